@@ -62,6 +62,7 @@ pub mod inspection;
 // Stages: functions of values, each from its predecessor's output.
 pub mod ingest;
 pub mod segment;
+mod recorder;
 mod surfaces;
 pub mod estimate;
 mod model;

@@ -237,6 +237,18 @@ fn print_changes(night: &str, changes: &Changes) {
             )
         },
     );
+    print_list("instruments that changed", &changes.instruments, |i| {
+        format!(
+            "{} of `{}`: {} since {}: {} ± {} {}",
+            i.error,
+            i.channel,
+            i.what,
+            i.since,
+            rounded(i.change),
+            rounded(i.bound),
+            i.unit
+        )
+    });
     print_list("learnt", &changes.learnt, |l| {
         format!(
             "{}: {:.1} nats; at {:.1} deg {} ± {} became {} ± {}",

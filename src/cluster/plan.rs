@@ -6,10 +6,11 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use crate::lineage::{Lineage, Stage};
+use crate::recorder::FlightCorrections;
 use crate::surfaces::DelayCorrection;
 
 /// Version of the file; another version is refused.
-const FORM: u32 = 2;
+const FORM: u32 = 3;
 
 /// Kind of items that a plan deals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -75,6 +76,8 @@ pub struct Plan {
     pub items: Vec<Item>,
     /// Corrections of the surfaces' delays from all flights; a plan of flights has none.
     pub delays: Vec<DelayCorrection>,
+    /// Corrections of flights whose instruments all flights together decide; a plan of flights has none.
+    pub corrections: Vec<FlightCorrections>,
     /// Lineage as far as the last stage of the shards.
     pub lineage: Lineage,
 }
@@ -117,6 +120,7 @@ impl Plan {
             shards,
             items: work.into_iter().map(item).collect(),
             delays,
+            corrections: vec![],
             lineage: lineage.until(of.last_stage()),
         }
     }

@@ -17,6 +17,7 @@ use crate::lineage::{Lineage, Stage};
 use crate::maneuver::{Maneuver, Status};
 use crate::night::{RunOutcome, campaign_lineage, run};
 use crate::pipeline::{Absent, Campaign, Conductor, Progress, bring_maneuvers};
+use crate::recorder::FlightCorrections;
 use crate::store::archive::{self, FlightFiles};
 use crate::store::files;
 use crate::surfaces::DelayCorrection;
@@ -43,11 +44,12 @@ pub fn deal(
     let archive = archive::find(&config.archive)?;
     let mut conductor = Conductor::join(config, archive, Absent::Report, Duration::ZERO, progress)?;
     conductor.remember_contents()?;
-    let (work, delays) = match dealt {
-        Dealt::Flights => (flights(&conductor), vec![]),
+    let (work, delays, corrections) = match dealt {
+        Dealt::Flights => (flights(&conductor), vec![], vec![]),
         Dealt::Maneuvers => maneuvers(&mut conductor)?,
     };
-    let plan = Plan::deal(dealt, shards, work, delays, &campaign_lineage(&conductor));
+    let mut plan = Plan::deal(dealt, shards, work, delays, &campaign_lineage(&conductor));
+    plan.corrections = corrections;
     conductor.runner.store.check_transfers()?;
     files::place_text(file, &plan.text())?;
     Ok(plan)
@@ -86,7 +88,10 @@ pub fn compute(
         return Err(Error::store(Path::new(flight), &what));
     }
     match plan.of {
-        Dealt::Maneuvers => estimate(&conductor, &campaign, plan, &items)?,
+        Dealt::Maneuvers => {
+            campaign.correct_flights(&plan.corrections);
+            estimate(&conductor, &campaign, plan, &items)?;
+        }
         Dealt::Flights if until >= Stage::Segment => conductor.surfaces(&mut campaign)?,
         Dealt::Flights => {}
     }
@@ -199,8 +204,11 @@ fn flights(conductor: &Conductor) -> Vec<Work> {
     readable.map(work).collect()
 }
 
-/// Every maneuver of the campaign, and the corrections of the surfaces' delays.
-fn maneuvers(conductor: &mut Conductor) -> Result<(Vec<Work>, Vec<DelayCorrection>)> {
+/// Work on maneuvers, with the corrections that all flights together decide.
+type ManeuverWork = (Vec<Work>, Vec<DelayCorrection>, Vec<FlightCorrections>);
+
+/// Every maneuver of the campaign, and the corrections of surfaces and instruments.
+fn maneuvers(conductor: &mut Conductor) -> Result<ManeuverWork> {
     let config = conductor.runner.config;
     let mut campaign = conductor.campaign(Stage::Segment)?;
     let mut missing: BTreeSet<String> = BTreeSet::new();
@@ -228,7 +236,7 @@ fn maneuvers(conductor: &mut Conductor) -> Result<(Vec<Work>, Vec<DelayCorrectio
         })
     };
     let work = campaign.maneuvers.iter().filter_map(work).collect();
-    Ok((work, campaign.delays))
+    Ok((work, campaign.delays, campaign.flight_corrections))
 }
 
 /// Cost of estimating a maneuver: samples times the square of the parameters.

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::differences::Cause;
 use crate::schema::words;
-use crate::tables::TunnelVerdict;
+use crate::tables::{InstrumentError, InstrumentTrend, TunnelVerdict};
 
 words! {
     /// Difference of a maneuver between two nights.
@@ -79,12 +79,28 @@ pub struct Contradiction {
     pub inside_95_pct: f64,
 }
 
+/// Error of an instrument that steps or drifts over the flights, and did not in the earlier night.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct InstrumentChange {
+    pub channel: String,
+    pub error: InstrumentError,
+    pub what: InstrumentTrend,
+    /// First flight of the step or drift.
+    pub since: String,
+    /// Size of the step, or drift from the first flight to the last.
+    pub change: f64,
+    /// Standard deviation of the change.
+    pub bound: f64,
+    pub unit: String,
+}
+
 /// Changes between two nights: the content of `alert.json`, and a section of the report.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Changes {
     /// Name of the night compared with; `None` for a first night.
     pub since: Option<String>,
-    /// `true` if a value moved, vanished or changed, or the rest of the campaign contradicts a part. New maneuvers alone are no alert.
+    /// `true` if a value moved, vanished or changed, an instrument changed, or the rest of the campaign
+    /// contradicts a part. New maneuvers alone are no alert.
     pub alert: bool,
     /// Differences of flights, configuration and code.
     pub causes: Vec<Cause>,
@@ -99,6 +115,9 @@ pub struct Changes {
     /// Information of flight about the derivatives, the most first.
     pub learnt: Vec<Learnt>,
     pub contradictions: Vec<Contradiction>,
+    /// Instruments whose errors changed.
+    #[serde(default)]
+    pub instruments: Vec<InstrumentChange>,
 }
 
 impl Changes {
@@ -112,5 +131,6 @@ impl Changes {
             && self.gone_trends.is_empty()
             && self.verdicts.is_empty()
             && self.contradictions.is_empty()
+            && self.instruments.is_empty()
     }
 }

@@ -7,7 +7,8 @@ mod parts;
 mod stage;
 
 pub use changes::{
-    Changes, Contradiction, Learnt, ManeuverChange, ManeuverDifference, Moved, VerdictChange,
+    Changes, Contradiction, InstrumentChange, Learnt, ManeuverChange, ManeuverDifference, Moved,
+    VerdictChange,
 };
 pub use differences::{Cause, Origin};
 pub use parts::{Code, Lineage};

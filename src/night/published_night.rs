@@ -7,8 +7,8 @@ use crate::lineage::Lineage;
 use crate::store::files;
 use crate::store::nights::{Night, Nights};
 use crate::tables::{
-    CovarianceRow, EstimateRow, FitRow, PosteriorRow, PublishedTrend, PublishedVerdict,
-    SelfCheckRow,
+    CovarianceRow, EstimateRow, FitRow, InstrumentTrendRow, PosteriorRow, PublishedTrend,
+    PublishedVerdict, SelfCheckRow,
 };
 
 /// Time and class of a maneuver, from the table `maneuvers`.
@@ -34,6 +34,7 @@ pub struct NightTables<'a> {
     pub posterior: &'a [PosteriorRow],
     pub covariances: &'a [CovarianceRow],
     pub self_check: &'a [SelfCheckRow],
+    pub instrument_trends: &'a [InstrumentTrendRow],
 }
 
 /// Tables of a published night that are compared with those of another.
@@ -48,6 +49,7 @@ pub struct PublishedNight {
     posterior: Vec<PosteriorRow>,
     covariances: Vec<CovarianceRow>,
     self_check: Vec<SelfCheckRow>,
+    instrument_trends: Vec<InstrumentTrendRow>,
 }
 
 impl PublishedNight {
@@ -70,6 +72,7 @@ impl PublishedNight {
             posterior: files::published(&folder, "posterior")?,
             covariances: files::published(&folder, "posterior_covariance")?,
             self_check: files::published(&folder, "self_check")?,
+            instrument_trends: files::published(&folder, "instrument_trends")?,
         })
     }
 
@@ -86,6 +89,7 @@ impl PublishedNight {
             posterior: &self.posterior,
             covariances: &self.covariances,
             self_check: &self.self_check,
+            instrument_trends: &self.instrument_trends,
         }
     }
 }

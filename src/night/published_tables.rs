@@ -76,6 +76,7 @@ fn publish_estimate(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
     table::publish(shelf, &campaign.correlations)?;
     table::publish_fits(shelf, &fits, &predicted)?;
     table::publish_as(shelf, "fit_outputs", &campaign.fit_outputs)?;
+    table::publish(shelf, &campaign.instrument_trends)?;
     table::publish(shelf, &estimates)?;
     table::publish_as(shelf, "combined", &sums)?;
     table::publish(shelf, &members)?;

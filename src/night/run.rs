@@ -193,6 +193,7 @@ impl NightRun<'_> {
             posterior: &campaign.model.rows.posterior,
             covariances: &campaign.model.rows.covariance,
             self_check: &campaign.model.rows.self_check,
+            instrument_trends: &campaign.instrument_trends,
         };
         changes::between(&name, &before.tables(), &now)
     }

@@ -13,12 +13,13 @@ use crate::model::Model;
 use crate::output_error::Outcome;
 use crate::proof_of_match::Matched;
 use crate::qualities::Qualities;
+use crate::recorder::FlightCorrections;
 use crate::store::ArtefactName;
 use crate::surfaces::DelayCorrection;
 use crate::tables::{
     AgreementRow, ChangeRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, DisagreementRow,
-    EstimateRow, EventRow, ExtrapolationRow, FitRow, FlightRow, InstrumentRow, LiftAndDragRow,
-    ManeuverComparisonRow, OutlierRow, TrendRow, VerdictRow,
+    EstimateRow, EventRow, ExtrapolationRow, FitRow, FlightRow, InstrumentRow, InstrumentTrendRow,
+    LiftAndDragRow, ManeuverComparisonRow, OutlierRow, TrendRow, VerdictRow,
 };
 
 /// A flight, maneuver or group whose artefact the store lacks.
@@ -71,6 +72,10 @@ pub struct Campaign {
     pub channels: Vec<ChannelRow>,
     pub checks: Vec<CheckRow>,
     pub instruments: Vec<InstrumentRow>,
+    /// Errors of the instruments over the flights.
+    pub instrument_trends: Vec<InstrumentTrendRow>,
+    /// Corrections of flights whose instruments all flights together decide.
+    pub flight_corrections: Vec<FlightCorrections>,
     pub maneuvers: Vec<Maneuver>,
     /// Excitation that fits no class.
     pub unknown: Vec<Unknown>,
@@ -123,6 +128,14 @@ impl Campaign {
     /// State of a stage, empty until the stage is brought.
     pub fn state(&mut self, stage: Stage) -> &mut StageState {
         self.states.entry(stage).or_default()
+    }
+
+    /// Corrects flights as all flights together decide.
+    pub fn correct_flights(&mut self, corrections: &[FlightCorrections]) {
+        for flight in &mut self.flights {
+            let own = corrections.iter().find(|c| c.flight_id == flight.id());
+            flight.by_all_flights = own.map(|c| c.corrections.clone());
+        }
     }
 
     /// Number of flights that ingest rejected.

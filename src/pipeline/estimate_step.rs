@@ -15,7 +15,7 @@ use crate::aircraft::Aircraft;
 use crate::config::Config;
 use crate::error::{ProblemStage, Result};
 use crate::estimate::{self, Context, Estimated};
-use crate::flight::Record;
+use crate::flight::{Correction, Record};
 use crate::lineage::Stage;
 use crate::maneuver::{Class, Maneuver};
 use crate::output_error::Outcome;
@@ -37,6 +37,9 @@ pub struct EstimateKey<'a> {
     estimate: &'a estimate::Settings,
     /// Corrections of the surfaces of the maneuver's axis.
     delays: Vec<&'a DelayCorrection>,
+    /// Corrections of the flight's instruments that all flights decide.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    corrections: Option<&'a [Correction]>,
 }
 
 /// Record of a flight with the surfaces' delays corrected, opened by the first maneuver that reads
@@ -112,6 +115,7 @@ impl<'a> Step for EstimateStep<'a> {
             tunnel: &config.tunnel,
             estimate: &config.estimate,
             delays: delays_of_axis(config, self.record.delays, self.maneuver.axis),
+            corrections: self.record.flight.by_all_flights.as_deref(),
         }
     }
 

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Problem, Result};
-use crate::flight::is_stretch;
+use crate::flight::{Correction, is_stretch};
 use crate::ingest::Assessment;
 use crate::maneuver::Event;
 use crate::store::record_file::{self, RecordFile, RecordHeader};
@@ -68,6 +68,9 @@ impl IngestedFlight {
 pub struct Flight {
     pub fingerprint: String,
     pub ingested: IngestedStretch,
+    /// Corrections of the instruments that all flights together decide, in place of those that the
+    /// flight alone gives; estimates have them, segmentation does not.
+    pub by_all_flights: Option<Vec<Correction>>,
 }
 
 impl Flight {
@@ -86,12 +89,14 @@ impl Flight {
     /// [`Error::Io`] or [`Error::Store`] naming the file.
     pub fn open(&self, store: &Store) -> Result<RecordFile> {
         let record = self.ingested.record.as_ref();
+        let own = &self.ingested.assessment.corrections;
+        let corrections = self.by_all_flights.as_ref().unwrap_or(own);
         let record =
             record.ok_or_else(|| Error::store(self.id().as_ref(), &"the flight has no record"))?;
         store.fetch(&record.name, &record.digest)?;
         Ok(record_file::open(&store.path(&record.name))?
             .completed(self.ingested.assessment.stand_ins.clone())
-            .corrected(self.ingested.assessment.corrections.clone()))
+            .corrected(corrections.clone()))
     }
 
     /// `true` for a stretch of the flight of this id, and for the flight itself.
@@ -157,6 +162,7 @@ mod tests {
         Flight {
             fingerprint: String::new(),
             ingested: IngestedStretch::rejected(flight_id, problem),
+            by_all_flights: None,
         }
     }
 

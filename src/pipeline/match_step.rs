@@ -15,6 +15,7 @@ use crate::aero::{Buildup, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::config::Config;
 use crate::error::Result;
+use crate::flight::Correction;
 use crate::maneuver::{Maneuver, Means};
 use crate::model::Model;
 use crate::proof_of_match::{self, Basis, Flown, Matched, OwnEstimates, Specification};
@@ -36,6 +37,8 @@ pub struct MatchKey<'a> {
     /// The maneuver's own estimates and means, from which its Dutch roll follows.
     own: Option<(&'a Means, OwnEstimates)>,
     delays: &'a [DelayCorrection],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    corrections: Option<&'a [Correction]>,
 }
 
 /// Proof of match of one maneuver.
@@ -70,6 +73,7 @@ impl<'a> Step for MatchStep<'a> {
             derivatives: self.derivatives,
             own: self.own.clone(),
             delays: self.delays,
+            corrections: self.record.flight.by_all_flights.as_deref(),
         }
     }
 

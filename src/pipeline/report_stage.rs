@@ -82,6 +82,7 @@ pub fn make_report(
         channels: &campaign.channels,
         checks: &campaign.checks,
         instruments: &campaign.instruments,
+        instrument_trends: &campaign.instrument_trends,
         events: &campaign.events,
         problems: &campaign.problems,
         pages: &pages,

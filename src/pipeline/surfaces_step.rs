@@ -14,8 +14,10 @@ use crate::aircraft::Aircraft;
 use crate::config::Config;
 use crate::error::Result;
 use crate::flight::Record;
+use crate::ingest::ErrorEvidence;
 use crate::lineage::Stage;
 use crate::maneuver::Maneuver;
+use crate::recorder::{self, ErrorSeries};
 use crate::store::{ArtefactName, Kind, Store};
 use crate::surfaces::{self, Basis, FlightEvidence};
 
@@ -117,11 +119,34 @@ pub fn surfaces(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
     Ok(())
 }
 
-/// Adds the delays of the surfaces from all flights, and what was found of each flight.
+/// Adds the delays of the surfaces from all flights, and what was found of each flight. Then the errors
+/// of all instruments are compared over the flights.
 fn combine(config: &Config, campaign: &mut Campaign, flights: &[FlightEvidence]) {
     let delays = surfaces::of_campaign(flights);
     campaign.delays = surfaces::corrections(&delays, &config.estimate.surfaces);
     let found = surfaces::findings(flights, &delays, &campaign.delays, &config.channels);
+    let of_surfaces = surfaces::delay_series(flights, &config.channels);
+    compare_flights(config, campaign, of_surfaces);
     campaign.instruments.extend(found.rows);
+    campaign.problems.extend(found.problems);
+}
+
+/// Compares the errors of the instruments over the flights, and corrects the flights that hardly determine
+/// them by the others.
+fn compare_flights(config: &Config, campaign: &mut Campaign, of_surfaces: Vec<ErrorSeries>) {
+    let evidence = |flight: &Flight| flight.ingested.assessment.error_evidence.clone();
+    let flights: Vec<(String, Vec<ErrorEvidence>)> = campaign
+        .flights
+        .iter()
+        .map(|flight| (flight.id().to_owned(), evidence(flight)))
+        .collect();
+    let mut series = recorder::instrument_series(&flights, &config.channels);
+    series.extend(of_surfaces);
+    let mut found = recorder::examine(series);
+    let settings = &config.ingest.compatibility;
+    let corrections = recorder::correct_flights(&mut campaign.instruments, &mut found, settings);
+    campaign.correct_flights(&corrections);
+    campaign.flight_corrections = corrections;
+    campaign.instrument_trends = found.rows;
     campaign.problems.extend(found.problems);
 }

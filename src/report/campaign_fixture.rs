@@ -73,6 +73,7 @@ impl Campaign {
             channels: &self.channels,
             checks: &self.checks,
             instruments: &self.instruments,
+            instrument_trends: &[],
             events: &self.events,
             problems: &self.problems,
             pages: &self.pages,

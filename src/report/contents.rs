@@ -12,7 +12,7 @@ use crate::proof_of_match::{self, Matched};
 use crate::qualities::{Qualities, Specification};
 use crate::tables::{
     AgreementRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow,
-    FitRow, FlightRow, History, InstrumentRow, PosteriorRow, TrendRow,
+    FitRow, FlightRow, History, InstrumentRow, InstrumentTrendRow, PosteriorRow, TrendRow,
 };
 
 /// A maneuver class of the configuration.
@@ -53,6 +53,7 @@ pub struct Contents<'a> {
     pub channels: &'a [ChannelRow],
     pub checks: &'a [CheckRow],
     pub instruments: &'a [InstrumentRow],
+    pub instrument_trends: &'a [InstrumentTrendRow],
     pub events: &'a [EventRow],
     pub problems: &'a [Problem],
     /// Identifiers of the maneuvers that get a page (see [`super::maneuvers_with_page`]).

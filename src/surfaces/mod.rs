@@ -27,7 +27,7 @@ mod findings;
 pub use correction::{DelayCorrection, corrections};
 pub use delays::of_campaign;
 pub use evidence::FlightEvidence;
-pub use findings::findings;
+pub use findings::{delay_series, findings};
 pub use flight::flight_evidence;
 pub use maneuver_data::Basis;
 pub use settings::Settings;

@@ -57,6 +57,12 @@ const PUBLISHED: &[(&str, &str, &str)] = &[
     ),
     (
         "estimate",
+        "instrument_trends",
+        "channel signal error unit flights mean mean_bound scatter common far_flights completed_flights verdict since change \
+         change_bound probability",
+    ),
+    (
+        "estimate",
         "fit_outputs",
         "maneuver_id class alpha_deg output unit samples root_mean_square theil theil_bias theil_variance \
          theil_covariance r_squared",

@@ -1,5 +1,5 @@
 //! Changes from one published night to the next, with their causes: maneuvers, their derivatives,
-//! trends and verdicts.
+//! trends, verdicts and instruments.
 //!
 //! A number has moved if it differs by more than its uncertainty, the larger of the two nights': the
 //! corrected bound of an estimate, the standard error of a trend. Smaller differences are noise and
@@ -7,6 +7,7 @@
 
 mod causes;
 mod contradictions;
+mod instruments;
 mod learnt;
 #[cfg(test)]
 mod tests;
@@ -15,6 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use self::causes::Causes;
 use self::contradictions::contradictions;
+use self::instruments::instruments;
 use self::learnt::learnt;
 use super::published_night::{ManeuverWindow, NightTables};
 use crate::lineage::{Changes, ManeuverChange, ManeuverDifference, Moved, Stage, VerdictChange};
@@ -40,6 +42,7 @@ pub fn between(since: &str, before: &NightTables, now: &NightTables) -> Changes 
         verdicts: changed_verdicts(before, now, &causes),
         learnt: learnt(before, now),
         contradictions: contradictions(before, now),
+        instruments: instruments(before, now),
         causes: causes.all,
         maneuvers,
         estimates,
@@ -56,6 +59,7 @@ fn needs_attention(changes: &Changes) -> bool {
         || !changes.gone_trends.is_empty()
         || !changes.verdicts.is_empty()
         || !changes.contradictions.is_empty()
+        || !changes.instruments.is_empty()
         || maneuvers.any(|m| m.what != ManeuverDifference::New)
 }
 

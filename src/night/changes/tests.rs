@@ -6,6 +6,7 @@ use super::*;
 use crate::lineage::Lineage;
 use crate::maneuver::Maneuver;
 use crate::tables::TunnelVerdict;
+use crate::tables::{CommonErrorVerdict, InstrumentError, InstrumentTrend, InstrumentTrendRow};
 
 #[derive(Clone)]
 struct Campaign {
@@ -15,6 +16,7 @@ struct Campaign {
     estimates: Vec<EstimateRow>,
     trends: Vec<PublishedTrend>,
     verdicts: Vec<PublishedVerdict>,
+    instrument_trends: Vec<InstrumentTrendRow>,
 }
 
 impl Campaign {
@@ -26,6 +28,7 @@ impl Campaign {
             estimates,
             trends,
             verdicts,
+            instrument_trends,
         } = self;
         NightTables {
             lineage,
@@ -37,6 +40,7 @@ impl Campaign {
             posterior: &[],
             covariances: &[],
             self_check: &[],
+            instrument_trends,
         }
     }
 
@@ -99,6 +103,7 @@ fn campaign() -> Campaign {
         estimates: vec![],
         trends: vec![],
         verdicts: vec![],
+        instrument_trends: vec![],
     };
     campaign.fly("f1", "one", 1.0);
     campaign.fly("f2", "two", 2.0);
@@ -227,4 +232,41 @@ fn a_maneuver_is_gone_with_its_flight_or_no_longer_what_it_was() {
         )
     );
     assert!(changes.alert);
+}
+
+fn trend(verdict: InstrumentTrend, since: Option<&str>) -> InstrumentTrendRow {
+    InstrumentTrendRow {
+        channel: "alpha".into(),
+        signal: "alpha_vane_deg".into(),
+        error: InstrumentError::Bias,
+        unit: "deg".into(),
+        flights: 12,
+        mean: Some(0.1),
+        mean_bound: Some(0.1),
+        scatter: Some(0.3),
+        common: CommonErrorVerdict::Ordinary,
+        far_flights: String::new(),
+        completed_flights: 0,
+        verdict,
+        since: since.map(Into::into),
+        change: Some(0.7),
+        change_bound: Some(0.05),
+        probability: Some(1e-7),
+    }
+}
+
+#[test]
+fn an_instrument_that_steps_is_an_alert_with_its_channel_and_flight_once() {
+    let (mut before, mut now) = (campaign(), campaign());
+    before.instrument_trends = vec![trend(InstrumentTrend::Steady, None)];
+    now.instrument_trends = vec![trend(InstrumentTrend::Step, Some("f2"))];
+    let changes = between("0001", &before.tables(), &now.tables());
+    let change = &changes.instruments[0];
+    assert!(changes.alert && !changes.is_empty());
+    assert_eq!(
+        (change.channel.as_str(), change.since.as_str()),
+        ("alpha", "f2")
+    );
+    let again = between("0002", &now.tables(), &now.tables());
+    assert!(!again.alert && again.instruments.is_empty());
 }

@@ -1,6 +1,6 @@
 //! Changes since the previously published night, with their causes.
 
-use crate::lineage::{Changes, Contradiction, Learnt, ManeuverDifference, Moved};
+use crate::lineage::{Changes, Contradiction, InstrumentChange, Learnt, ManeuverDifference, Moved};
 use crate::report::notation::{angle, number};
 use crate::report::table_view::TableView;
 
@@ -44,6 +44,7 @@ fn counts(changes: &Changes) -> Vec<String> {
         (changes.gone_trends.len(), "trends gone"),
         (changes.verdicts.len(), "verdicts changed"),
         (changes.contradictions.len(), "contradictions"),
+        (changes.instruments.len(), "instruments changed"),
     ]
     .iter()
     .filter(|(n, _)| *n > 0)
@@ -75,6 +76,7 @@ pub fn tables(changes: &Changes) -> Vec<TableView> {
         input_changes(changes),
         verdicts(changes),
         contradictions(changes),
+        instruments(changes),
         learnt(changes),
         moved("Trends that moved", "group", &changes.trends),
         trend_names(changes),
@@ -124,6 +126,23 @@ fn contradictions(changes: &Changes) -> TableView {
     let rows = changes.contradictions.iter().map(row).collect();
     let heads = ["flight or class", "coefficient", "estimates", "inside 95 %"];
     TableView::new("Contradicted by the rest of the campaign", "", &heads, rows)
+}
+
+fn instruments(changes: &Changes) -> TableView {
+    let row = |i: &InstrumentChange| {
+        vec![
+            i.channel.clone(),
+            i.error.to_string(),
+            i.what.to_string(),
+            i.since.clone(),
+            number(Some(i.change), 3),
+            number(Some(i.bound), 2),
+            i.unit.clone(),
+        ]
+    };
+    let rows = changes.instruments.iter().map(row).collect();
+    let heads = ["channel", "error", "", "since", "change", "bound", "unit"];
+    TableView::new("Instruments that changed", "", &heads, rows)
 }
 
 fn learnt(changes: &Changes) -> TableView {

@@ -10,8 +10,8 @@ use crate::report::notation::{NOTHING, angle, fixed, number, outcome_in_words};
 use crate::report::table_view::TableView;
 use crate::schema::Words;
 use crate::tables::{
-    ALL_FLIGHTS, ChannelRow, CheckRow, EventRow, EventVerdict, FitRow, FlightRow, InstrumentRow,
-    Outcome,
+    ALL_FLIGHTS, ChannelRow, CheckRow, CommonErrorVerdict, EventRow, EventVerdict, FitRow,
+    FlightRow, InstrumentRow, InstrumentTrendRow, Outcome,
 };
 
 /// The tables of failures, without empty ones.
@@ -24,6 +24,7 @@ pub fn tables(contents: &Contents) -> Vec<TableView> {
         checks(contents),
         flights(contents),
         instruments(contents),
+        instrument_trends(contents),
         channels(contents),
     ];
     tables.into_iter().filter(|t| !t.rows.is_empty()).collect()
@@ -234,6 +235,50 @@ fn instrument(channel: &str, unit: &str, rows: &[&InstrumentRow]) -> Vec<String>
         range(rows.iter().filter_map(|r| r.scale), 4),
         range(rows.iter().filter_map(|r| r.delay_s.map(|d| 1e3 * d)), 1),
     ]
+}
+
+/// Errors of the instruments over the flights.
+fn instrument_trends(contents: &Contents) -> TableView {
+    let row = |t: &InstrumentTrendRow| {
+        vec![
+            t.channel.clone(),
+            t.error.to_string(),
+            t.unit.clone(),
+            t.flights.to_string(),
+            t.completed_flights.to_string(),
+            number(t.mean, 4),
+            number(t.mean_bound, 2),
+            number(t.scatter, 2),
+            t.common.to_string(),
+            t.far_flights.clone(),
+            t.verdict.to_string(),
+            t.since.clone().unwrap_or_else(|| NOTHING.to_owned()),
+        ]
+    };
+    let judged = contents.instrument_trends.iter();
+    let judged = judged.filter(|t| t.common != CommonErrorVerdict::TooFewFlights);
+    let heads = [
+        "channel",
+        "error",
+        "unit",
+        "flights",
+        "completed",
+        "mean",
+        "bound",
+        "scatter",
+        "mean is",
+        "far from the others",
+        "over the flights",
+        "since",
+    ];
+    let note = "Mean of each error over the flights, and its scatter between them. Completed: flights that do \
+                not determine the error by themselves and take it from the others.";
+    TableView::new(
+        "Instruments over the flights",
+        note,
+        &heads,
+        judged.map(row).collect(),
+    )
 }
 
 /// Smallest and largest value; a dash without any.

@@ -12,6 +12,7 @@ mod derivative_results;
 mod failures;
 mod history_strips;
 mod identifiability_tables;
+mod instrument_charts;
 mod maneuver_page;
 mod maneuver_table;
 mod match_charts;
@@ -41,6 +42,7 @@ use derivative_results::DerivativeResults;
 use maneuver_page::ManeuverPage;
 use match_section::MatchSection;
 use qualities_section::QualitiesSection;
+use quality_charts::QualityChart;
 use summary::Summary;
 use verdict_table::VerdictGroup;
 
@@ -71,6 +73,7 @@ pub struct Page<'a> {
     identifiability: Vec<TableView>,
     is_held_by_evidence: bool,
     failures: Vec<TableView>,
+    instrument_charts: Vec<QualityChart>,
     maneuver_pages: Vec<ManeuverPage>,
     provenance: &'a Provenance,
     data: TableView,
@@ -109,6 +112,7 @@ impl<'a> Page<'a> {
             identifiability: identifiability_tables::tables(contents),
             is_held_by_evidence: contents.estimates.iter().any(|e| e.held_because.is_some()),
             failures: failures::tables(contents),
+            instrument_charts: instrument_charts::charts(contents),
             maneuver_pages: maneuver_page::pages(contents, &markers),
             provenance: contents.provenance,
             data: contents.provenance.table(),

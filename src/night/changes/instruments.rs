@@ -1,0 +1,35 @@
+//! Instruments whose errors step or drift over the flights.
+
+use std::collections::BTreeSet;
+
+use crate::lineage::InstrumentChange;
+use crate::night::published_night::NightTables;
+use crate::tables::{InstrumentError, InstrumentTrend, InstrumentTrendRow};
+
+/// Errors that step or drift now and did not in the earlier night. A step that is found a flight earlier
+/// or later than in the earlier night is no news.
+pub fn instruments(before: &NightTables, now: &NightTables) -> Vec<InstrumentChange> {
+    let known = before.instrument_trends.iter();
+    let known: BTreeSet<_> = known.filter_map(place).collect();
+    let now = now.instrument_trends.iter();
+    let is_new = |row: &&InstrumentTrendRow| place(row).is_some_and(|at| !known.contains(&at));
+    now.filter(is_new).filter_map(change).collect()
+}
+
+/// Error with the way it changes; `None` for a steady one.
+fn place(row: &InstrumentTrendRow) -> Option<(&str, InstrumentError, InstrumentTrend)> {
+    let changes = matches!(row.verdict, InstrumentTrend::Step | InstrumentTrend::Drift);
+    changes.then_some((row.channel.as_str(), row.error, row.verdict))
+}
+
+fn change(row: &InstrumentTrendRow) -> Option<InstrumentChange> {
+    Some(InstrumentChange {
+        channel: row.channel.clone(),
+        error: row.error,
+        what: row.verdict,
+        since: row.since.clone()?,
+        change: row.change?,
+        bound: row.change_bound?,
+        unit: row.unit.clone(),
+    })
+}

@@ -1,0 +1,211 @@
+//! Mean of an error over the flights, its scatter between them, and flights far from the others.
+
+use super::error_series::{ErrorSample, ErrorSeries};
+use crate::numerics::random_effects::{Observation, RandomEffects};
+use crate::numerics::student;
+
+/// Fewest flights with a common error: with fewer the scatter is not known to its size.
+const FEWEST_FLIGHTS: usize = 4;
+
+/// Probability by chance, over the flights of a series, below which a flight is far from the others.
+/// Some fifty series are examined.
+const FAR_PROBABILITY: f64 = 1e-4;
+
+/// Mean and scatter of an error.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CommonError {
+    pub mean: f64,
+    /// Standard deviation of the mean, with what all flights have alike.
+    pub bound: f64,
+    /// Standard deviation between flights.
+    pub scatter: f64,
+    /// Upper 90 % limit of the scatter. That of few flights is itself uncertain.
+    pub scatter_limit: f64,
+    /// Flights far from the others, which the mean leaves out.
+    pub far: Vec<String>,
+}
+
+impl CommonError {
+    /// Common error of a series; `None` with too few flights.
+    #[must_use]
+    pub fn of(series: &ErrorSeries) -> Option<CommonError> {
+        let mut near: Vec<&ErrorSample> = series.samples.iter().collect();
+        let mut far = Vec::new();
+        while near.len() >= FEWEST_FLIGHTS
+            && let Some(farthest) = farthest(&near, series.ordinary)
+        {
+            far.push(near.remove(farthest).flight_id.clone());
+        }
+        if near.len() < FEWEST_FLIGHTS {
+            return None;
+        }
+        let observations = observations(&near);
+        let pooled = RandomEffects::mean_of(&observations)?;
+        let widening = student::widening_95(pooled.degrees_of_freedom);
+        Some(CommonError {
+            mean: pooled.mean(),
+            bound: (widening * pooled.variance().sqrt()).hypot(systematic(&near, &pooled)),
+            scatter: pooled.scatter_variance.sqrt(),
+            scatter_limit: pooled.scatter_limit(&observations)?.sqrt(),
+            far,
+        })
+    }
+
+    /// Error of a flight with this evidence of its own, and its standard deviation.
+    #[must_use]
+    pub fn of_flight(&self, own: Option<&ErrorSample>) -> (f64, f64) {
+        let prior = (self.scatter_limit.powi(2) + self.bound.powi(2)).recip();
+        let (moment, information) = own.map_or((0.0, 0.0), |own| {
+            let information = own.bound.powi(-2);
+            (information * own.value, information)
+        });
+        let total = prior + information;
+        ((prior * self.mean + moment) / total, total.recip().sqrt())
+    }
+}
+
+/// Error of the mean by what all flights have alike: the flights' own, with the weights of the mean.
+fn systematic(samples: &[&ErrorSample], pooled: &RandomEffects<1>) -> f64 {
+    let weight = |s: &ErrorSample| (s.bound * s.bound + pooled.scatter_variance).recip();
+    let moment: f64 = samples.iter().map(|s| weight(s) * s.systematic).sum();
+    moment / samples.iter().map(|s| weight(s)).sum::<f64>()
+}
+
+fn observations(samples: &[&ErrorSample]) -> Vec<Observation> {
+    let observation = |sample: &&ErrorSample| Observation {
+        value: sample.value,
+        variance: sample.bound * sample.bound,
+    };
+    samples.iter().map(observation).collect()
+}
+
+/// Flight that is farthest from the others, if chance does not explain it and no ordinary error is as
+/// large.
+fn farthest(samples: &[&ErrorSample], ordinary: f64) -> Option<usize> {
+    let all = observations(samples);
+    let probability = |i: usize| {
+        let mut others = all.clone();
+        let own = others.remove(i);
+        let pooled = RandomEffects::mean_of(&others)?;
+        let distance = (own.value - pooled.mean()).abs();
+        let variance = own.variance + pooled.scatter_variance + pooled.variance();
+        let chance = student::exceedance(distance / variance.sqrt(), pooled.degrees_of_freedom);
+        let is_far = distance > ordinary && chance * (all.len() as f64) < FAR_PROBABILITY;
+        is_far.then_some((i, chance))
+    };
+    let far = (0..all.len()).filter_map(probability);
+    far.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
+}
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_abs_diff_eq;
+
+    use super::*;
+    use crate::numerics::random::RandomStream;
+    use crate::tables::InstrumentError;
+
+    fn series(values: &[(f64, f64)]) -> ErrorSeries {
+        let sample = |(i, (value, bound)): (usize, &(f64, f64))| ErrorSample {
+            flight_id: format!("f{i}"),
+            value: *value,
+            bound: *bound,
+            systematic: 0.0,
+        };
+        ErrorSeries {
+            channel: "q".to_owned(),
+            signal: "q_deg_s".to_owned(),
+            error: InstrumentError::Scale,
+            ordinary: 0.005,
+            samples: values.iter().enumerate().map(sample).collect(),
+        }
+    }
+
+    #[test]
+    fn a_flight_far_from_the_others_is_named_and_left_out_of_the_mean() {
+        let mut values = vec![
+            (0.021, 0.001),
+            (0.019, 0.001),
+            (0.02, 0.002),
+            (0.0205, 0.001),
+        ];
+        values.extend([
+            (0.0195, 0.001),
+            (0.02, 0.001),
+            (0.0185, 0.001),
+            (0.25, 0.004),
+        ]);
+        let common = CommonError::of(&series(&values)).unwrap();
+        assert_eq!(common.far, ["f7"]);
+        assert_abs_diff_eq!(common.mean, 0.0197, epsilon = 5e-4);
+        assert!(common.bound < 0.001 && common.scatter < 0.001, "{common:?}");
+        assert_eq!(CommonError::of(&series(&values[..3])), None);
+    }
+
+    #[test]
+    fn biases_that_scatter_from_flight_to_flight_are_not_far() {
+        let values = [0.3, -0.2, 0.1, -0.4, 0.25, 0.0, -0.1].map(|v| (v, 0.01));
+        let common = CommonError::of(&series(&values)).unwrap();
+        assert!(common.far.is_empty());
+        assert!(common.scatter_limit > common.scatter && common.scatter > 0.2);
+    }
+
+    #[test]
+    fn a_flight_without_evidence_has_the_mean_and_one_with_much_its_own() {
+        let values = [
+            (0.021, 0.001),
+            (0.019, 0.001),
+            (0.02, 0.001),
+            (0.0205, 0.001),
+        ];
+        let common = CommonError::of(&series(&values)).unwrap();
+        let (value, bound) = common.of_flight(None);
+        assert_abs_diff_eq!(value, common.mean);
+        assert_abs_diff_eq!(
+            bound,
+            common.scatter_limit.hypot(common.bound),
+            epsilon = 1e-12
+        );
+        let sure = ErrorSample {
+            flight_id: String::new(),
+            value: 0.03,
+            bound: 1e-6,
+            systematic: 0.0,
+        };
+        let (value, bound) = common.of_flight(Some(&sure));
+        assert_abs_diff_eq!(value, 0.03, epsilon = 1e-6);
+        assert!(bound <= 1e-6);
+    }
+
+    #[test]
+    fn what_all_flights_have_alike_does_not_average_out() {
+        let mut series = series(&[(0.02, 0.002); 16]);
+        series
+            .samples
+            .iter_mut()
+            .for_each(|sample| sample.systematic = 0.001);
+        let bound = CommonError::of(&series).unwrap().bound;
+        let of_chance = 0.0005 * student::widening_95(15.0);
+        assert_abs_diff_eq!(bound, of_chance.hypot(0.001), epsilon = 1e-9);
+    }
+
+    #[test]
+    fn bounds_of_flights_that_say_little_hold() {
+        const TIMES: u32 = 300;
+        let mut random = RandomStream::new(3, "recorder");
+        let mut inside = 0;
+        for _ in 0..TIMES {
+            let mean = 0.01 * random.normal();
+            let truth: Vec<f64> = (0..6).map(|_| mean + 0.002 * random.normal()).collect();
+            let mut draw = |truth: f64, bound: f64| (truth + bound * random.normal(), bound);
+            let mut values: Vec<(f64, f64)> = truth[..5].iter().map(|t| draw(*t, 0.001)).collect();
+            values.push(draw(truth[5], 0.01));
+            let series = series(&values);
+            let common = CommonError::of(&series).unwrap();
+            let (value, bound) = common.of_flight(series.samples.last());
+            inside += u32::from((value - truth[5]).abs() < 1.96 * bound);
+        }
+        let share = f64::from(inside) / f64::from(TIMES);
+        assert!((0.93..0.995).contains(&share), "{share}");
+    }
+}

@@ -1,0 +1,185 @@
+//! Corrections of flights that the other flights decide.
+//!
+//! A flight that determines an error by itself keeps its own. One that does not takes the posterior of
+//! its weak evidence and the errors of the others. An error far from the others' corrects nothing.
+
+use std::collections::BTreeSet;
+
+use serde::{Deserialize, Serialize};
+
+use super::findings::Findings;
+use crate::flight::Correction;
+use crate::ingest::Compatibility;
+use crate::tables::{InstrumentError, InstrumentRow, InstrumentVerdict};
+
+/// Largest bound of a completed error, in ordinary sizes: with a larger one the other flights say as
+/// little as the flight itself.
+const MOST_OF_ORDINARY: f64 = 0.7;
+
+/// Steps of the grid of completed errors in a bound. A further flight that moves an error by less leaves
+/// the estimates as they are, and rounding is a twentieth of the bound.
+const STEPS_IN_BOUND: f64 = 8.0;
+
+/// Corrections of a flight's record, in place of those that the flight alone gives.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FlightCorrections {
+    pub flight_id: String,
+    pub corrections: Vec<Correction>,
+}
+
+/// Completes the rows of the flights by the errors that the flights have in common. Returns the
+/// corrections of the flights that are corrected otherwise than before.
+pub fn correct_flights(
+    rows: &mut [InstrumentRow],
+    findings: &mut Findings,
+    settings: &Compatibility,
+) -> Vec<FlightCorrections> {
+    let mut changed = BTreeSet::new();
+    for row in rows.iter_mut() {
+        let applied = row.applied.clone();
+        findings.complete(row, settings);
+        if row.applied != applied {
+            changed.insert(row.flight_id.clone());
+        }
+    }
+    let of_flight = |flight_id: String| {
+        let own = rows.iter().filter(|row| row.flight_id == flight_id);
+        let corrections = own.filter_map(correction).collect();
+        FlightCorrections {
+            flight_id,
+            corrections,
+        }
+    };
+    changed.into_iter().map(of_flight).collect()
+}
+
+impl Findings {
+    /// Completes the errors of an instrument that its flight does not determine, and withdraws the
+    /// corrections by errors far from the other flights'.
+    fn complete(&mut self, row: &mut InstrumentRow, settings: &Compatibility) {
+        for (one, trend) in self.examined.iter().zip(&mut self.rows) {
+            let (series, error) = (&one.series, one.series.error);
+            let Some(common) = one
+                .common
+                .as_ref()
+                .filter(|_| series.channel == row.channel)
+            else {
+                continue;
+            };
+            if common.far.contains(&row.flight_id) {
+                row.set_applied(error, false);
+            } else if row.error(error).is_none() {
+                let mut samples = series.samples.iter();
+                let own = samples.find(|sample| sample.flight_id == row.flight_id);
+                let (value, bound) = common.of_flight(own);
+                if bound > MOST_OF_ORDINARY * series.ordinary {
+                    continue;
+                }
+                let value = on_grid(value, bound);
+                row.set_error(error, value, bound);
+                row.set_applied(error, settings.corrects(error, value, bound));
+                if row.verdict.is_unknown() {
+                    row.verdict = InstrumentVerdict::FromOthers;
+                }
+                trend.completed_flights += 1;
+            }
+        }
+    }
+}
+
+/// Value on a grid whose step is a power of two.
+fn on_grid(value: f64, bound: f64) -> f64 {
+    let step = (bound / STEPS_IN_BOUND).log2().floor().exp2();
+    step * (value / step).round()
+}
+
+/// Correction by the errors of a row; `None` where it applies none.
+fn correction(row: &InstrumentRow) -> Option<Correction> {
+    let applied = |error| {
+        let value = row.error(error).filter(|_| row.is_applied(error));
+        value.map_or(0.0, |(value, _)| value)
+    };
+    (!row.applied.is_empty()).then(|| Correction {
+        signal: row.signal.clone(),
+        bias: applied(InstrumentError::Bias),
+        scale: applied(InstrumentError::Scale),
+        delay_s: applied(InstrumentError::Delay),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::error_series::{ErrorSample, ErrorSeries};
+    use super::super::findings::examine;
+    use super::*;
+
+    fn row(flight: usize, scale: Option<f64>, applied: &str) -> InstrumentRow {
+        InstrumentRow {
+            flight_id: format!("f{flight}"),
+            channel: "Q".to_owned(),
+            signal: "q_deg_s".to_owned(),
+            unit: "deg/s".to_owned(),
+            bias: Some(0.04),
+            bias_bound: Some(0.002),
+            scale: scale.map(|scale| 1.0 + scale),
+            scale_bound: scale.map(|_| 0.001),
+            delay_s: None,
+            delay_bound_s: None,
+            applied: applied.to_owned(),
+            verdict: InstrumentVerdict::Ok,
+        }
+    }
+
+    /// Eight flights with a scale error of 2 %, one far from them, and one that determines none.
+    fn campaign() -> (Vec<InstrumentRow>, Findings) {
+        let scales = [
+            0.019, 0.021, 0.02, 0.0195, 0.0205, 0.02, 0.0198, 0.0202, 0.3,
+        ];
+        let sample = |(i, value): (usize, &f64)| ErrorSample {
+            flight_id: format!("f{i}"),
+            value: *value,
+            bound: 0.001,
+            systematic: 0.0,
+        };
+        let series = ErrorSeries {
+            channel: "Q".to_owned(),
+            signal: "q_deg_s".to_owned(),
+            error: InstrumentError::Scale,
+            ordinary: 0.005,
+            samples: scales.iter().enumerate().map(sample).collect(),
+        };
+        let mut rows: Vec<InstrumentRow> = scales
+            .iter()
+            .enumerate()
+            .map(|(i, scale)| row(i, Some(*scale), "bias scale"))
+            .collect();
+        rows.push(row(9, None, "bias"));
+        (rows, examine(vec![series]))
+    }
+
+    #[test]
+    fn a_flight_that_says_nothing_takes_the_others_and_a_far_one_corrects_nothing() {
+        let (mut rows, mut findings) = campaign();
+        let corrected = correct_flights(&mut rows, &mut findings, &Compatibility::default());
+        let flights: Vec<&str> = corrected.iter().map(|c| c.flight_id.as_str()).collect();
+        assert_eq!(flights, ["f8", "f9"]);
+        let [far, taken] = [&corrected[0].corrections[0], &corrected[1].corrections[0]];
+        assert_eq!((far.bias, far.scale), (0.04, 0.0));
+        assert!(
+            (taken.scale - 0.02).abs() < 5e-4 && taken.bias == 0.04,
+            "{taken:?}"
+        );
+        assert_eq!(findings.rows[0].completed_flights, 1);
+        assert_eq!(
+            (rows[8].applied.as_str(), rows[9].applied.as_str()),
+            ("bias", "bias scale")
+        );
+        assert_eq!(rows[0], row(0, Some(0.019), "bias scale"));
+    }
+
+    #[test]
+    fn a_further_flight_within_the_grid_changes_no_value() {
+        assert!(on_grid(0.020_1, 0.001) == on_grid(0.020_12, 0.000_99));
+        assert!((on_grid(0.020_1, 0.001) - 0.020_1).abs() < 0.000_063);
+    }
+}

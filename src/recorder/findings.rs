@@ -1,0 +1,242 @@
+//! Rows of the table `instrument_trends`, and problems that only several flights show.
+
+use super::common_error::CommonError;
+use super::error_series::ErrorSeries;
+use super::history::{Change, Shape, change};
+use crate::error::{Problem, ProblemStage};
+use crate::tables::{
+    ALL_FLIGHTS, CommonErrorVerdict, InstrumentError, InstrumentTrend, InstrumentTrendRow,
+};
+
+/// Probability of any false alarm about the history of all series.
+const ALARM_PROBABILITY: f64 = 0.01;
+
+/// Number of standard deviations from which an error common to all flights is sure.
+const SURELY: f64 = 4.0;
+
+/// Number of ordinary sizes from which an error common to all flights is named: chance leaves one
+/// healthy instrument in twenty beyond them.
+const LARGEST_ORDINARY: f64 = 2.0;
+
+/// A series with its common error and its change over the flights.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExaminedSeries {
+    pub series: ErrorSeries,
+    pub common: Option<CommonError>,
+    pub change: Option<Change>,
+}
+
+/// Rows and problems of a campaign's instruments.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Findings {
+    pub rows: Vec<InstrumentTrendRow>,
+    pub problems: Vec<Problem>,
+    pub examined: Vec<ExaminedSeries>,
+}
+
+/// Examines all series of a campaign.
+#[must_use]
+pub fn examine(series: Vec<ErrorSeries>) -> Findings {
+    let examined: Vec<ExaminedSeries> = series.into_iter().map(ExaminedSeries::of).collect();
+    let tests = examined.iter().filter(|one| one.change.is_some()).count();
+    let alarm = ALARM_PROBABILITY / tests.max(1) as f64;
+    Findings {
+        rows: examined.iter().map(|one| one.row(alarm)).collect(),
+        problems: examined.iter().flat_map(ExaminedSeries::problems).collect(),
+        examined,
+    }
+}
+
+impl ExaminedSeries {
+    fn of(series: ErrorSeries) -> ExaminedSeries {
+        let common = CommonError::of(&series);
+        let change = common.as_ref().and_then(|common| change(&series, common));
+        ExaminedSeries {
+            series,
+            common,
+            change,
+        }
+    }
+
+    /// Flights far from the others.
+    pub fn far(&self) -> &[String] {
+        self.common.as_ref().map_or(&[], |common| &common.far)
+    }
+
+    /// `true` where the mean is surely no ordinary error.
+    fn is_wrong_in_every_flight(&self) -> bool {
+        self.common.as_ref().is_some_and(|common| {
+            let size = common.mean.abs();
+            size > SURELY * common.bound.hypot(common.scatter)
+                && size > LARGEST_ORDINARY * self.series.ordinary
+        })
+    }
+
+    fn common_verdict(&self) -> CommonErrorVerdict {
+        if self.common.is_none() {
+            CommonErrorVerdict::TooFewFlights
+        } else if self.is_wrong_in_every_flight() {
+            CommonErrorVerdict::Wrong
+        } else {
+            CommonErrorVerdict::Ordinary
+        }
+    }
+
+    /// Row of the series; `alarm` is the probability below which a change is no chance.
+    fn row(&self, alarm: f64) -> InstrumentTrendRow {
+        let series = &self.series;
+        let common = self.common.as_ref();
+        let change = self.change.as_ref();
+        let sure = change.filter(|change| change.probability < alarm);
+        // The table has scale factors, as `instruments` does.
+        let offset = f64::from(u8::from(series.error == InstrumentError::Scale));
+        let verdict = match (sure.map(|change| change.shape), change) {
+            (Some(Shape::Step), _) => InstrumentTrend::Step,
+            (Some(Shape::Drift), _) => InstrumentTrend::Drift,
+            (None, Some(_)) => InstrumentTrend::Steady,
+            (None, None) => InstrumentTrend::TooFewFlights,
+        };
+        InstrumentTrendRow {
+            channel: series.channel.clone(),
+            signal: series.signal.clone(),
+            error: series.error,
+            unit: series.unit().to_owned(),
+            flights: series.samples.len(),
+            mean: common.map(|common| offset + common.mean),
+            mean_bound: common.map(|common| common.bound),
+            scatter: common.map(|common| common.scatter),
+            common: self.common_verdict(),
+            far_flights: self.far().join(" "),
+            completed_flights: 0,
+            verdict,
+            since: sure.map(|change| change.since.clone()),
+            change: change.map(|change| change.size),
+            change_bound: change.map(|change| change.bound),
+            probability: change.map(|change| change.probability),
+        }
+    }
+
+    fn problems(&self) -> Vec<Problem> {
+        let series = &self.series;
+        let problem = |flight_id: &str, reason: String| Problem {
+            stage: ProblemStage::Ingest,
+            flight_id: flight_id.to_owned(),
+            place: format!("channel `{}`", series.channel),
+            reason,
+        };
+        let Some(common) = &self.common else {
+            return vec![];
+        };
+        let far = series.samples.iter();
+        let far = far.filter(|sample| common.far.contains(&sample.flight_id));
+        let mut problems: Vec<Problem> = far
+            .map(|sample| {
+                let reason = format!(
+                    "`{}`: {} is far from the other flights' ({}, scatter {}). The record is not corrected by it: \
+                     look after the instrument of this flight",
+                    series.channel,
+                    self.in_words(sample.value, sample.bound),
+                    self.in_words(common.mean, common.bound),
+                    self.number(common.scatter),
+                );
+                problem(&sample.flight_id, reason)
+            })
+            .collect();
+        if self.is_wrong_in_every_flight() {
+            let reason = format!(
+                "`{}` disagrees with the other channels in every flight: {} over {} flights (scatter {}). Check its \
+                 calibration, its unit and its position in aircraft.yaml",
+                series.channel,
+                self.in_words(common.mean, common.bound),
+                series.samples.len() - common.far.len(),
+                self.number(common.scatter),
+            );
+            problems.push(problem(ALL_FLIGHTS, reason));
+        }
+        problems
+    }
+
+    /// An error with its bound in words.
+    fn in_words(&self, value: f64, bound: f64) -> String {
+        let bound = self.number(bound);
+        match self.series.error {
+            InstrumentError::Bias => format!("bias {} ± {bound}", self.number(value)),
+            InstrumentError::Scale => format!("scale factor {:.4} ± {bound}", 1.0 + value),
+            InstrumentError::Delay => format!("delay {} ± {bound}", self.number(value)),
+        }
+    }
+
+    fn number(&self, value: f64) -> String {
+        match self.series.error {
+            InstrumentError::Bias => format!("{value:.3} {}", self.series.unit()),
+            InstrumentError::Scale => format!("{value:.4}"),
+            InstrumentError::Delay => format!("{:.1} ms", 1e3 * value),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::error_series::ErrorSample;
+    use super::*;
+
+    fn scales(values: &[f64]) -> ErrorSeries {
+        let sample = |(i, value): (usize, &f64)| ErrorSample {
+            flight_id: format!("f{i}"),
+            value: *value,
+            bound: 0.004,
+            systematic: 0.002,
+        };
+        ErrorSeries {
+            channel: "Q".to_owned(),
+            signal: "q_deg_s".to_owned(),
+            error: InstrumentError::Scale,
+            ordinary: 0.005,
+            samples: values.iter().enumerate().map(sample).collect(),
+        }
+    }
+
+    #[test]
+    fn a_rate_that_is_five_percent_off_in_every_flight_is_named() {
+        let found = examine(vec![scales(&[0.046, 0.052, 0.049, 0.05, 0.051, 0.047])]);
+        assert_eq!(found.rows[0].common, CommonErrorVerdict::Wrong);
+        assert_eq!(found.problems.len(), 1);
+        let problem = &found.problems[0];
+        assert_eq!(problem.flight_id, ALL_FLIGHTS);
+        assert!(
+            problem.reason.contains("scale factor 1.0492"),
+            "{problem:?}"
+        );
+        let healthy = examine(vec![scales(&[0.004, -0.002, 0.001, 0.005, -0.003, 0.0])]);
+        assert!(healthy.problems.is_empty());
+        assert_eq!(healthy.rows[0].common, CommonErrorVerdict::Ordinary);
+        assert_eq!(healthy.rows[0].verdict, InstrumentTrend::Steady);
+    }
+
+    #[test]
+    fn a_flight_far_from_the_others_is_a_problem_of_that_flight() {
+        let mut values = vec![0.001, -0.002, 0.0, 0.002, 0.001, -0.001, 0.0, 0.001, 0.002];
+        values.push(0.2);
+        let found = examine(vec![scales(&values)]);
+        assert_eq!(found.rows[0].far_flights, "f9");
+        assert_eq!(found.problems.len(), 1);
+        assert_eq!(found.problems[0].flight_id, "f9");
+    }
+
+    #[test]
+    fn a_step_has_its_flight_and_no_problem() {
+        let values = [
+            0.001, -0.002, 0.0, 0.002, 0.001, 0.0, 0.041, 0.039, 0.04, 0.042, 0.038,
+        ];
+        let found = examine(vec![scales(&values)]);
+        let row = &found.rows[0];
+        assert_eq!(
+            (row.verdict, row.since.as_deref()),
+            (InstrumentTrend::Step, Some("f6"))
+        );
+        assert!(
+            row.change
+                .is_some_and(|change| (change - 0.04).abs() < 0.003)
+        );
+    }
+}
