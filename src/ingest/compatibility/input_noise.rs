@@ -158,7 +158,12 @@ fn block_products(
 }
 
 /// Sensitivities of an output at a node's sample.
-fn row_at(fitted: &FittedWindow, reconstructed: &Reconstructed, sample: usize, output: usize) -> Row {
+fn row_at(
+    fitted: &FittedWindow,
+    reconstructed: &Reconstructed,
+    sample: usize,
+    output: usize,
+) -> Row {
     let readings = &reconstructed.readings;
     let gain = 1.0 + fitted.shared[place(INPUTS + output, Kind::Scale)];
     let mut row = reconstructed.rows[sample / reconstructed.samples_per_node][output];
