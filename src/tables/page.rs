@@ -5,10 +5,10 @@ use std::fmt::Write;
 use super::{
     AgreementRow, ChangeRow, ChannelRow, CheckRow, ComparisonRow, ConditionRow, ContributionRow,
     CorrelationRow, CovarianceRow, CoverageRow, DisagreementRow, DrawRow, EstimateRow, EventRow,
-    ExportRow, ExtrapolationRow, FitRow, FlightRow, InstrumentRow, InstrumentTrendRow, JointRow, LevelRow,
-    LiftAndDragRow, ManeuverComparisonRow, MatchRow, MatchVerdictRow, NextCardRow, NextGoalRow,
-    OutlierRow, PosteriorRow, PredictedRow, QualityRow, RootRow, ScaleRow, SelfCheckRow, StartRow,
-    TrendRow, VerdictRow,
+    ExportRow, ExtrapolationRow, FitRow, FlightRow, InstrumentRow, InstrumentTrendRow, JointRow,
+    LevelRow, LiftAndDragRow, ManeuverComparisonRow, MatchRow, MatchVerdictRow, NextCardRow,
+    NextGoalRow, OutlierRow, PosteriorRow, PredictedRow, QualityRow, RootRow, ScaleRow,
+    SelfCheckRow, StartRow, TrendRow, VerdictRow,
 };
 use crate::aero::DerivativeUnit;
 use crate::error::Problem;
