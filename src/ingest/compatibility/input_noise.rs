@@ -18,7 +18,7 @@ use nalgebra::{DMatrix, DVector, SMatrix, Vector3};
 use super::equations::{Inputs, STATES, State, rate_slopes, rates};
 use super::parameters::{INPUTS, KINDS, Kind, OUTPUTS, PARAMETERS, Parameters, place};
 use super::reconstruction::{
-    DRIVING, LOCAL, Local, ROW, Reconstructed, Row, reconstruct, shared_place,
+    DRIVING, LOCAL, Local, ROW, Reconstructed, Row, input_values, reconstruct, shared_place,
 };
 use super::window::{Window, input_factor};
 use super::window_sums::{ALL, WindowSums};
