@@ -29,7 +29,7 @@ harvest = cargo run --release --locked --quiet -- $(1) '$(PIPELINE)' $(options)
 .DEFAULT_GOAL := help
 # Stages share a store: one at a time, also under make -j.
 .NOTPARALLEL:
-.PHONY: cluster object-store supply-chain status explain diff verify gc doc docs torture fuzz ingest segment estimate model trend qualities match match-study compare report export next next-study nightly check show shown simulate validate build test same bench lint clean help init import install
+.PHONY: cluster object-store supply-chain status explain diff verify gc doc docs torture fuzz ingest segment estimate model trend qualities match match-study compare report export next next-study nightly check show shown simulate validate build test same bench count lint clean help init import install
 
 ingest: build ## read the archive: channels to signals on one clock, repairs, checks of units and signs
 	$(call harvest,ingest) $(running)
@@ -154,6 +154,9 @@ next-study: ## are the bounds that plans of the next flight predict kept, over t
 
 bench: ## run the benchmarks
 	cargo bench --locked
+
+count: build ## count the instructions of five cases into docs/performance.md
+	bash tests/count.sh "$(or $(CARGO_TARGET_DIR),target)/release/harvest"
 
 lint: ## formatting and lints, as .ci/run has them
 	cargo fmt --check

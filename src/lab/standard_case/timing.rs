@@ -55,9 +55,10 @@ pub struct TimedBatch {
 /// # Errors
 /// The message for a signal that the record lacks.
 pub fn timed(case: &StandardCase, repetitions: usize) -> Result<TimedCase, String> {
-    let stopwatch = Stopwatch::start();
+    // Without repetitions no processor time is read: valgrind cannot.
+    let start = Instant::now();
     let mut first = case.estimate()?;
-    let first_s = stopwatch.wall_s();
+    let first_s = start.elapsed().as_secs_f64();
     let corrected = first.corrected(case).unwrap_or_default();
     let (mut wall_s, mut cpu_s, mut ready_s, mut corrected_s) = (vec![], vec![], vec![], vec![]);
     for _ in 0..repetitions {

@@ -1,0 +1,93 @@
+#!/usr/bin/env bash
+# Instructions of five cases, counted by valgrind: unlike times they hardly depend on the machine and its load. Needs valgrind,
+# which is installed where that is possible. Skipped without it; with CI=true that is a failure.
+#
+#   tests/count.sh HARVEST          write the counts into the table of docs/performance.md
+#   tests/count.sh HARVEST check    fail where a case is more than 5 % above that table
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+harvest=$(realpath "${1:?the program: target/release/harvest}")
+mode=${2:-write}
+page=docs/performance.md
+most_above_pct=5
+
+if ! command -v valgrind >/dev/null && [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
+    { timeout 120 apt-get update && timeout 300 apt-get install -y --no-install-recommends valgrind; } >/dev/null 2>&1 || true
+fi
+if ! command -v valgrind >/dev/null; then
+    echo "skipped: no valgrind here, and it cannot be installed"
+    [ "${CI:-}" != true ] || exit 1
+    exit 0
+fi
+
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+# Runs a command; 2 is the code of a run that rejected something.
+run() {
+    local out="$work/out.$BASHPID"
+    "$@" >"$out" 2>&1 || [ $? = 2 ] || { cat "$out" >&2; return 1; }
+}
+
+# count CASE COMMAND...: writes the command's instructions, in millions, to a file of the case.
+count() {
+    local log="$work/$1.log"
+    shift
+    run valgrind --tool=cachegrind --cache-sim=no --cachegrind-out-file=/dev/null --log-file="$log" "$@"
+    sed -n 's/.*I *refs: *//p' "$log" | tr -d , | awk '{ printf "%.0f\n", $1 / 1e6 }' >"${log%.log}.count"
+}
+
+# Options of a campaign: its archive, a tunnel database, and a store of its own.
+campaign() {
+    echo "--quiet --archive $2 --wind-tunnel $3 --store $work/$1 --reports $work/$1.reports"
+}
+
+# Ten times the flights of the cards, with other noise and errors each: 550 maneuvers.
+cards() {
+    local flights
+    flights=$(sed -n '/^flights:/,/^$/p' pipelines/harv/cards.yaml | tail -n +2)
+    sed '/^flights:/,$d' pipelines/harv/cards.yaml
+    echo "flights:"
+    for copy in {0..9}; do
+        sed "s/sim_/sim_$copy/" <<<"$flights"
+    done
+}
+
+# shellcheck disable=SC2046,SC2086 # options without spaces
+one_flight() {
+    for stage in ingest segment estimate; do
+        count $stage "$harvest" $stage --threads 1 $(campaign one data/demo/flights/flight_001.parquet data/demo/wt_tables.csv)
+    done
+    count standard_case "$harvest" lab bench tests/data/standard_case.json --repetitions 0 --threads 1
+}
+
+# shellcheck disable=SC2086
+many_flights() {
+    cards >"$work/cards.yaml"
+    run "$harvest" lab simulate "$work/cards.yaml" --out "$work/simulated"
+    local many
+    many=$(campaign many "$work/simulated/flights" "$work/simulated/wind_tunnel.csv")
+    run "$harvest" run $many
+    # Into a folder of its own: what is published is not made again.
+    count trend "$harvest" trend --threads 1 ${many%.reports}.trend
+}
+
+one_flight &
+first=$!
+many_flights
+wait $first
+
+failed=0
+while IFS='|' read -r _ name _ committed _; do
+    name=$(tr -d ' `' <<<"$name") committed=$(tr -d ' ,' <<<"$committed")
+    [ -f "$work/$name.count" ] || continue
+    counted=$(<"$work/$name.count")
+    echo "$name: $counted million instructions, $committed in $page"
+    if [ "$mode" = check ]; then
+        [ $((counted * 100)) -le $((committed * (100 + most_above_pct))) ] || { echo "$name: more than $most_above_pct % above"; failed=1; }
+    else
+        sed -i "s/^\(| \`$name\` |.*| \)[0-9]*\( |\)\$/\1$counted\2/" "$page"
+    fi
+done < <(grep '^| `' "$page")
+exit $failed
