@@ -50,7 +50,10 @@ impl Goal {
             Some("`bound` must be a positive standard deviation")
         } else if !is_positive(self.weight) {
             Some("`weight` must be positive")
-        } else if self.alpha_deg.is_some_and(|(from, to)| !(from <= to)) {
+        } else if self
+            .alpha_deg
+            .is_some_and(|(from, to)| from > to || (from - to).is_nan())
+        {
             Some("`alpha_deg` must be a lowest and a highest angle of attack")
         } else {
             None

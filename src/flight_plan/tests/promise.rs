@@ -215,6 +215,7 @@ fn within(ratios: &[f64], low: f64, high: f64) -> f64 {
 /// `make next-study`: a first flight of eight cards, then a planned one of 15 minutes, over ten seeds.
 #[test]
 #[ignore = "a study of minutes"]
+#[expect(clippy::print_stdout, reason = "the figures are the study's result")]
 fn the_bounds_of_planned_flights_are_kept() {
     let longitudinal: &[f64] = &[10.0, 20.0, 30.0, 40.0];
     let points = [
