@@ -125,7 +125,7 @@ fn combine(config: &Config, campaign: &mut Campaign, flights: &[FlightEvidence])
     let delays = surfaces::of_campaign(flights);
     campaign.delays = surfaces::corrections(&delays, &config.estimate.surfaces);
     let found = surfaces::findings(flights, &delays, &campaign.delays, &config.channels);
-    let of_surfaces = surfaces::delay_series(flights, &config.channels);
+    let of_surfaces = surfaces::delay_series(flights, &campaign.delays, &config.channels);
     compare_flights(config, campaign, of_surfaces);
     campaign.instruments.extend(found.rows);
     campaign.problems.extend(found.problems);

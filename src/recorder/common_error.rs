@@ -117,6 +117,7 @@ mod tests {
             signal: "q_deg_s".to_owned(),
             error: InstrumentError::Scale,
             ordinary: 0.005,
+            corrected: 0.0,
             samples: values.iter().enumerate().map(sample).collect(),
         }
     }

@@ -146,6 +146,7 @@ mod tests {
             signal: "q_deg_s".to_owned(),
             error: InstrumentError::Scale,
             ordinary: 0.005,
+            corrected: 0.0,
             samples: scales.iter().enumerate().map(sample).collect(),
         };
         let mut rows: Vec<InstrumentRow> = scales

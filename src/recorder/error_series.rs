@@ -26,6 +26,8 @@ pub struct ErrorSeries {
     pub error: InstrumentError,
     /// Standard deviation of the errors of healthy instruments.
     pub ordinary: f64,
+    /// Error by which every flight is corrected already.
+    pub corrected: f64,
     pub samples: Vec<ErrorSample>,
 }
 
@@ -60,6 +62,7 @@ pub fn instrument_series(
                     signal: one.signal.clone(),
                     error: one.error,
                     ordinary: one.ordinary,
+                    corrected: 0.0,
                     samples: vec![],
                 });
             of_error.samples.push(ErrorSample {

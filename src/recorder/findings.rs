@@ -63,10 +63,10 @@ impl ExaminedSeries {
         self.common.as_ref().map_or(&[], |common| &common.far)
     }
 
-    /// `true` where the mean is surely no ordinary error.
+    /// `true` where what corrections leave of the mean is surely no ordinary error.
     fn is_wrong_in_every_flight(&self) -> bool {
         self.common.as_ref().is_some_and(|common| {
-            let size = common.mean.abs();
+            let size = (common.mean - self.series.corrected).abs();
             size > SURELY * common.bound.hypot(common.scatter)
                 && size > LARGEST_ORDINARY * self.series.ordinary
         })
@@ -192,6 +192,7 @@ mod tests {
             signal: "q_deg_s".to_owned(),
             error: InstrumentError::Scale,
             ordinary: 0.005,
+            corrected: 0.0,
             samples: values.iter().enumerate().map(sample).collect(),
         }
     }
@@ -209,6 +210,9 @@ mod tests {
         );
         let healthy = examine(vec![scales(&[0.004, -0.002, 0.001, 0.005, -0.003, 0.0])]);
         assert!(healthy.problems.is_empty());
+        let mut corrected = scales(&[0.046, 0.052, 0.049, 0.05, 0.051, 0.047]);
+        corrected.corrected = 0.05;
+        assert!(examine(vec![corrected]).problems.is_empty());
         assert_eq!(healthy.rows[0].common, CommonErrorVerdict::Ordinary);
         assert_eq!(healthy.rows[0].verdict, InstrumentTrend::Steady);
     }

@@ -125,6 +125,7 @@ mod tests {
             signal: "alpha_vane_deg".to_owned(),
             error: InstrumentError::Bias,
             ordinary: 0.3,
+            corrected: 0.0,
             samples: samples.collect(),
         };
         let common = CommonError::of(&series).unwrap();

@@ -117,6 +117,7 @@ const MODEL_S: f64 = 0.5e-3;
 #[must_use]
 pub fn delay_series(
     flights: &[FlightEvidence],
+    corrections: &[DelayCorrection],
     channels: &BTreeMap<String, Channel>,
 ) -> Vec<ErrorSeries> {
     let of_channel = |(name, channel): (&String, &Channel)| {
@@ -131,11 +132,14 @@ pub fn delay_series(
             })
         };
         let samples: Vec<ErrorSample> = flights.iter().filter_map(sample).collect();
+        let mut corrections = corrections.iter();
+        let correction = corrections.find(|c| c.surface == channel.signal);
         (!samples.is_empty()).then(|| ErrorSeries {
             channel: name.clone(),
             signal: channel.signal.clone(),
             error: InstrumentError::Delay,
             ordinary: ORDINARY_S,
+            corrected: correction.map_or(0.0, |c| c.delay_s),
             samples,
         })
     };
