@@ -44,6 +44,10 @@ pub struct ErrorEvidence {
 }
 
 /// Estimate of one error of an instrument.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "separate findings on one estimate"
+)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorEstimate {
     pub value: f64,

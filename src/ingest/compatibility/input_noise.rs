@@ -142,7 +142,7 @@ fn block_products(
             continue;
         };
         let around = sample.saturating_sub(spacing / 2)..sample + spacing - spacing / 2;
-        for output in 0..OUTPUTS {
+        for (output, weight) in weights.iter().enumerate() {
             let measured = |k: &usize| {
                 let value = window.outputs[output].get(*k);
                 fitted.compared.contains(k) && value.is_some_and(|v| v.is_finite())
@@ -150,7 +150,7 @@ fn block_products(
             let count = around.clone().filter(measured).count() as f64;
             if count > 0.0 {
                 let row = row_at(fitted, reconstructed, sample, output);
-                add_products(block, &row, output, count * weights[output]);
+                add_products(block, &row, output, count * weight);
             }
         }
     }
@@ -167,7 +167,9 @@ fn row_at(
     let readings = &reconstructed.readings;
     let gain = 1.0 + fitted.shared[place(INPUTS + output, Kind::Scale)];
     let mut row = reconstructed.rows[sample / reconstructed.samples_per_node][output];
-    row.iter_mut().for_each(|slope| *slope *= gain);
+    for slope in &mut row {
+        *slope *= gain;
+    }
     let last = readings.len() - 1;
     let (before, after) = (sample.saturating_sub(1).min(last), (sample + 1).min(last));
     let rise = readings[after][output] - readings[before][output];

@@ -880,9 +880,9 @@ fn the_score_scatters_with_the_noise_of_the_inputs() {
     for _ in 0..TIMES {
         let mut noisy = exact.clone();
         for (values, deviation) in noisy.inputs.iter_mut().zip(NOISE) {
-            values
-                .iter_mut()
-                .for_each(|value| *value += deviation * random.normal());
+            for value in values {
+                *value += deviation * random.normal();
+            }
         }
         let change = score(&noisy) - &without_noise;
         scatter += &change * change.transpose() / f64::from(TIMES);
@@ -911,9 +911,8 @@ fn the_score_scatters_with_the_noise_of_the_inputs() {
 fn the_noise_of_the_inputs_is_found_in_the_record() {
     let record = recorded(&flight(24.0), &[0.0; PARAMETERS], 5);
     let window = windows(&record).remove(0);
-    for i in 0..INPUTS {
-        let found = window.input_variances[i].sqrt();
-        assert_relative_eq!(found, NOISE[i], max_relative = 0.25);
+    for (variance, noise) in window.input_variances.iter().zip(NOISE) {
+        assert_relative_eq!(variance.sqrt(), noise, max_relative = 0.25);
     }
 }
 
