@@ -421,6 +421,7 @@ pub fn from_environment(name: &str, default: usize) -> usize {
 pub struct Random(u64);
 
 impl Random {
+    #[expect(clippy::print_stdout, reason = "a failure is repeated with this seed")]
     pub fn new(seed: u64) -> Random {
         let other = u64::try_from(from_environment("HARVEST_SEED", 0)).unwrap();
         if other > 0 {
