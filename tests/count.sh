@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Instructions of five cases, counted by valgrind: unlike times they hardly depend on the machine and its load. Needs valgrind,
+# Instructions of four cases, counted by valgrind: unlike times they hardly depend on the machine and its load. Needs valgrind,
 # which is installed where that is possible. Skipped without it; with CI=true that is a failure.
 #
 #   tests/count.sh HARVEST          write the counts into the table of docs/performance.md
@@ -43,40 +43,15 @@ campaign() {
     echo "--quiet --archive $2 --wind-tunnel $3 --store $work/$1 --reports $work/$1.reports"
 }
 
-# Ten times the flights of the cards, with other noise and errors each: 550 maneuvers.
-cards() {
-    local flights
-    flights=$(sed -n '/^flights:/,/^$/p' pipelines/harv/cards.yaml | tail -n +2)
-    sed '/^flights:/,$d' pipelines/harv/cards.yaml
-    echo "flights:"
-    for copy in {0..9}; do
-        sed "s/sim_/sim_$copy/" <<<"$flights"
-    done
-}
-
 # shellcheck disable=SC2046,SC2086 # options without spaces
 one_flight() {
     for stage in ingest segment estimate; do
         count $stage "$harvest" $stage --threads 1 $(campaign one data/demo/flights/flight_001.parquet data/demo/wt_tables.csv)
     done
-    count standard_case "$harvest" lab bench tests/data/standard_case.json --repetitions 0 --threads 1
 }
 
-# shellcheck disable=SC2086
-many_flights() {
-    cards >"$work/cards.yaml"
-    run "$harvest" lab simulate "$work/cards.yaml" --out "$work/simulated"
-    local many
-    many=$(campaign many "$work/simulated/flights" "$work/simulated/wind_tunnel.csv")
-    run "$harvest" run $many
-    # Into a folder of its own: what is published is not made again.
-    count trend "$harvest" trend --threads 1 ${many%.reports}.trend
-}
-
-one_flight &
-first=$!
-many_flights
-wait $first
+one_flight
+count standard_case "$harvest" lab bench tests/data/standard_case.json --repetitions 0 --threads 1
 
 failed=0
 while IFS='|' read -r _ name _ committed _; do
