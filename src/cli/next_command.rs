@@ -86,10 +86,10 @@ fn print(planned: &PlannedFlight, minutes: f64) {
     let plan = &planned.plan;
     let flown = || plan.cards.iter().filter(|row| row.place.is_some());
     let times: usize = flown().map(|row| row.times).sum();
-    let fall_pct = 100.0 * (1.0 - (-plan.information).exp());
     out!(
-        "{times} cards in {:.1} of {minutes} minutes; the standard deviations of the goals fall by {fall_pct:.0} % in the mean",
-        plan.minutes
+        "{times} cards in {:.1} of {minutes} minutes; the standard deviations of the goals fall by {:.0} % in the mean",
+        plan.minutes,
+        plan.fall_pct()
     );
     for row in flown() {
         out!("{}", line(row));

@@ -100,7 +100,7 @@ pub fn page(
         aircraft: &config.aircraft.name,
         minutes: fixed(minutes, 0),
         flown_minutes: fixed(plan.minutes, 1),
-        fall_pct: fixed(100.0 * (1.0 - (-plan.information).exp()), 0),
+        fall_pct: fixed(plan.fall_pct(), 0),
         cards: card_lines(config, plan, next),
         goals,
         further_goals,

@@ -50,6 +50,14 @@ pub struct Plan {
     pub information: f64,
 }
 
+impl Plan {
+    /// Percentage by which the goals' standard deviations fall, in their weighted geometric mean.
+    #[must_use]
+    pub fn fall_pct(&self) -> f64 {
+        100.0 * (1.0 - (-self.information).exp())
+    }
+}
+
 /// Plans the next flight.
 #[must_use]
 pub fn plan(tonight: &Tonight, rehearsals: &[Rehearsal], goals: &[Goal], budget: Budget) -> Plan {

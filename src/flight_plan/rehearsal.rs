@@ -128,18 +128,12 @@ fn medians(name: &str, estimates: &[EstimateRow]) -> Vec<TunnelPoint> {
         let degree = row.alpha_deg.round() as i64;
         by_degree.entry(degree).or_default().extend(row.value);
     }
-    let point = |alpha_deg: f64, value: f64| TunnelPoint {
-        alpha_deg,
-        mach: None,
-        value,
-        uncertainty: None,
-        source: None,
-    };
     let by_degree = by_degree.into_iter();
-    let found = by_degree.filter_map(|(degree, own)| Some(point(degree as f64, median(own)?)));
+    let found =
+        by_degree.filter_map(|(degree, own)| Some(TunnelPoint::new(degree as f64, median(own)?)));
     let mut found: Vec<TunnelPoint> = found.collect();
     if found.is_empty() {
-        found.push(point(0.0, 0.0));
+        found.push(TunnelPoint::new(0.0, 0.0));
     }
     found
 }

@@ -13,3 +13,11 @@ pub struct Evidence<'a> {
     pub combined: &'a [EstimateRow],
     pub covariance: &'a Covariance,
 }
+
+/// Evidence in the order of the maneuvers' ids, which is that of the flights and of the times in them.
+#[must_use]
+pub fn in_order<'a>(evidence: &[Evidence<'a>]) -> Vec<Evidence<'a>> {
+    let mut evidence = evidence.to_vec();
+    evidence.sort_by(|a, b| a.maneuver.maneuver_id.cmp(&b.maneuver.maneuver_id));
+    evidence
+}

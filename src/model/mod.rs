@@ -38,6 +38,7 @@ use rayon::prelude::*;
 
 use crate::aero::{Axis, Buildup, Coefficient, WindTunnel};
 use coefficient::CoefficientPosterior;
+use evidence::in_order;
 use term::Basis;
 
 pub use campaign_model::{Failure, MOST_POINTS, Model};
@@ -57,8 +58,7 @@ pub fn model(
     tunnel: &WindTunnel,
     settings: &Settings,
 ) -> Model {
-    let mut evidence = evidence.to_vec();
-    evidence.sort_by(|a, b| a.maneuver.maneuver_id.cmp(&b.maneuver.maneuver_id));
+    let evidence = in_order(evidence);
     let tunnel = tunnel.clamped();
     let basis = Basis {
         buildup,

@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::campaign_model::Model;
 use super::coefficient::{CoefficientPosterior, Data};
-use super::evidence::Evidence;
+use super::evidence::{Evidence, in_order};
 use super::observation::Observation;
 use super::posterior::{gaussian, information};
 use super::settings::Settings;
@@ -64,8 +64,7 @@ impl Model {
         (buildup, tunnel): (&Buildup, &WindTunnel),
         settings: &Settings,
     ) -> Vec<Outlook> {
-        let mut evidence = evidence.to_vec();
-        evidence.sort_by(|a, b| a.maneuver.maneuver_id.cmp(&b.maneuver.maneuver_id));
+        let evidence = in_order(evidence);
         let tunnel = tunnel.clamped();
         let basis = Basis {
             buildup,

@@ -101,25 +101,12 @@ fn farthest(samples: &[&ErrorSample], ordinary: f64) -> Option<usize> {
 mod tests {
     use approx::assert_abs_diff_eq;
 
+    use super::super::fixture;
     use super::*;
     use crate::numerics::random::RandomStream;
-    use crate::tables::InstrumentError;
 
-    fn series(values: &[(f64, f64)]) -> ErrorSeries {
-        let sample = |(i, (value, bound)): (usize, &(f64, f64))| ErrorSample {
-            flight_id: format!("f{i}"),
-            value: *value,
-            bound: *bound,
-            systematic: 0.0,
-        };
-        ErrorSeries {
-            channel: "q".to_owned(),
-            signal: "q_deg_s".to_owned(),
-            error: InstrumentError::Scale,
-            ordinary: 0.005,
-            corrected: 0.0,
-            samples: values.iter().enumerate().map(sample).collect(),
-        }
+    fn scales(values: &[(f64, f64)]) -> ErrorSeries {
+        fixture::scales(values.iter().copied(), 0.0)
     }
 
     #[test]
@@ -136,17 +123,17 @@ mod tests {
             (0.0185, 0.001),
             (0.25, 0.004),
         ]);
-        let common = CommonError::of(&series(&values)).unwrap();
+        let common = CommonError::of(&scales(&values)).unwrap();
         assert_eq!(common.far, ["f7"]);
         assert_abs_diff_eq!(common.mean, 0.0197, epsilon = 5e-4);
         assert!(common.bound < 0.001 && common.scatter < 0.001, "{common:?}");
-        assert_eq!(CommonError::of(&series(&values[..3])), None);
+        assert_eq!(CommonError::of(&scales(&values[..3])), None);
     }
 
     #[test]
     fn biases_that_scatter_from_flight_to_flight_are_not_far() {
         let values = [0.3, -0.2, 0.1, -0.4, 0.25, 0.0, -0.1].map(|v| (v, 0.01));
-        let common = CommonError::of(&series(&values)).unwrap();
+        let common = CommonError::of(&scales(&values)).unwrap();
         assert!(common.far.is_empty());
         assert!(common.scatter_limit > common.scatter && common.scatter > 0.2);
     }
@@ -159,7 +146,7 @@ mod tests {
             (0.02, 0.001),
             (0.0205, 0.001),
         ];
-        let common = CommonError::of(&series(&values)).unwrap();
+        let common = CommonError::of(&scales(&values)).unwrap();
         let (value, bound) = common.of_flight(None);
         assert_abs_diff_eq!(value, common.mean);
         assert_abs_diff_eq!(

@@ -111,8 +111,8 @@ fn correction(row: &InstrumentRow) -> Option<Correction> {
 mod tests {
     use approx::assert_abs_diff_eq;
 
-    use super::super::error_series::{ErrorSample, ErrorSeries};
     use super::super::findings::examine;
+    use super::super::fixture;
     use super::*;
 
     fn row(flight: usize, scale: Option<f64>, applied: &str) -> InstrumentRow {
@@ -137,20 +137,7 @@ mod tests {
         let scales = [
             0.019, 0.021, 0.02, 0.0195, 0.0205, 0.02, 0.0198, 0.0202, 0.3,
         ];
-        let sample = |(i, value): (usize, &f64)| ErrorSample {
-            flight_id: format!("f{i}"),
-            value: *value,
-            bound: 0.001,
-            systematic: 0.0,
-        };
-        let series = ErrorSeries {
-            channel: "Q".to_owned(),
-            signal: "q_deg_s".to_owned(),
-            error: InstrumentError::Scale,
-            ordinary: 0.005,
-            corrected: 0.0,
-            samples: scales.iter().enumerate().map(sample).collect(),
-        };
+        let series = fixture::scales(scales.iter().map(|scale| (*scale, 0.001)), 0.0);
         let mut rows: Vec<InstrumentRow> = scales
             .iter()
             .enumerate()

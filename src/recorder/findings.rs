@@ -177,24 +177,11 @@ impl ExaminedSeries {
 
 #[cfg(test)]
 mod tests {
-    use super::super::error_series::ErrorSample;
+    use super::super::fixture;
     use super::*;
 
     fn scales(values: &[f64]) -> ErrorSeries {
-        let sample = |(i, value): (usize, &f64)| ErrorSample {
-            flight_id: format!("f{i}"),
-            value: *value,
-            bound: 0.004,
-            systematic: 0.002,
-        };
-        ErrorSeries {
-            channel: "Q".to_owned(),
-            signal: "q_deg_s".to_owned(),
-            error: InstrumentError::Scale,
-            ordinary: 0.005,
-            corrected: 0.0,
-            samples: values.iter().enumerate().map(sample).collect(),
-        }
+        fixture::scales(values.iter().map(|value| (*value, 0.004)), 0.002)
     }
 
     #[test]

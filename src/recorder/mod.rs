@@ -15,6 +15,8 @@ mod common_error;
 mod history;
 mod findings;
 mod correction;
+#[cfg(test)]
+mod fixture;
 
 pub use correction::{FlightCorrections, correct_flights};
 pub use error_series::{ErrorSample, ErrorSeries, instrument_series};

@@ -5,9 +5,7 @@ use super::quality_charts::QualityChart;
 use crate::report::contents::Contents;
 use crate::report::figure::scale::{Scale, extent};
 use crate::report::figure::style::INK;
-use crate::report::figure::xy_chart::{
-    self, ChartAxis, ChartPoint, ChartSeries, LevelBox, XyChart,
-};
+use crate::report::figure::xy_chart::{ChartAxis, ChartPoint, ChartSeries, LevelBox, XyChart};
 use crate::tables::{
     ALL_FLIGHTS, CommonErrorVerdict, InstrumentError, InstrumentRow, InstrumentTrend,
     InstrumentTrendRow,
@@ -54,7 +52,7 @@ fn chart(contents: &Contents, number: usize, trend: &InstrumentTrendRow) -> Opti
             y: (Some(mean - half), Some(mean + half)),
         }
     });
-    let svg = xy_chart::draw(&XyChart {
+    Some(QualityChart::of(&XyChart {
         id: &id,
         title: &title,
         description: &caption,
@@ -66,13 +64,7 @@ fn chart(contents: &Contents, number: usize, trend: &InstrumentTrendRow) -> Opti
             points,
             is_joined: false,
         }],
-    });
-    Some(QualityChart {
-        anchor: format!("chart-{id}"),
-        title,
-        svg,
-        caption,
-    })
+    }))
 }
 
 /// Error of each flight over its number in the order of the flights.

@@ -4,9 +4,7 @@ use super::quality_charts::QualityChart;
 use crate::report::contents::Contents;
 use crate::report::figure::scale::{Scale, extent};
 use crate::report::figure::style::DARK_COLOURS;
-use crate::report::figure::xy_chart::{
-    self, ChartAxis, ChartPoint, ChartSeries, LevelBox, XyChart,
-};
+use crate::report::figure::xy_chart::{ChartAxis, ChartPoint, ChartSeries, LevelBox, XyChart};
 use crate::tables::{MatchVerdict, MatchVerdictRow, ModelSource};
 
 /// Least margin that a chart reaches: twice the tolerance.
@@ -32,7 +30,7 @@ pub fn chart(contents: &Contents, model: ModelSource) -> Option<QualityChart> {
     let title = format!("Margin over angle of attack, {}", model.name());
     let caption = "One mark for each maneuver. 1 is a perfect match, 0 the limit; the shaded maneuvers \
                    are inside. Marks on the lower edge are at twice their tolerance or beyond.";
-    let svg = xy_chart::draw(&XyChart {
+    Some(QualityChart::of(&XyChart {
         id: &id,
         title: &title,
         description: caption,
@@ -48,11 +46,5 @@ pub fn chart(contents: &Contents, model: ModelSource) -> Option<QualityChart> {
             points,
             is_joined: false,
         }],
-    });
-    Some(QualityChart {
-        anchor: format!("chart-{id}"),
-        title,
-        svg,
-        caption: caption.to_owned(),
-    })
+    }))
 }

@@ -22,6 +22,18 @@ pub struct QualityChart {
     pub caption: String,
 }
 
+impl QualityChart {
+    /// Draws a chart; its description is the caption.
+    pub fn of(chart: &XyChart) -> QualityChart {
+        QualityChart {
+            anchor: format!("chart-{}", chart.id),
+            title: chart.title.to_owned(),
+            svg: xy_chart::draw(chart),
+            caption: chart.description.to_owned(),
+        }
+    }
+}
+
 /// Paragraph of the worst level of all.
 pub const ALL: &str = "all";
 
@@ -92,7 +104,7 @@ fn probabilities(levels: &[&LevelRow], airframe: Airframe) -> Option<QualityChar
     let title = "Probability of a level or better";
     let caption = "Probability that every paragraph is met at Level 1, at Level 2 or better (2), at Level 3 or \
                    better (3).";
-    let svg = xy_chart::draw(&XyChart {
+    Some(QualityChart::of(&XyChart {
         id: &id,
         title,
         description: caption,
@@ -103,13 +115,7 @@ fn probabilities(levels: &[&LevelRow], airframe: Airframe) -> Option<QualityChar
             .iter()
             .map(|line| line.through(levels))
             .collect(),
-    });
-    Some(QualityChart {
-        anchor: format!("chart-{id}"),
-        title: title.to_owned(),
-        svg,
-        caption: caption.to_owned(),
-    })
+    }))
 }
 
 /// Line of a level's probability.
@@ -189,7 +195,7 @@ impl PairChart {
         let id = format!("{}-{airframe}", self.id);
         let caption =
             "One point for each angle of attack, with its 95 % ellipse; boxes are levels.";
-        let svg = xy_chart::draw(&XyChart {
+        Some(QualityChart::of(&XyChart {
             id: &id,
             title: self.title,
             description: caption,
@@ -201,13 +207,7 @@ impl PairChart {
                 points,
                 is_joined: true,
             }],
-        });
-        Some(QualityChart {
-            anchor: format!("chart-{id}"),
-            title: self.title.to_owned(),
-            svg,
-            caption: caption.to_owned(),
-        })
+        }))
     }
 
     fn points(&self, rows: &[&QualityRow]) -> Vec<ChartPoint> {
@@ -333,7 +333,7 @@ fn locus(roots: &[&RootRow], axis: Axis, airframe: Airframe) -> Option<QualityCh
         },
         outline: vec![],
     };
-    let svg = xy_chart::draw(&XyChart {
+    Some(QualityChart::of(&XyChart {
         id: &id,
         title,
         description: &caption,
@@ -345,13 +345,7 @@ fn locus(roots: &[&RootRow], axis: Axis, airframe: Airframe) -> Option<QualityCh
             points: own.iter().map(point).collect(),
             is_joined: false,
         }],
-    });
-    Some(QualityChart {
-        anchor: format!("chart-{id}"),
-        title: title.to_owned(),
-        svg,
-        caption,
-    })
+    }))
 }
 
 #[cfg(test)]
