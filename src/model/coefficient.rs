@@ -29,6 +29,8 @@ pub struct CoefficientPosterior {
     pub terms: Vec<Term>,
     pub unknowns: Unknowns,
     pub scales: Vec<Scale>,
+    /// Scales before their last step: those of the noise between the points of the grids.
+    pub noise_scales: Vec<Scale>,
     /// With the spread over the scales that the data leave open.
     pub gaussian: Gaussian,
     /// Weight of each maneuver that takes part, by its place in the evidence.
@@ -53,11 +55,13 @@ impl CoefficientPosterior {
     ) -> Option<CoefficientPosterior> {
         let mut data = Data::new(&terms, evidence, basis);
         let mut weights = vec![1.0; evidence.len()];
-        let (mut scales, mut found) = data.fit(&terms, &weights, &centres(&terms))?;
+        let mut noise_scales = centres(&terms);
+        let (mut scales, mut found) = data.fit(&terms, &weights, &noise_scales)?;
         for _ in 0..REWEIGHTINGS {
             let freedom = basis.settings.degrees_of_freedom;
             weights = reweighted(&data.flights, &weights, &found, freedom);
-            (scales, found) = data.fit(&terms, &weights, &scales)?;
+            noise_scales = scales;
+            (scales, found) = data.fit(&terms, &weights, &noise_scales)?;
         }
         let posterior = Posterior {
             terms: &terms,
@@ -74,7 +78,11 @@ impl CoefficientPosterior {
             information: &differences,
         };
         open.add_to(&whole.scales, &mut whole.gaussian);
-        Some(CoefficientPosterior { held, ..whole })
+        Some(CoefficientPosterior {
+            noise_scales,
+            held,
+            ..whole
+        })
     }
 }
 
@@ -230,6 +238,7 @@ impl Data {
             terms,
             unknowns: self.unknowns,
             scales,
+            noise_scales: vec![],
             gaussian,
         })
     }

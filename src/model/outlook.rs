@@ -105,7 +105,7 @@ impl CoefficientPosterior {
         basis: &Basis,
     ) -> Option<Outlook> {
         let (mut data, observed) = Data::with_planned(&self.terms, evidence, planned, basis);
-        data.set_between(&self.terms, &self.scales);
+        data.set_between(&self.terms, &self.noise_scales);
         let covariance = self.covariance(&data, evidence.len())?;
         let unknowns = &data.unknowns;
         let mut rows: Vec<SparseRow> = vec![];
@@ -164,7 +164,7 @@ impl CoefficientPosterior {
     /// Covariance of what no other maneuver shares, with what lies between the points of the grids.
     fn noise(&self, observation: &Observation) -> DMatrix<f64> {
         let (design, at) = (&observation.design, &observation.condition);
-        &observation.noise + between_points(&self.terms, &self.scales, design, at)
+        &observation.noise + between_points(&self.terms, &self.noise_scales, design, at)
     }
 
     /// Row of a point over the unknowns: of a term, or of the constant of a sum; `None` for a

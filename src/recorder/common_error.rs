@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     fn what_all_flights_have_alike_does_not_average_out() {
-        let mut series = series(&[(0.02, 0.002); 16]);
+        let mut series = scales(&[(0.02, 0.002); 16]);
         series
             .samples
             .iter_mut()
@@ -188,7 +188,7 @@ mod tests {
             let mut draw = |truth: f64, bound: f64| (truth + bound * random.normal(), bound);
             let mut values: Vec<(f64, f64)> = truth[..5].iter().map(|t| draw(*t, 0.001)).collect();
             values.push(draw(truth[5], 0.01));
-            let series = series(&values);
+            let series = scales(&values);
             let common = CommonError::of(&series).unwrap();
             let (value, bound) = common.of_flight(series.samples.last());
             inside += u32::from((value - truth[5]).abs() < 1.96 * bound);
