@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::position::Position;
+use super::thrust_line::{Thrust, ThrustLine};
+
 /// Reference dimensions, engines and sensors of one aircraft.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -17,9 +20,23 @@ pub struct Aircraft {
     /// leaves it out.
     #[serde(default)]
     pub engine_inertia_slug_ft2: f64,
+    /// Line of the thrust; `None` is the body x axis through the c.g.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub thrust_line: Option<ThrustLine>,
     /// Latitude of the campaign; gravity depends on it.
     pub latitude_deg: f64,
     pub sensors: Sensors,
+}
+
+impl Aircraft {
+    /// Force and moment of a thrust.
+    #[must_use]
+    pub fn thrust(&self, thrust_lbf: f64, cg: Position) -> Thrust {
+        match self.thrust_line {
+            Some(line) => line.thrust(thrust_lbf, cg),
+            None => Thrust::forward(thrust_lbf),
+        }
+    }
 }
 
 /// Positions of the sensors and equations of the vanes.
@@ -43,15 +60,6 @@ pub struct Sensors {
 
 fn default_true() -> bool {
     true
-}
-
-/// A point of the aircraft, ft aft, right and above of the reference point.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Position {
-    pub x_ft: f64,
-    pub y_ft: f64,
-    pub z_ft: f64,
 }
 
 /// A flow vane: its position, and the factor of its reading over the local angle by upwash or
@@ -86,16 +94,4 @@ pub enum VaneModel {
     Exact,
     /// Eqs. 2.9 and 3.8 of the paper, linear in the rates.
     SmallAngle,
-}
-
-impl Position {
-    /// Arm from the c.g. to this point in body axes, ft forward, right and down.
-    #[must_use]
-    pub fn arm(self, cg: Position) -> [f64; 3] {
-        [
-            cg.x_ft - self.x_ft,
-            self.y_ft - cg.y_ft,
-            cg.z_ft - self.z_ft,
-        ]
-    }
 }

@@ -4,8 +4,12 @@
 //! Positions are in ft, positive aft (x), right (y) and above (z) of a reference point about 5 ft
 //! ahead of the nose.
 
+mod position;
+mod thrust_line;
 mod geometry;
 mod vanes;
 
-pub use geometry::{Aircraft, Position, Sensors, Vane, VaneModel};
+pub use geometry::{Aircraft, Sensors, Vane, VaneModel};
+pub use position::Position;
+pub use thrust_line::{Thrust, ThrustLine};
 pub use vanes::Flow;

@@ -10,7 +10,8 @@
     reason = "compiled into the kernel for the processor at hand"
 )]
 
-use super::geometry::{Position, Sensors, Vane, VaneModel};
+use super::geometry::{Sensors, Vane, VaneModel};
+use super::position::Position;
 use crate::numerics::trig::sin_cos;
 
 /// Flow at the c.g. and rotation: angles in rad, velocity in ft/s, body rates in rad/s.

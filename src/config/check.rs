@@ -7,6 +7,7 @@ use super::checked::Config;
 use super::instruments::Instrument;
 use super::source::{Files, Source};
 use crate::aero::{Axis, Buildup, Output, Regressor, WindTunnel, wind_tunnel};
+use crate::aircraft::ThrustLine;
 use crate::error::{Error, Result, did_you_mean, similarity};
 use crate::estimate::Hold;
 use crate::flight::{StandIn, signal};
@@ -239,6 +240,16 @@ fn aircraft(config: &Config, source: &Source) -> Result<()> {
     }
     if !(-90.0..=90.0).contains(&a.latitude_deg) {
         return Err(source.error("latitude_deg", "`latitude_deg` must lie between -90 and 90"));
+    }
+    a.thrust_line
+        .map_or(Ok(()), |line| thrust_line(line, source))
+}
+
+fn thrust_line(line: ThrustLine, source: &Source) -> Result<()> {
+    let inclination = line.inclination_deg;
+    if !(-45.0..=45.0).contains(&inclination) {
+        let what = format!("`inclination_deg` must lie between -45 and 45, not {inclination}");
+        return Err(source.error_under("thrust_line", "inclination_deg", what));
     }
     Ok(())
 }

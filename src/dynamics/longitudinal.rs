@@ -5,10 +5,11 @@
 //!
 //! ```text
 //! V cos β α̇ = f_z cos α − f_x sin α + gravity + V cos β q − V sin β (p cos α + r sin α)
-//! f_z = −q̄S CN/m,   f_x = (T − q̄S CA)/m
+//! f_z = (T_z − q̄S CN)/m,   f_x = (T_x − q̄S CA)/m
 //! ```
 //!
-//! This is 2.1 with C_L = CN cos α − CA sin α. Moments follow Euler's equation about y for a
+//! T_x and T_z are the thrust forward and down; T_z is zero without an inclination. This is 2.1 with
+//! C_L = CN cos α − CA sin α. Moments, with that of the thrust's line, follow Euler's equation about y for a
 //! symmetric airframe (I_xy = I_yz = 0). The engines' angular momentum H along +x has the moment
 //! −r H.
 #![expect(
@@ -33,12 +34,11 @@ pub struct Longitudinal;
 /// Inputs of the state equations at one instant.
 #[derive(Clone, Debug)]
 pub struct RateInputs {
-    /// tan β (p cos α + r sin α) = `slip_cos` cos α + `slip_sin` sin α, rad/s.
-    slip_cos: f64,
-    slip_sin: f64,
-    /// q̄S/m, T/m and g over V cos β, 1/s.
+    /// Parts of thrust and sideslip in −α̇: `less_by_cos` cos α + `less_by_sin` sin α, rad/s.
+    less_by_cos: f64,
+    less_by_sin: f64,
+    /// q̄S/m and g over V cos β, 1/s.
     force: f64,
-    thrust: f64,
     weight: f64,
     cos_phi: f64,
     /// r sin φ.
@@ -61,9 +61,11 @@ pub struct SensorInputs {
     /// Arms of the accelerometers from the c.g., ft forward, right, down.
     an: [f64; 3],
     ax: [f64; 3],
-    /// q̄S/m, and T/m where the accelerometer senses it, ft/s².
+    /// q̄S/m, and the thrust over the mass upwards, and forwards where the accelerometer senses it,
+    /// ft/s².
     force: f64,
-    thrust: f64,
+    thrust_up: f64,
+    thrust_forward: f64,
     cg: Position,
     vane: Vane,
     model: VaneModel,
@@ -128,14 +130,13 @@ impl Equations<3> for Longitudinal {
         let gyroscopic = -r * m.engine_momentum;
         let coupling = p * r * (m.iz - m.ix) + (r * r - p * p) * m.ixz;
         RateInputs {
-            slip_cos: tan_beta * p,
-            slip_sin: tan_beta * r,
+            less_by_cos: tan_beta * p - per_speed * m.thrust.down_lbf * per_mass,
+            less_by_sin: tan_beta * r + per_speed * m.thrust.forward_lbf * per_mass,
             force: per_speed * m.qbar * aircraft.wing_area_ft2 * per_mass,
-            thrust: per_speed * m.thrust * per_mass,
             weight: per_speed * m.gravity,
             cos_phi,
             turn: r * sin_phi,
-            pitch: (coupling + gyroscopic) * per_iy,
+            pitch: (coupling + gyroscopic + m.thrust.pitch_ft_lbf) * per_iy,
             moment: m.qbar * aircraft.wing_area_ft2 * aircraft.chord_ft * per_iy,
         }
     }
@@ -153,8 +154,9 @@ impl Equations<3> for Longitudinal {
             an: sensors.an.arm(m.cg),
             ax: sensors.ax.arm(m.cg),
             force: m.qbar * aircraft.wing_area_ft2 * per_mass,
-            thrust: if sensors.thrust_in_ax {
-                m.thrust * per_mass
+            thrust_up: -m.thrust.down_lbf * per_mass,
+            thrust_forward: if sensors.thrust_in_ax {
+                m.thrust.forward_lbf * per_mass
             } else {
                 0.0
             },
@@ -196,14 +198,12 @@ impl Equations<3> for Longitudinal {
         m: &Motion,
         k: &RateInputs,
     ) -> [f64; COEFFICIENTS] {
-        let (per_force, thrust) = (
-            m.mass / (m.qbar * aircraft.wing_area_ft2),
-            m.thrust * (1.0 / m.mass),
-        );
+        let per_mass = 1.0 / m.mass;
+        let per_force = m.mass / (m.qbar * aircraft.wing_area_ft2);
         [
-            -m.force_z * per_force,
+            (m.thrust.down_lbf * per_mass - m.force_z) * per_force,
             (m.accelerations[1] - k.pitch) / k.moment,
-            (thrust - m.force_x) * per_force,
+            (m.thrust.forward_lbf * per_mass - m.force_x) * per_force,
         ]
     }
 
@@ -213,12 +213,9 @@ impl Equations<3> for Longitudinal {
         // 2.1 sorted by the factors cos α and sin α.
         let by_cos = ct.mul_add(
             k.weight * k.cos_phi,
-            (-k.force).mul_add(c[NORMAL_FORCE], -k.slip_cos),
+            (-k.force).mul_add(c[NORMAL_FORCE], -k.less_by_cos),
         );
-        let by_sin = st.mul_add(
-            k.weight,
-            k.force.mul_add(c[AXIAL_FORCE], -k.thrust - k.slip_sin),
-        );
+        let by_sin = st.mul_add(k.weight, k.force.mul_add(c[AXIAL_FORCE], -k.less_by_sin));
         let alpha_dot = sa.mul_add(by_sin, ca.mul_add(by_cos, x[Q]));
         let by_alpha = ca * by_sin - sa * by_cos;
         let by_theta = k.weight * (ct * sa - st * k.cos_phi * ca);
@@ -280,8 +277,8 @@ impl Equations<3> for Longitudinal {
                 DEG * vane.angle,
                 DEG * x[Q],
                 DEG * x[THETA],
-                g * (sensors.force * c[NORMAL_FORCE] - down.value),
-                g * (sensors.thrust - sensors.force * c[AXIAL_FORCE] + forward.value),
+                g * (sensors.force * c[NORMAL_FORCE] + sensors.thrust_up - down.value),
+                g * (sensors.thrust_forward - sensors.force * c[AXIAL_FORCE] + forward.value),
             ]),
             by_state: SMatrix::zeros(),
             by_coefficient: SMatrix::<f64, OUTPUTS, COEFFICIENTS>::zeros(),

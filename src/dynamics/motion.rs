@@ -14,7 +14,7 @@ use std::sync::Arc;
 use pulp::Arch;
 
 use super::lever::lever;
-use crate::aircraft::{Aircraft, Flow, Position, Sensors};
+use crate::aircraft::{Aircraft, Flow, Position, Sensors, Thrust};
 use crate::earth::gravity_at;
 use crate::flight::{Record, signal};
 use crate::units::{G0_FT_S2, RAD};
@@ -38,7 +38,7 @@ pub struct Motion {
     pub gravity: f64,
     pub qbar: f64,
     pub mass: f64,
-    pub thrust: f64,
+    pub thrust: Thrust,
     pub ix: f64,
     pub iy: f64,
     pub iz: f64,
@@ -355,6 +355,7 @@ impl Signals<'_> {
         let felt =
             |i: usize, sensor: Position| lever(i, sensor.arm(cg), rates, accelerations).value;
         let [thrust, rpm_left, rpm_right] = self.engines.map(|s| s[i]);
+        let thrust = aircraft.thrust(thrust, cg);
         let [altitude, qbar] = self.air.map(|s| s[i]);
         let [ix, iy, iz, ixz] = self.inertia.map(|s| s[i]);
         let [ax, ay, an] = self.forces.map(|s| s[i]);
@@ -364,7 +365,7 @@ impl Signals<'_> {
         let unfelt = if aircraft.sensors.thrust_in_ax {
             0.0
         } else {
-            thrust * (1.0 / mass)
+            thrust.forward_lbf * (1.0 / mass)
         };
         Motion {
             alpha,

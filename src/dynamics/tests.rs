@@ -8,7 +8,7 @@ use super::{
     Motion, OUTPUTS,
 };
 use crate::aero::Regressor;
-use crate::aircraft::{Aircraft, Position, Sensors, Vane, VaneModel};
+use crate::aircraft::{Aircraft, Position, Sensors, Thrust, Vane, VaneModel};
 use crate::units::{DEG, G0_FT_S2};
 
 /// Aircraft of the campaign's size, with its sensors well away from the c.g.
@@ -19,6 +19,7 @@ pub(crate) fn aircraft() -> Aircraft {
         span_ft: 37.42,
         chord_ft: 11.52,
         engine_inertia_slug_ft2: 3.0,
+        thrust_line: None,
         latitude_deg: 34.9,
         sensors: Sensors {
             an: Position {
@@ -70,7 +71,7 @@ pub(crate) fn steady() -> Motion {
         gravity: 32.07,
         qbar: 52.0,
         mass: 1040.0,
-        thrust: 9000.0,
+        thrust: Thrust::forward(9000.0),
         ix: 22_360.0,
         iy: 173_300.0,
         iz: 187_300.0,
@@ -326,7 +327,10 @@ fn axial_force_points_aft_so_it_raises_alpha_where_alpha_is_positive() {
 
 #[test]
 fn thrust_carries_part_of_the_weight_and_lowers_alpha() {
-    assert!(change!(longitudinal.0[0], steady() => Motion { thrust: 12_000.0, ..steady() }) < 0.0);
+    assert!(
+        change!(longitudinal.0[0], steady() => Motion { thrust: Thrust::forward(12_000.0), ..steady() })
+            < 0.0
+    );
 }
 
 #[test]
@@ -425,7 +429,8 @@ fn accelerometers_read_force_up_forward_and_right_in_g() {
 
 #[test]
 fn the_axial_accelerometer_senses_thrust() {
-    let more = change!(longitudinal.1[4], steady() => Motion { thrust: 10_040.0, ..steady() });
+    let thrust = Thrust::forward(10_040.0);
+    let more = change!(longitudinal.1[4], steady() => Motion { thrust, ..steady() });
     assert_abs_diff_eq!(more, 1.0 / G0_FT_S2, epsilon = 1e-12);
 }
 
@@ -627,7 +632,11 @@ fn implied<const NX: usize, E: Equations<NX>>(m: &Motion) -> [f64; COEFFICIENTS]
 fn coefficients_come_back_from_the_motion_that_they_produce() {
     let (m, force) = (general_motion(), 52.0 * 400.0 / 1040.0);
     let [_, q_dot, _] = m.accelerations;
-    let forces = [m.thrust / m.mass - force * C[2], 0.0, -force * C[0]];
+    let forces = [
+        m.thrust.forward_lbf / m.mass - force * C[2],
+        0.0,
+        m.thrust.down_lbf / m.mass - force * C[0],
+    ];
     let longitudinal =
         produced::<3, Longitudinal>(forces, |x| [m.accelerations[0], x[1], m.accelerations[2]]);
     let lateral = produced::<4, Lateral>([m.force_x, force * C[0], m.force_z], |x| {

@@ -1,4 +1,4 @@
-//! Means of a maneuver's record: attitude, inertias, positions of the surfaces.
+//! Means of a maneuver's record: attitude, height of the c.g., inertias, positions of the surfaces.
 
 use crate::aero::Buildup;
 use crate::flight::{Record, signal};
@@ -15,6 +15,7 @@ pub fn means(record: &Record, maneuver: &Maneuver, buildup: &Buildup) -> Option<
     let surfaces = surfaces.flat_map(|d| d.regressor.signals());
     Some(Means {
         theta_deg: mean(signal::THETA)?,
+        z_cg_ft: mean(signal::Z_CG)?,
         ix_slug_ft2: mean(signal::IX)?,
         iy_slug_ft2: mean(signal::IY)?,
         iz_slug_ft2: mean(signal::IZ)?,

@@ -1,4 +1,5 @@
-//! Means of a maneuver that its flight condition lacks: attitude, inertias, positions of the surfaces.
+//! Means of a maneuver that its flight condition lacks: attitude, height of the c.g., inertias, positions of
+//! the surfaces.
 
 use std::collections::BTreeMap;
 
@@ -8,6 +9,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Means {
     pub theta_deg: f64,
+    /// Above the reference point.
+    pub z_cg_ft: f64,
     pub ix_slug_ft2: f64,
     pub iy_slug_ft2: f64,
     pub iz_slug_ft2: f64,

@@ -118,7 +118,9 @@ impl Simulation<'_> {
         let level = start.trim.coefficients;
         let coefficients: [f64; COEFFICIENTS] = std::array::from_fn(|i| level[i] + change[i]);
         let (force, moment) = self.aerodynamics.loads(&coefficients, air.qbar_psf);
-        let force = force + Vector3::new(inputs.thrust_lbf, 0.0, 0.0);
+        let thrust = inputs.thrust;
+        let force = force + Vector3::new(thrust.forward_lbf, 0.0, thrust.down_lbf);
+        let moment = moment + Vector3::new(0.0, thrust.pitch_ft_lbf, 0.0);
         let loads = Loads {
             force,
             moment,
@@ -132,7 +134,7 @@ impl Simulation<'_> {
             loading: inputs.loading,
             specific_force: force / inputs.loading.mass_slug,
             relative_rates: state.rates,
-            thrust_lbf: inputs.thrust_lbf,
+            forward_thrust_lbf: thrust.forward_lbf,
         }
     }
 }

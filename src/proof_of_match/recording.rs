@@ -3,7 +3,7 @@
 use super::aerodynamics::recorded_signals;
 use super::outputs::{COUNT, MATCHED, Outputs};
 use crate::aero::Buildup;
-use crate::aircraft::Aircraft;
+use crate::aircraft::{Aircraft, Thrust};
 use crate::dynamics::Motion;
 use crate::dynamics::motion::{MassProperties, Window};
 use crate::flight::Record;
@@ -28,7 +28,7 @@ const LEAST_NOISE: Outputs = [
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inputs {
     pub loading: Loading,
-    pub thrust_lbf: f64,
+    pub thrust: Thrust,
     pub engine_momentum: f64,
     pub gravity_ft_s2: f64,
 }
@@ -157,7 +157,7 @@ fn inputs(motion: &Motion) -> Inputs {
             iz_slug_ft2: motion.iz,
             ixz_slug_ft2: motion.ixz,
         },
-        thrust_lbf: motion.thrust,
+        thrust: motion.thrust,
         engine_momentum: motion.engine_momentum,
         gravity_ft_s2: motion.gravity,
     }

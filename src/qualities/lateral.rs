@@ -2,7 +2,7 @@
 
 use super::linear::{AxisStates, Flight, LinearModel, Matrix, Vector};
 use super::trim::Trim;
-use crate::aircraft::Aircraft;
+use crate::aircraft::{Aircraft, Thrust};
 use crate::dynamics::{Equations, Lateral, Rates};
 use crate::model::LocalPosterior;
 
@@ -16,7 +16,7 @@ const FEEDBACK: [(&str, usize); 4] = [
 /// Rates of the states at trim with their slopes. Thrust acts through the measured forces.
 #[must_use]
 pub fn rates(aircraft: &Aircraft, trim: &Trim) -> Rates<4> {
-    let motion = trim.motion(0.0);
+    let motion = trim.motion(Thrust::forward(0.0));
     let inputs = Lateral::rate_inputs(aircraft, &motion);
     Lateral::rates(&inputs, &Lateral::measured_state(&motion), &[0.0; 3])
 }

@@ -4,7 +4,9 @@
 //! their own slopes. They take the velocity as measured; here it is a state, at constant thrust and
 //! density:
 //!
-//! m V̇ = T cos α − q̄S (CA cos α + CN sin α) − m g sin γ,  q̄ ~ V².
+//! m V̇ = T_x cos α + T_z sin α − q̄S (CA cos α + CN sin α) − m g sin γ,  q̄ ~ V².
+//!
+//! The pitch control balances the moment M of the thrust, which does not grow with V as its own does.
 
 use super::linear::{AxisStates, ByCoefficient, Flight, LinearModel, Matrix, Vector};
 use super::trim::Trim;
@@ -37,8 +39,8 @@ pub struct Slopes {
 #[must_use]
 pub fn slopes(aircraft: &Aircraft, trim: &Trim, axial_force: f64) -> Slopes {
     let force = trim.qbar * aircraft.wing_area_ft2;
-    let normal_force = trim.normal_force(aircraft.wing_area_ft2);
-    let thrust = trim.mass * trim.gravity * trim.theta.sin() + force * axial_force;
+    let thrust = trim.thrust(aircraft, axial_force);
+    let normal_force = trim.normal_force(aircraft, thrust);
     let motion = trim.motion(thrust);
     let inputs = Longitudinal::rate_inputs(aircraft, &motion);
     let state = Longitudinal::measured_state(&motion);
@@ -59,6 +61,7 @@ pub fn slopes(aircraft: &Aircraft, trim: &Trim, axial_force: f64) -> Slopes {
     by_state[(VELOCITY, THETA)] = -trim.gravity * cos_path;
     let lift = normal_force * cos - axial_force * sin;
     by_state[(ALPHA, VELOCITY)] = -2.0 * per_mass * lift / (velocity * velocity);
+    by_state[(Q, VELOCITY)] -= 2.0 * thrust.pitch_ft_lbf / (trim.iy * velocity);
     by_state[(ALPHA, THETA)] = -trim.gravity * sin_path / velocity;
     by_coefficient[(VELOCITY, NORMAL)] = -per_mass * sin;
     by_coefficient[(VELOCITY, AXIAL)] = -per_mass * cos;

@@ -1,13 +1,13 @@
 //! Steady flight at an angle of attack, in the conditions that were flown there.
 //!
 //! Between the flown angles of attack conditions are linear. The path is as flown: pitch attitude less
-//! angle of attack. The normal force carries the weight; thrust balances axial force and weight; the
-//! pitch control balances the moment.
+//! angle of attack. Normal force and the thrust's part down carry the weight; the thrust's part forward
+//! balances axial force and weight; the pitch control balances the moment.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::aero::{Condition, WindTunnel};
-use crate::aircraft::{Aircraft, Position};
+use crate::aircraft::{Aircraft, Position, Thrust};
 use crate::dynamics::Motion;
 use crate::earth::gravity_ft_s2;
 use crate::flight::signal;
@@ -35,6 +35,7 @@ pub struct Trim {
     pub iy: f64,
     pub iz: f64,
     pub ixz: f64,
+    pub cg: Position,
     /// Positions of surfaces and vanes, deg.
     pub surfaces_deg: BTreeMap<String, f64>,
 }
@@ -42,12 +43,7 @@ pub struct Trim {
 impl Trim {
     /// Motion at trim, with a thrust. Specific forces carry the weight.
     #[must_use]
-    pub fn motion(&self, thrust: f64) -> Motion {
-        let origin = Position {
-            x_ft: 0.0,
-            y_ft: 0.0,
-            z_ft: 0.0,
-        };
+    pub fn motion(&self, thrust: Thrust) -> Motion {
         Motion {
             alpha: self.alpha,
             beta: 0.0,
@@ -68,14 +64,24 @@ impl Trim {
             iz: self.iz,
             ixz: self.ixz,
             engine_momentum: 0.0,
-            cg: origin,
+            cg: self.cg,
         }
     }
 
-    /// Normal force coefficient that carries the weight.
+    /// Thrust that balances the weight and an axial force coefficient.
     #[must_use]
-    pub fn normal_force(&self, wing_area_ft2: f64) -> f64 {
-        self.mass * self.gravity * self.theta.cos() / (self.qbar * wing_area_ft2)
+    pub fn thrust(&self, aircraft: &Aircraft, axial_force: f64) -> Thrust {
+        let force = self.qbar * aircraft.wing_area_ft2;
+        let forward = self.mass * self.gravity * self.theta.sin() + force * axial_force;
+        let of_one = aircraft.thrust(1.0, self.cg).forward_lbf;
+        aircraft.thrust(forward / of_one, self.cg)
+    }
+
+    /// Normal force coefficient that carries the weight with a thrust.
+    #[must_use]
+    pub fn normal_force(&self, aircraft: &Aircraft, thrust: Thrust) -> f64 {
+        let down = self.mass * self.gravity * self.theta.cos() + thrust.down_lbf;
+        down / (self.qbar * aircraft.wing_area_ft2)
     }
 }
 
@@ -142,6 +148,8 @@ impl Flown {
             (signal::VELOCITY, Some(maneuver.velocity_ft_s)),
             (signal::ALTITUDE, Some(maneuver.altitude_ft)),
             (signal::MASS, Some(maneuver.mass_slug)),
+            (signal::X_CG, Some(maneuver.x_cg_ft)),
+            (signal::Z_CG, Some(means.z_cg_ft)),
             (signal::IX, Some(means.ix_slug_ft2)),
             (signal::IY, Some(means.iy_slug_ft2)),
             (signal::IZ, Some(means.iz_slug_ft2)),
@@ -202,6 +210,11 @@ impl Flown {
             iy: get(signal::IY)?,
             iz: get(signal::IZ)?,
             ixz: get(signal::IXZ)?,
+            cg: Position {
+                x_ft: get(signal::X_CG)?,
+                y_ft: 0.0,
+                z_ft: get(signal::Z_CG)?,
+            },
             surfaces_deg: self.surfaces_deg.clone(),
         })
     }

@@ -22,7 +22,7 @@ pub struct Instant {
     pub specific_force: Vector3<f64>,
     /// Rates relative to the air, rad/s.
     pub relative_rates: Vector3<f64>,
-    pub thrust_lbf: f64,
+    pub forward_thrust_lbf: f64,
 }
 
 /// Readings in deg, deg/s and g, with the signs of the signals.
@@ -60,7 +60,7 @@ impl Instant {
         let unfelt_g = if sensors.thrust_in_ax {
             0.0
         } else {
-            self.thrust_lbf / self.loading.mass_slug / G0_FT_S2
+            self.forward_thrust_lbf / self.loading.mass_slug / G0_FT_S2
         };
         let angles = self.state.euler();
         Readings {

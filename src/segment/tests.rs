@@ -33,6 +33,7 @@ fn aircraft() -> Aircraft {
         span_ft: 37.4,
         chord_ft: 11.5,
         engine_inertia_slug_ft2: 3.0,
+        thrust_line: None,
         latitude_deg: 35.0,
         sensors: Sensors {
             an: p,

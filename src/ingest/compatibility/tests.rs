@@ -37,6 +37,7 @@ fn aircraft() -> Aircraft {
         span_ft: 37.4,
         chord_ft: 11.5,
         engine_inertia_slug_ft2: 3.0,
+        thrust_line: None,
         latitude_deg: 35.0,
         sensors: Sensors {
             an: at(31.3, -0.25, 6.9),

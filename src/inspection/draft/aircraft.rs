@@ -31,6 +31,7 @@ aircraft:
   span_ft: {OPEN} # reference span: rolling and yawing moments, p b/2V, r b/2V
   chord_ft: {OPEN} # mean aerodynamic chord: pitching moment, q c/2V
   engine_inertia_slug_ft2: 0 # of one engine's rotor; with its speed it couples pitch and yaw, by little
+  # thrust_line: {{ x_ft: ?, z_ft: ?, inclination_deg: 0 }} # a point of it; without it along x through the centre of gravity
   latitude_deg: 45 # gravity depends on it: 0.5 % from the equator to a pole
   # Positions: ft aft (x), right (y) and above (z) of any reference point; those of the centre of gravity count from the
   # same point. Where a position is not known, give the centre of gravity's: the sensor then counts as mounted there.

@@ -84,7 +84,9 @@ impl Plant {
             &(state.rates - inputs.gust.rates),
             &inputs.surfaces,
         );
-        let force = aerodynamic + Vector3::new(inputs.thrust_lbf, 0.0, 0.0);
+        let thrust = self.aircraft.thrust(inputs.thrust_lbf, loading.cg());
+        let force = aerodynamic + Vector3::new(thrust.forward_lbf, 0.0, thrust.down_lbf);
+        let moment = moment + Vector3::new(0.0, thrust.pitch_ft_lbf, 0.0);
         let per_minute = 2.0 * std::f64::consts::PI / 60.0;
         let loads = Loads {
             force,

@@ -27,7 +27,7 @@ pub fn readings(
         loading: *loading,
         specific_force: outputs.specific_force,
         relative_rates: state.rates - inputs.gust.rates,
-        thrust_lbf: inputs.thrust_lbf,
+        forward_thrust_lbf: aircraft.thrust(inputs.thrust_lbf, loading.cg()).forward_lbf,
     }
     .readings(aircraft);
     let [p, q, r] = read.rates_deg_s;

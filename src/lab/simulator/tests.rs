@@ -13,6 +13,7 @@ use super::{
     Card, FlownManeuver, Instrument, Instruments, Program, Simulator, Turbulence, TurbulenceModel,
     sensors,
 };
+use crate::aircraft::ThrustLine;
 use crate::dynamics::{Equations, Lateral, Longitudinal, Motion};
 use crate::earth::gravity_ft_s2;
 use crate::estimate::{self, Context, Estimated, Method};
@@ -82,7 +83,7 @@ fn measured_motion(
         gravity: gravity_ft_s2(aircraft.latitude_deg, state.position.z),
         qbar: outputs.air.qbar_psf,
         mass: loading.mass_slug,
-        thrust: inputs.thrust_lbf,
+        thrust: aircraft.thrust(inputs.thrust_lbf, loading.cg()),
         ix: loading.ix_slug_ft2,
         iy: loading.iy_slug_ft2,
         iz: loading.iz_slug_ft2,
@@ -179,13 +180,22 @@ fn disagreement(campaign: &SimulatedCampaign, random: &mut RandomStream) -> (f64
 
 #[test]
 fn the_equations_of_simulator_and_estimator_agree_to_twelve_digits() {
-    // Typically 2e-15: both include sideslip, rotation about all axes, the engines' angular momentum,
-    // I_xz and the sensors' arms without approximation.
-    let campaign = shipped_campaign();
+    // Typically 2e-15: both include sideslip, rotation about all axes, the engines' angular momentum, the
+    // thrust's line, I_xz and the sensors' arms without approximation.
+    let mut campaign = shipped_campaign();
     let mut random = RandomStream::new(5, "agreement");
-    for _ in 0..500 {
-        let (r, o) = disagreement(&campaign, &mut random);
-        assert!(r < 1e-12 && o < 1e-12, "rates {r:.1e}, outputs {o:.1e}");
+    let inclined = ThrustLine {
+        x_ft: 55.0,
+        z_ft: 4.0,
+        inclination_deg: 6.0,
+    };
+    for line in [None, Some(inclined)] {
+        campaign.config.aircraft.thrust_line = line;
+        campaign.simulator.plant.aircraft.thrust_line = line;
+        for _ in 0..500 {
+            let (r, o) = disagreement(&campaign, &mut random);
+            assert!(r < 1e-12 && o < 1e-12, "rates {r:.1e}, outputs {o:.1e}");
+        }
     }
 }
 

@@ -138,6 +138,7 @@ impl CaseFile {
             span_ft: c.b,
             chord_ft: c.cbar,
             engine_inertia_slug_ft2: c.Ixe,
+            thrust_line: None,
             latitude_deg: LATITUDE_DEG,
             sensors: Sensors {
                 an: at(c.x_an, c.y_an, c.z_an),

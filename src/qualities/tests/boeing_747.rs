@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, SMatrix};
 
 use super::fixture;
 use crate::aero::{Axis, Condition};
-use crate::aircraft::Aircraft;
+use crate::aircraft::{Aircraft, Position};
 use crate::numerics::dual::Dual;
 use crate::qualities::linear::{ByCoefficient, LinearModel, Matrix, Vector};
 use crate::qualities::modes::Modes;
@@ -52,6 +52,7 @@ fn trim() -> Trim {
         iy: 0.331e8,
         iz: 0.497e8,
         ixz: -0.156e7,
+        cg: Position::default(),
         surfaces_deg: std::collections::BTreeMap::new(),
     }
 }
@@ -65,7 +66,7 @@ const M: [f64; 4] = [3.581e3, -3.515e4, -1.122e7, -3.826e3];
 fn by_state() -> ByState {
     let (aircraft, trim) = (aircraft(), trim());
     let force = trim.qbar * aircraft.wing_area_ft2;
-    let normal_force = trim.normal_force(aircraft.wing_area_ft2);
+    let normal_force = trim.normal_force(&aircraft, trim.thrust(&aircraft, DRAG));
     let apparent = MASS - Z[3];
     let w_dot = [
         Z[0] / apparent,

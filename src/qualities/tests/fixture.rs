@@ -85,11 +85,7 @@ pub fn buildup() -> Buildup {
 }
 
 pub fn aircraft() -> Aircraft {
-    let origin = Position {
-        x_ft: 0.0,
-        y_ft: 0.0,
-        z_ft: 0.0,
-    };
+    let origin = Position::default();
     let vane = Vane {
         x_ft: 0.0,
         y_ft: 0.0,
@@ -102,6 +98,7 @@ pub fn aircraft() -> Aircraft {
         span_ft: 37.42,
         chord_ft: 11.52,
         engine_inertia_slug_ft2: 3.0,
+        thrust_line: None,
         latitude_deg: 34.9,
         sensors: Sensors {
             an: origin,
@@ -134,6 +131,11 @@ pub fn trim() -> Trim {
         iy: 173_000.0,
         iz: 188_000.0,
         ixz: -2_080.0,
+        cg: Position {
+            x_ft: 38.2,
+            y_ft: 0.0,
+            z_ft: 2.0,
+        },
         surfaces_deg: BTreeMap::from([("de_deg".into(), -4.0), ("dpv_deg".into(), 3.0)]),
     }
 }
@@ -163,8 +165,7 @@ pub fn posterior(axis: Axis, share: f64) -> LocalPosterior {
 
 /// Linear equations of the fighter.
 pub fn linear(axis: Axis, posterior: &LocalPosterior) -> LinearModel {
-    let none = BTreeMap::new();
-    linear_with(axis, posterior, &none)
+    linear_of(&aircraft(), axis, posterior, &BTreeMap::new())
 }
 
 /// As [`linear`], with feedback.
@@ -173,10 +174,20 @@ pub fn linear_with(
     posterior: &LocalPosterior,
     feedback: &BTreeMap<String, BTreeMap<String, f64>>,
 ) -> LinearModel {
-    let (aircraft, buildup, trim) = (aircraft(), buildup(), trim());
+    linear_of(&aircraft(), axis, posterior, feedback)
+}
+
+/// Linear equations of an aircraft at the fighter's trim.
+pub fn linear_of(
+    aircraft: &Aircraft,
+    axis: Axis,
+    posterior: &LocalPosterior,
+    feedback: &BTreeMap<String, BTreeMap<String, f64>>,
+) -> LinearModel {
+    let (buildup, trim) = (buildup(), trim());
     let pitch = BTreeMap::from([("de_deg".to_owned(), 1.0)]);
     let flight = Flight {
-        aircraft: &aircraft,
+        aircraft,
         buildup: &buildup,
         trim: &trim,
         controls: Controls {

@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use approx::assert_relative_eq;
 use nalgebra::{DMatrix, DVector};
 
-use super::fixture::{aircraft, linear, linear_with, posterior, trim};
+use super::fixture::{aircraft, linear, linear_of, linear_with, posterior, trim};
 use crate::aero::{Axis, Buildup, Coefficient, Derivative, Regressor};
+use crate::aircraft::{Aircraft, ThrustLine};
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
 use crate::qualities::linear::{AxisStates, Controls, Effect, Flight, Matrix, Vector};
 use crate::qualities::quantities::Differentiation;
@@ -18,8 +19,9 @@ use crate::units::DEG;
 struct Pitching {
     values: BTreeMap<&'static str, f64>,
     mach_slope: f64,
-    thrust: f64,
-    /// Constants that make the trim steady.
+    /// Forward and down, and its moment.
+    thrust: [f64; 3],
+    /// Constants of CN and Cm that make the trim steady.
     offset: [f64; 2],
 }
 
@@ -59,12 +61,13 @@ impl Pitching {
         let drag = force * (ca * alpha.cos() + cn * alpha.sin());
         let path = theta - alpha;
         let (weight, mass) = (trim.mass * trim.gravity, trim.mass);
-        let along = self.thrust * alpha.cos() - drag - weight * path.sin();
-        let across = lift + self.thrust * alpha.sin() - weight * path.cos();
+        let [forward, down, pitch] = self.thrust;
+        let along = forward * alpha.cos() + down * alpha.sin() - drag - weight * path.sin();
+        let across = lift + forward * alpha.sin() - down * alpha.cos() - weight * path.cos();
         Vector::from([
             along / mass,
             q - across / (mass * velocity),
-            force * aircraft.chord_ft * cm / trim.iy,
+            (force * aircraft.chord_ft * cm + pitch) / trim.iy,
             q,
         ])
     }
@@ -91,6 +94,20 @@ fn with_mach_slope() -> (LocalPosterior, f64) {
 
 #[test]
 fn the_longitudinal_matrix_is_that_of_differences_of_forces_and_moment() {
+    // Engines 3 ft below the c.g., inclined by 5 deg.
+    let line = ThrustLine {
+        x_ft: 38.2,
+        z_ft: -1.0,
+        inclination_deg: 5.0,
+    };
+    assert_matrix_is_that_of_differences(&aircraft());
+    assert_matrix_is_that_of_differences(&Aircraft {
+        thrust_line: Some(line),
+        ..aircraft()
+    });
+}
+
+fn assert_matrix_is_that_of_differences(aircraft: &Aircraft) {
     let (posterior, mach_slope) = with_mach_slope();
     let names = [
         "CN_0", "CN_alpha", "CN_q", "CN_de", "CN_dpv", "Cm_0", "Cm_alpha", "Cm_q", "Cm_de",
@@ -104,20 +121,29 @@ fn the_longitudinal_matrix_is_that_of_differences_of_forces_and_moment() {
             .zip(posterior.mean.iter().copied())
             .collect(),
         mach_slope,
-        thrust: 0.0,
+        thrust: [0.0; 3],
         offset: [0.0; 2],
     };
-    let force = trim.qbar * aircraft().wing_area_ft2;
+    let force = trim.qbar * aircraft.wing_area_ft2;
     let [cn, cm, ca] = pitching.coefficients(&start);
-    pitching.offset = [trim.normal_force(aircraft().wing_area_ft2) - cn, -cm];
-    pitching.thrust = trim.mass * trim.gravity * trim.theta.sin() + force * ca;
+    let weight = trim.mass * trim.gravity;
+    let forward = weight * trim.theta.sin() + force * ca;
+    let line = aircraft.thrust_line;
+    let (slope, arm) = line.map_or((0.0, 0.0), |l| {
+        (l.inclination_deg.to_radians().tan(), 2.0 - l.z_ft)
+    });
+    let (down, pitch) = (-forward * slope, forward * arm);
+    pitching.thrust = [forward, down, pitch];
+    let normal = (weight * trim.theta.cos() + down) / force;
+    pitching.offset = [normal - cn, -pitch / (force * aircraft.chord_ft) - cm];
     assert!(pitching.rates(&start).norm() < 1e-12);
     let differences = Matrix::from_fn(|i, j| {
         let h = 1e-4 * if j == 0 { trim.velocity } else { 1.0 };
         let step = Vector::ith(j, h);
         (pitching.rates(&(start + step))[i] - pitching.rates(&(start - step))[i]) / (2.0 * h)
     });
-    let found = linear(Axis::Longitudinal, &posterior).matrix(&posterior.mean);
+    let none = BTreeMap::new();
+    let found = linear_of(aircraft, Axis::Longitudinal, &posterior, &none).matrix(&posterior.mean);
     assert_relative_eq!(found, differences, epsilon = 1e-7, max_relative = 1e-6);
     // Each entry that the equations have is exercised.
     assert!((0..4).all(|i| found[(0, i)].abs() > 1e-4 || i == 2));

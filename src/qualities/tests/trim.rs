@@ -14,6 +14,7 @@ fn flown(alpha_deg: f64, qbar_psf: f64, theta_deg: f64, surface: Option<f64>) ->
     };
     let means = Means {
         theta_deg,
+        z_cg_ft: 1.5,
         ix_slug_ft2: 22e3,
         iy_slug_ft2: 172e3,
         iz_slug_ft2: 188e3,
