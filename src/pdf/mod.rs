@@ -27,8 +27,8 @@
 //! | `weak` `fair` `strong` `flagged` (`td`) | four shades |
 //! | `inline` (`svg`) | a drawing within a line |
 //!
-//! An `svg` may contain `g` (`transform="translate(…)"`, `clip-path` of one rectangle), `rect`,
-//! `line`, `path` (M L H V Z, and A for half circles) and `text` (`rotate(-90 …)`), with the
+//! An `svg` may contain `g` (`clip-path` of one rectangle), `rect`, `line`, `path` (M L H V Z, and A for half
+//! circles; both with `transform="translate(…)"` or `scale(…)`) and `text` (`rotate(-90 …)`), with the
 //! attributes `fill`, `stroke`, `stroke-width`, `stroke-dasharray`, `opacity`, `fill-opacity`,
 //! `font-size`, `font-weight` and `text-anchor`.
 //!

@@ -81,6 +81,25 @@ fn colour(value: &str) -> Option<[u8; 3]> {
     }
 }
 
+/// Matrix of a `translate` or `scale`.
+fn matrix(transform: &str) -> Option<String> {
+    let (name, rest) = transform.split_once('(')?;
+    let by: Vec<f32> = numbers(rest.strip_suffix(')')?).collect();
+    let at = |i: usize| by.get(i).copied().map(number);
+    let first = at(0)?;
+    match name {
+        "translate" => Some(format!(
+            "1 0 0 1 {first} {}",
+            at(1).unwrap_or("0".to_owned())
+        )),
+        "scale" => Some(format!(
+            "{first} 0 0 {} 0 0",
+            at(1).unwrap_or(first.clone())
+        )),
+        _ => None,
+    }
+}
+
 fn dashes(value: &str) -> String {
     let numbers: Vec<f32> = numbers(value).collect();
     numbers
@@ -193,7 +212,7 @@ impl SvgReader<'_> {
             }
             "path" => {
                 let outline = path_operators(node.attribute("d").unwrap_or(""));
-                self.paint(&outline, style);
+                self.transformed(node, |own| own.paint(&outline, style));
             }
             "text" => self.text(node, style, of("x"), of("y")),
             _ => {}
@@ -205,24 +224,34 @@ impl SvgReader<'_> {
             .attribute("clip-path")
             .and_then(|c| c.strip_prefix("url(#")?.strip_suffix(')'));
         let clip = clip.and_then(|id| self.clips.get(id)).cloned();
-        let moved = node
-            .attribute("transform")
-            .and_then(|t| t.strip_prefix("translate(")?.strip_suffix(')'));
-        if clip.is_none() && moved.is_none() {
-            return self.children(node, style);
-        }
+        self.transformed(node, |own| {
+            let Some(clip) = clip else {
+                return own.children(node, style);
+            };
+            own.saved(|own| {
+                // Writing into a String cannot fail.
+                let _ = writeln!(own.out, "{clip} W n");
+                own.children(node, style);
+            });
+        });
+    }
+
+    /// Draws what a `translate` or `scale` of an element applies to.
+    fn transformed(&mut self, node: Node, draw: impl FnOnce(&mut Self)) {
+        let Some(matrix) = node.attribute("transform").and_then(matrix) else {
+            return draw(self);
+        };
+        self.saved(|own| {
+            let _ = writeln!(own.out, "{matrix} cm");
+            draw(own);
+        });
+    }
+
+    /// Draws in a graphics state of its own.
+    fn saved(&mut self, draw: impl FnOnce(&mut Self)) {
         self.out.push_str("q\n");
-        if let Some(moved) = moved {
-            let by: Vec<f32> = numbers(moved).collect();
-            let at = |i: usize| number(by.get(i).copied().unwrap_or(0.0));
-            // Writing into a String cannot fail.
-            let _ = writeln!(self.out, "1 0 0 1 {} {} cm", at(0), at(1));
-        }
-        if let Some(clip) = clip {
-            let _ = writeln!(self.out, "{clip} W n");
-        }
         self.graphics_state.clear();
-        self.children(node, style);
+        draw(self);
         self.out.push_str("Q\n");
         self.graphics_state.clear();
     }
@@ -303,6 +332,34 @@ impl SvgReader<'_> {
         let _ = writeln!(
             self.out,
             "BT /{font} {size} Tf {place} Tm <{encoded}> Tj ET"
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn operators(elements: &str) -> String {
+        let svg = format!(r#"<svg viewBox="0 0 9 9">{elements}</svg>"#);
+        let xml = roxmltree::Document::parse(&svg).unwrap();
+        drawing(xml.root_element(), &Fonts::load().unwrap()).operators
+    }
+
+    #[test]
+    fn a_transform_holds_for_its_element_alone() {
+        let line = r##"<path transform="scale(.25)" d="M0 4l8 8" stroke="#000" stroke-width="4" fill="none"/>"##;
+        let own = "/A100 gs\n0 0 0 RG 4 w [] 0 d\n0 4 m 8 12 l S\n";
+        assert_eq!(
+            operators(line),
+            format!("q\n0.25 0 0 0.25 0 0 cm\n{own}Q\n")
+        );
+        let group = r#"<g transform="translate(1,2)"><rect width="1" height="1"/></g><rect width="2" height="2"/>"#;
+        let first = "/A100 gs\n0 0 0 rg\n0 0 1 1 re f\n";
+        let second = "/A100 gs\n0 0 0 rg\n0 0 2 2 re f\n";
+        assert_eq!(
+            operators(group),
+            format!("q\n1 0 0 1 1 2 cm\n{first}Q\n{second}")
         );
     }
 }

@@ -411,9 +411,13 @@ mod tests {
             path_after(&svg, "class=\"mark despiked\"")[0] + 4.0,
             x(140.0),
         );
-        let step = coordinate(x(200.0) - x(100.0));
-        assert!(svg.contains(&format!("M{} ", coordinate(x(100.0)))));
-        assert!(svg.contains(&format!("l{step}-")), "{svg}");
+        let quarters = |value: f64| (4.0 * value).round();
+        let (first, step) = (quarters(x(100.0)), quarters(x(200.0) - x(100.0)));
+        let line = format!("<path transform=\"scale(.25)\" d=\"M{first} ");
+        assert!(
+            svg.contains(&line) && svg.contains(&format!("l{step}-")),
+            "{svg}"
+        );
         assert!(!svg.contains("class=\"mark missing\""));
     }
 

@@ -284,7 +284,7 @@ impl StripColumn {
                 dash: line.dash,
                 ..PathStyle::line(line.colour, line.width)
             };
-            svg.path(&self.line(line, strip, top), style);
+            svg.lines(&self.line(line, strip, top), style);
         }
         let mut dots = String::new();
         for &(time_s, value) in &strip.dots {
@@ -300,7 +300,7 @@ impl StripColumn {
         }
     }
 
-    /// Area and limits of a tolerance.
+    /// Area of a tolerance with its outline, which is its limits.
     fn tube(&self, svg: &mut SvgWriter, strip: &Strip, top: f64) {
         if strip.tube.is_empty() {
             return;
@@ -308,11 +308,12 @@ impl StripColumn {
         let place = |time_s: f64, value: f64| (self.x(time_s), strip.y(top, value));
         let upper = strip.tube.iter().map(|(t, _, upper)| place(*t, *upper));
         let lower = strip.tube.iter().map(|(t, lower, _)| place(*t, *lower));
-        let around = upper.clone().chain(lower.clone().rev());
-        let area = format!("{}z", polyline(around));
-        svg.path(&area, PathStyle::filled(TOLERANCE_AREA));
-        let limits = [polyline(upper), polyline(lower)].concat();
-        svg.path(&limits, PathStyle::line(TOLERANCE_LIMIT, 0.6));
+        let area = format!("{}z", polyline(upper.chain(lower.rev())));
+        let style = PathStyle {
+            fill: Some(TOLERANCE_AREA),
+            ..PathStyle::line(TOLERANCE_LIMIT, 0.6)
+        };
+        svg.lines(&area, style);
     }
 
     fn line(&self, line: &StripLine, strip: &Strip, top: f64) -> String {

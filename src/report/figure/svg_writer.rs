@@ -1,4 +1,5 @@
-//! Elements of an SVG drawing as text, with coordinates in tenths of a unit.
+//! Elements of an SVG drawing as text, with coordinates in tenths of a unit. Lines through many points are
+//! in whole quarters of a unit: half as many characters.
 
 use std::fmt::Write;
 
@@ -88,11 +89,29 @@ pub struct Alternative<'a> {
 impl SvgWriter {
     /// Draws a path; nothing for empty data.
     pub fn path(&mut self, data: &str, style: PathStyle) {
+        self.scaled_path("", data, style);
+    }
+
+    /// Draws data of [`polyline`]; nothing for empty data.
+    pub fn lines(&mut self, data: &str, style: PathStyle) {
+        let dashes = style.dash.split_whitespace().filter_map(|d| d.parse().ok());
+        let dashes: Vec<String> = dashes.map(|d: f64| coordinate(QUARTERS * d)).collect();
+        let style = PathStyle {
+            stroke: style
+                .stroke
+                .map(|(colour, width)| (colour, QUARTERS * width)),
+            dash: &dashes.join(" "),
+            ..style
+        };
+        self.scaled_path(r#" transform="scale(.25)""#, data, style);
+    }
+
+    fn scaled_path(&mut self, transform: &str, data: &str, style: PathStyle) {
         if data.is_empty() {
             return;
         }
         // Writing into a String cannot fail.
-        let _ = write!(self.svg, r#"<path d="{data}""#);
+        let _ = write!(self.svg, r#"<path{transform} d="{data}""#);
         if let Some((colour, width)) = style.stroke {
             let _ = write!(self.svg, r#" stroke="{colour}" stroke-width="{width}""#);
         }
@@ -195,26 +214,29 @@ impl SvgWriter {
     }
 }
 
-/// Path data of a line through points, relative from each to the next. Points are left out where the
-/// line stays within [`TOLERANCE`] of them; the sum of the steps stays true to the others.
+/// Coordinates of [`polyline`] in a unit of the drawing.
+const QUARTERS: f64 = 4.0;
+
+/// Path data of a line through points for [`SvgWriter::lines`], relative from each to the next. Points are
+/// left out where the line stays within [`TOLERANCE`] of them; the sum of the steps stays true to the others.
 #[must_use]
 pub fn polyline(points: impl Iterator<Item = (f64, f64)>) -> String {
-    let points: Vec<(i64, i64)> = points.map(|(x, y)| (tenths(x), tenths(y))).collect();
+    let quarters = |value: f64| rounded(QUARTERS * value);
+    let points: Vec<(i64, i64)> = points.map(|(x, y)| (quarters(x), quarters(y))).collect();
     let points = simplified(&points);
     let Some(&(x, y)) = points.first() else {
         return String::new();
     };
-    let mut data = format!("M{} {}", from_tenths(x), from_tenths(y));
+    let mut data = format!("M{x} {y}");
     for (step, pair) in points.windows(2).enumerate() {
         let (dx, dy) = (pair[1].0 - pair[0].0, pair[1].1 - pair[0].1);
         let command = if step == 0 { "l" } else { separator(dx) };
         // Writing into a String cannot fail.
-        let _ = write!(data, "{command}{}", from_tenths(dx));
-        let _ = write!(data, "{}{}", separator(dy), from_tenths(dy));
+        let _ = write!(data, "{command}{dx}{}{dy}", separator(dy));
     }
     if points.len() == 1 {
         // A single point has no length: make it visible.
-        data.push_str("h.6");
+        data.push_str("h2");
     }
     data
 }
@@ -224,9 +246,9 @@ fn separator(number: i64) -> &'static str {
     if number < 0 { "" } else { " " }
 }
 
-/// Largest distance of a point from a line that leaves it out, in tenths of a unit: a quarter of a
-/// unit is a quarter of a pixel, and half of the thinnest line.
-const TOLERANCE: f64 = 2.5;
+/// Largest distance of a point from a line that leaves it out, in quarters of a unit: a quarter of a
+/// pixel, and half of the thinnest line.
+const TOLERANCE: f64 = 1.0;
 
 /// The first and the last point, and those that the line between two kept ones would miss by more
 /// than [`TOLERANCE`] (Ramer, Douglas and Peucker).
@@ -276,12 +298,16 @@ pub fn coordinate(value: f64) -> String {
     from_tenths(tenths(value))
 }
 
+fn tenths(value: f64) -> i64 {
+    rounded(10.0 * value)
+}
+
 #[expect(
     clippy::cast_possible_truncation,
     reason = "coordinates of a drawing are small"
 )]
-fn tenths(value: f64) -> i64 {
-    (10.0 * value).round() as i64
+fn rounded(value: f64) -> i64 {
+    value.round() as i64
 }
 
 fn from_tenths(tenths: i64) -> String {
@@ -301,21 +327,32 @@ mod tests {
     use super::*;
 
     #[test]
-    fn steps_of_tenths_add_up_to_the_points() {
-        let data = polyline([(0.04, 1.0), (0.08, 2.25), (10.0, -3.0)].into_iter());
-        assert_eq!(data, "M0 1l.1 1.3 9.9-5.3");
-        assert_eq!(polyline([(1.0, 2.0)].into_iter()), "M1 2h.6");
+    fn steps_of_quarters_add_up_to_the_points() {
+        let data = polyline([(0.1, 1.0), (0.2, 2.3), (10.0, -3.0)].into_iter());
+        assert_eq!(data, "M0 4l1 5 39-21");
+        assert_eq!(polyline([(1.0, 2.0)].into_iter()), "M4 8h2");
         assert_eq!(polyline(std::iter::empty()), "");
     }
 
     #[test]
     fn points_on_a_straight_line_are_left_out() {
         let line = (0..100).map(|i| (f64::from(i), 5.0 + 0.1 * f64::from(i % 2)));
-        assert_eq!(polyline(line), "M0 5l99 .1");
-        let peak = [(0.0, 0.0), (1.0, 0.0), (2.0, 0.4), (3.0, 0.0), (4.0, 0.0)];
-        assert_eq!(polyline(peak.into_iter()), "M0 0l2 .4 2-.4");
+        assert_eq!(polyline(line), "M0 20l396 0");
+        let peak = [(0.0, 0.0), (1.0, 0.0), (2.0, 0.5), (3.0, 0.0), (4.0, 0.0)];
+        assert_eq!(polyline(peak.into_iter()), "M0 0l8 2 8-2");
         let back = [(0.0, 0.0), (9.0, 0.0), (1.0, 0.0)];
-        assert_eq!(polyline(back.into_iter()), "M0 0l9 0-8 0");
+        assert_eq!(polyline(back.into_iter()), "M0 0l36 0-32 0");
+    }
+
+    #[test]
+    fn lines_are_as_wide_as_asked_for_at_their_scale() {
+        let mut svg = SvgWriter::default();
+        svg.lines(
+            &polyline([(0.0, 1.0), (2.0, 3.0)].into_iter()),
+            PathStyle::line("#111111", 0.6),
+        );
+        let expected = r##"<path transform="scale(.25)" d="M0 4l8 8" stroke="#111111" stroke-width="2.4" fill="none"/>"##;
+        assert_eq!(svg.svg, expected);
     }
 
     proptest! {
