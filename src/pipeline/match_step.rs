@@ -57,7 +57,7 @@ impl<'a> Step for MatchStep<'a> {
     type Artefact = Matched;
 
     const KIND: Kind = Kind::Match;
-    const VERSION: u32 = 1;
+    const VERSION: u32 = 2;
 
     fn item(&self) -> &str {
         &self.maneuver.maneuver_id

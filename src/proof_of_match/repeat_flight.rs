@@ -294,7 +294,7 @@ fn inside(
         return 0.0;
     };
     let noise = recording.noise[output];
-    let mut count = 0;
+    let (mut count, mut outside) = (0, 0);
     let mut doubtful = Vec::new();
     for sample in (0..recording.samples).filter(|k| !recording.repaired[*k][output]) {
         count += 1;
@@ -302,11 +302,22 @@ fn inside(
         let (a, b) = (drawn[low], drawn[(low + 1).min(drawn.len() - 1)]);
         let difference = a + share * (b - a);
         let width = tolerance.width(recording.measured[sample][output]);
-        if width - difference.abs() < CERTAIN * noise {
-            doubtful.push(normal::within(width, difference, noise));
+        let margin = width - difference.abs();
+        if margin < -CERTAIN * noise {
+            outside += 1;
+        } else if margin < CERTAIN * noise {
+            doubtful.push((width, difference));
         }
     }
-    at_most_outside(&doubtful, allowed_outside(count, required_pct))
+    let allowed = allowed_outside(count, required_pct);
+    let Some(allowed) = allowed.checked_sub(outside) else {
+        return 0.0;
+    };
+    let inside = doubtful.into_iter();
+    let inside: Vec<f64> = inside
+        .map(|(width, difference)| normal::within(width, difference, noise))
+        .collect();
+    at_most_outside(&inside, allowed)
 }
 
 /// Probability that at most `allowed` of independent samples are outside.
