@@ -1,0 +1,172 @@
+//! Columns of a recording from the variables of a file: vectors, the columns of matrices, and both in
+//! structs.
+
+use std::collections::BTreeMap;
+
+use super::super::contents::ImportedColumn;
+
+/// A variable or field.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// Rows, columns, and values column by column.
+    Numbers(usize, usize, Vec<f64>),
+    Text(String),
+    Cells(Vec<Value>),
+    Struct(Vec<(String, Value)>),
+    /// Something else, in words.
+    Other(&'static str),
+}
+
+/// Columns collected from the variables.
+#[derive(Debug, Default)]
+pub struct Table {
+    columns: Vec<(ImportedColumn, Vec<f64>)>,
+    /// Matrices whose columns have no names yet: first column and count.
+    matrices: Vec<(usize, usize)>,
+    /// Lists of texts, with their names.
+    lists: Vec<(String, Vec<String>)>,
+    notes: Vec<String>,
+}
+
+impl Table {
+    /// Adds a value under the name of what contains it.
+    pub fn add(&mut self, prefix: &str, name: &str, value: Value) {
+        match value {
+            Value::Numbers(rows, columns, values) => self.add_numbers(name, rows, columns, values),
+            Value::Struct(fields) => {
+                if let Some((unit, data)) = signal_of(&fields) {
+                    let column = ImportedColumn {
+                        name: name.to_owned(),
+                        unit,
+                    };
+                    self.columns.push((column, data));
+                    return;
+                }
+                for (field, value) in fields {
+                    let full = if prefix.is_empty() {
+                        field.clone()
+                    } else {
+                        format!("{prefix}.{field}")
+                    };
+                    self.add(&full, &full, value);
+                }
+            }
+            Value::Cells(cells) => {
+                let text = |cell: Value| {
+                    if let Value::Text(text) = cell {
+                        Some(text)
+                    } else {
+                        None
+                    }
+                };
+                if let Some(list) = cells.into_iter().map(text).collect() {
+                    self.lists.push((name.to_owned(), list));
+                }
+            }
+            Value::Other(what) => self.notes.push(format!("`{name}` is left out: {what}")),
+            Value::Text(_) => {}
+        }
+    }
+
+    fn add_numbers(&mut self, name: &str, rows: usize, columns: usize, values: Vec<f64>) {
+        let head = |name: String| ImportedColumn { name, unit: None };
+        if rows == 1 || columns == 1 {
+            if values.len() > 1 {
+                self.columns.push((head(name.to_owned()), values));
+            }
+            return;
+        }
+        if rows == 0 || columns == 0 {
+            return;
+        }
+        // Recordings are longer than wide.
+        let (length, width) = (rows.max(columns), rows.min(columns));
+        self.matrices.push((self.columns.len(), width));
+        for n in 0..width {
+            let at = |k: usize| {
+                if rows >= columns {
+                    n * rows + k
+                } else {
+                    k * rows + n
+                }
+            };
+            let column = (0..length).map(|k| values[at(k)]).collect();
+            self.columns
+                .push((head(format!("{name}_{}", n + 1)), column));
+        }
+    }
+
+    /// Names the columns of a matrix by a list of as many texts, and gives them units by another.
+    pub fn name_matrix_columns(&mut self) {
+        let is_units = |name: &str| name.to_lowercase().contains("unit");
+        for (first, width) in self.matrices.clone() {
+            let mut of_width = self.lists.iter().filter(|(_, list)| list.len() == width);
+            let names = of_width.clone().find(|(name, _)| !is_units(name));
+            let units = of_width.find(|(name, _)| is_units(name));
+            let columns = self.columns.iter_mut().skip(first).take(width).enumerate();
+            for (n, (head, _)) in columns {
+                if let Some((_, names)) = names {
+                    head.name.clone_from(&names[n]);
+                }
+                head.unit = units
+                    .map(|(_, units)| units[n].clone())
+                    .or(head.unit.take());
+            }
+        }
+    }
+
+    /// Length that most columns have.
+    pub fn frequent_length(&self) -> usize {
+        let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
+        for (_, values) in &self.columns {
+            *counts.entry(values.len()).or_default() += 1;
+        }
+        counts
+            .into_iter()
+            .max_by_key(|(length, count)| (*count, *length))
+            .map_or(0, |(length, _)| length)
+    }
+
+    /// Columns of a length, each name once, and the notes.
+    pub fn of_length(self, length: usize) -> (Vec<(ImportedColumn, Vec<f64>)>, Vec<String>) {
+        let mut notes = self.notes;
+        let mut kept: Vec<(ImportedColumn, Vec<f64>)> = Vec::new();
+        for (mut head, values) in self.columns {
+            if values.len() != length {
+                notes.push(format!(
+                    "`{}` is left out: {} values, where most columns have {length}",
+                    head.name,
+                    values.len()
+                ));
+                continue;
+            }
+            let base = head.name.clone();
+            let mut n = 2;
+            while kept.iter().any(|(other, _)| other.name == head.name) {
+                head.name = format!("{base}_{n}");
+                n += 1;
+            }
+            kept.push((head, values));
+        }
+        (kept, notes)
+    }
+}
+
+/// Unit and values of a struct that holds one signal: `data` or `values`, and perhaps `unit`.
+fn signal_of(fields: &[(String, Value)]) -> Option<(Option<String>, Vec<f64>)> {
+    let field = |names: &[&str]| {
+        let found = fields
+            .iter()
+            .find(|(name, _)| names.contains(&name.to_lowercase().as_str()));
+        found.map(|(_, value)| value)
+    };
+    let Some(Value::Numbers(rows, columns, values)) = field(&["data", "values", "value"]) else {
+        return None;
+    };
+    let unit = match field(&["unit", "units"]) {
+        Some(Value::Text(unit)) => Some(unit.clone()),
+        _ => None,
+    };
+    let is_vector = (*rows == 1 || *columns == 1) && values.len() > 1;
+    is_vector.then(|| (unit, values.clone()))
+}
