@@ -11,7 +11,7 @@ use crate::store::import;
 pub const IMPORT_HELP: &str = "\
 Formats, known by their content:
   text      one row a sample: any delimiter, decimal commas, units in brackets or in a row of their own, comments above
-  MATLAB    version 5 (-v6, -v7): vectors, matrices and structs; of v7.3 (HDF5) the message says how to convert it
+  MATLAB    version 5 (-v6, -v7) and 7.3: vectors, matrices and structs; other HDF5 alike
   Parquet   tall: columns time, name, value and perhaps unit; runs and init also read it as it is. A Parquet file with one \
 column a channel needs no import
 

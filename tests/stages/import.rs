@@ -227,6 +227,88 @@ fn matlab_vectors_structs_and_matrices_come_back_to_the_bit() {
     assert_eq!(recording.columns.len(), 5);
 }
 
+/// File of tests/data as a recording in a folder.
+fn shipped(folder: &Path, name: &str) -> Vec<u8> {
+    let bytes = fs::read(Path::new("tests/data").join(name)).unwrap();
+    fs::write(folder.join(name), &bytes).unwrap();
+    bytes
+}
+
+/// Values of both HDF5 files, for sample k.
+fn written(value: impl Fn(f64) -> f64) -> Vec<f64> {
+    (0..200).map(|k| value(f64::from(k))).collect()
+}
+
+#[test]
+fn matlab_7_3_comes_back_to_the_bit() {
+    // By the HDF5 library, laid out as MATLAB lays it out: a column, a matrix with names, a struct of one signal.
+    let folder = tempfile::tempdir().unwrap();
+    shipped(folder.path(), "matlab_7_3.mat");
+    let outcome = import(folder.path(), "matlab_7_3.mat");
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let slow = "`slow` is left out: 7 values";
+    assert!(outcome.stdout.contains(slow), "{}", outcome.stdout);
+    let recording = imported(folder.path());
+    let q = |k: f64| (37.0 * k % 101.0) / 8.0;
+    check(&recording, "time", None, &written(|k| k / 40.0));
+    check(&recording, "q", None, &written(q));
+    check(&recording, "de", Some("deg"), &written(|k| 2.0 * q(k)));
+    check(
+        &recording,
+        "roll",
+        None,
+        &written(|k| (11.0 * k % 53.0) / 4.0 - 3.0),
+    );
+    check(&recording, "yaw", None, &written(|k| k * k / 64.0));
+    check(&recording, "counts", None, &written(|k| k % 100.0 - 50.0));
+    assert_eq!(recording.columns.len(), 6);
+}
+
+#[test]
+fn hdf5_of_other_programs_has_its_units_as_attributes() {
+    // Compressed chunks, shuffled bytes, big-endian integers, a group.
+    let folder = tempfile::tempdir().unwrap();
+    shipped(folder.path(), "recording.h5");
+    let outcome = import(folder.path(), "recording.h5");
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let recording = imported(folder.path());
+    check(&recording, "time", Some("s"), &written(|k| k / 40.0));
+    let q = written(|k| (37.0 * k % 101.0) / 8.0);
+    check(&recording, "adc.q", Some("deg/s"), &q);
+    check(
+        &recording,
+        "adc.counts",
+        None,
+        &written(|k| k % 100.0 - 50.0),
+    );
+    assert_eq!(recording.columns.len(), 3);
+}
+
+#[test]
+fn damaged_hdf5_is_refused_or_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut random = Random::new(23);
+    for name in ["matlab_7_3.mat", "recording.h5"] {
+        let whole = shipped(folder.path(), name);
+        for trial in 0..40 {
+            let mut bytes = whole.clone();
+            if trial % 2 == 0 {
+                bytes.truncate(520 + random.below(whole.len() - 520));
+            } else {
+                // The first bytes make it HDF5 at all.
+                let at = 530 + random.below(4000);
+                bytes[at] ^= 1 << random.below(8);
+            }
+            fs::write(folder.path().join(name), bytes).unwrap();
+            let outcome = import(folder.path(), name);
+            assert!(
+                matches!(outcome.code, Some(0 | 1)),
+                "{name}, {trial}: {outcome:?}"
+            );
+        }
+    }
+}
+
 #[test]
 fn what_cannot_be_read_is_refused_with_the_way_out() {
     let folder = tempfile::tempdir().unwrap();
@@ -234,13 +316,13 @@ fn what_cannot_be_read_is_refused_with_the_way_out() {
     hdf5.extend(b"\x89HDF\r\n\x1a\n");
     let cut = doubles("time", [3, 1], &[1.0, 2.0, 3.0]);
     for (file, bytes, words) in [
-        ("f.mat", hdf5, "'-v7'"),
+        ("f.mat", hdf5, "an HDF5 file that cannot be read"),
         (
             "prose.txt",
             b"Dear reader,\nno numbers here.\n".to_vec(),
             "no table of numbers",
         ),
-        ("old.mat", vec![0; 400], "no MATLAB 5 file"),
+        ("old.mat", vec![0; 400], "'-v7'"),
     ] {
         fs::write(folder.path().join(file), bytes).unwrap();
         let outcome = import(folder.path(), file);

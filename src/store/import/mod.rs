@@ -1,8 +1,8 @@
 //! Import: recordings in other formats, written as Parquet of the archive with the units of the columns,
 //! and a manifest that names the source of each file.
 //!
-//! CSV and tall Parquet pass row by row, in bounded memory. A MATLAB file is in memory whole: its columns
-//! stand one after the other.
+//! CSV and tall Parquet pass row by row, in bounded memory. A MATLAB or HDF5 file is in memory whole: its
+//! columns stand one after the other.
 
 mod contents;
 mod csv_text;
@@ -25,7 +25,9 @@ pub use contents::{Imported, ImportedColumn};
 pub const MANIFEST: &str = "import.json";
 
 /// Extensions of files that may be recordings.
-const EXTENSIONS: [&str; 7] = ["csv", "txt", "tsv", "dat", "asc", "mat", "parquet"];
+const EXTENSIONS: [&str; 9] = [
+    "csv", "txt", "tsv", "dat", "asc", "mat", "h5", "hdf5", "parquet",
+];
 
 /// Sources in a file or a folder, sorted.
 ///
@@ -75,9 +77,9 @@ pub fn import(source: &Path, folder: &Path) -> Result<Imported> {
     }
     let contents = match Format::of(source)? {
         Format::Csv => csv_text::import(source, &file)?,
-        Format::Matlab => matlab::import(source, &file)?,
+        Format::Matlab => matlab::import(source, &file, false)?,
+        Format::Hdf5 => matlab::import(source, &file, true)?,
         Format::Parquet => tall::import(source, &file)?,
-        Format::Hdf5 => return Err(refused(source, HDF5)),
     };
     let digest = Digest::of_file(source)?;
     Ok(Imported {
@@ -102,11 +104,6 @@ pub fn write_manifest(folder: &Path, imported: &[Imported]) -> Result<PathBuf> {
     Ok(path)
 }
 
-/// Way out for files that harvest cannot read.
-const HDF5: &str = "an HDF5 file (MATLAB v7.3), which harvest does not read: in MATLAB, save it with `save('flight.mat', \
-                    '-struct', 's', '-v7')` or write its table with `writetable(t, 'flight.csv')`; in Python, `h5py` and \
-                    `pandas.DataFrame(...).to_parquet('flight.parquet')`";
-
 /// First bytes of HDF5, at the beginning or behind MATLAB's header.
 const HDF5_SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 
@@ -130,7 +127,7 @@ impl Format {
             || head
                 .get(512..)
                 .is_some_and(|rest| rest.starts_with(HDF5_SIGNATURE));
-        Ok(if is_hdf5 || head.starts_with(b"MATLAB 7.3") {
+        Ok(if is_hdf5 {
             Format::Hdf5
         } else if head.starts_with(b"MATLAB 5.0") {
             Format::Matlab
@@ -140,7 +137,7 @@ impl Format {
             .extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("mat"))
         {
-            let what = "no MATLAB 5 file: save it with `save('flight.mat', '-v7')`";
+            let what = "neither a MATLAB 5 file nor one of MATLAB 7.3: save it with `save('flight.mat', '-v7')`";
             return Err(refused(source, what));
         } else {
             Format::Csv

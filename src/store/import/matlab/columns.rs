@@ -5,6 +5,9 @@ use std::collections::BTreeMap;
 
 use super::super::contents::ImportedColumn;
 
+/// Deepest nesting of structs.
+pub const DEEPEST: usize = 16;
+
 /// A variable or field.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {

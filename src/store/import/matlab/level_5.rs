@@ -6,8 +6,7 @@ use std::io::Read;
 
 use flate2::read::ZlibDecoder;
 
-use super::DEEPEST;
-use super::columns::Value;
+use super::columns::{DEEPEST, Value};
 
 /// Bytes of a compressed variable when it is unpacked, at most.
 const LARGEST_VARIABLE: u64 = 4 << 30;

@@ -1,6 +1,7 @@
 //! MATLAB files: `level_5` and `hdf5` read the variables, `columns` makes the columns of a recording.
 
 mod columns;
+mod hdf5;
 mod level_5;
 
 use std::io::Read;
@@ -13,18 +14,21 @@ use columns::Table;
 
 /// Largest file: more than any flight.
 const LARGEST: u64 = 4 << 30;
-/// Deepest nesting of structs.
-const DEEPEST: usize = 16;
 
-/// Imports a MATLAB file.
-pub fn import(source: &Path, file: &Path) -> Result<Contents> {
+/// Imports a MATLAB file of level 5, or an HDF5 file.
+pub fn import(source: &Path, file: &Path, is_hdf5: bool) -> Result<Contents> {
     let opened = std::fs::File::open(source).map_err(Error::io(source, "cannot open it"))?;
     let mut bytes = Vec::new();
     opened
         .take(LARGEST)
         .read_to_end(&mut bytes)
         .map_err(Error::io(source, "cannot read it"))?;
-    let variables = level_5::variables(&bytes).map_err(|what| refused(source, &what))?;
+    let variables = if is_hdf5 {
+        hdf5::variables(bytes)
+    } else {
+        level_5::variables(&bytes)
+    };
+    let variables = variables.map_err(|what| refused(source, &what))?;
     let mut table = Table::default();
     let single = variables.len() == 1;
     for (name, value) in variables {
