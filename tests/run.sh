@@ -2,7 +2,7 @@
 # All tests, then the ten slowest. Needs Rust alone: stable test programs print times once RUSTC_BOOTSTRAP is set, and it is
 # set while they run only, so that nothing is built with it.
 #
-#   tests/run.sh             all tests, documentation included
+#   tests/run.sh             all tests
 #   tests/run.sh nights::    those whose names contain a text
 set -uo pipefail
 cd "$(dirname "$0")/.."
@@ -18,7 +18,6 @@ for program in $programs; do
     RUSTC_BOOTSTRAP=1 "$program" -Z unstable-options --report-time "$@" | tee -a "$log"
     [ "${PIPESTATUS[0]}" = 0 ] || code=101
 done
-cargo test --locked --doc -- "$@" || code=101
 
 printf '\nthe slowest tests:\n'
 sed -n 's/^test \(.*\) \.\.\. .*<\([0-9.]*\)s>$/\2 s  \1/p' "$log" | sort -rn | head -n 10
