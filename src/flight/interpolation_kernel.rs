@@ -67,6 +67,41 @@ impl InterpolationKernel {
         (sum, slope)
     }
 
+    /// Interpolates at sample `k` and the samples after it, as many as `to` has.
+    pub fn interpolate_from(&self, k: usize, values: &[f64], to: &mut [f64]) {
+        let first = k.checked_add_signed(self.first);
+        let inside = first.and_then(|first| values.get(first..first + to.len() + WIDTH - 1));
+        let Some(inside) = inside else {
+            for (i, to) in to.iter_mut().enumerate() {
+                *to = self.interpolate(k + i, values.len(), |k| values[k]).0;
+            }
+            return;
+        };
+        for (to, near) in to.iter_mut().zip(inside.windows(WIDTH)) {
+            let weighted = self.weights.iter().zip(near);
+            *to = weighted.fold(0.0, |sum, (weight, value)| sum + weight * value);
+        }
+    }
+
+    /// Adds values at sample `k` and the samples after it to the samples that they are interpolated
+    /// from: the transpose of [`Self::interpolate_from`].
+    pub fn share_out(&self, k: usize, values: &[f64], to: &mut [f64]) {
+        let first = k.checked_add_signed(self.first);
+        let Some(first) = first.filter(|first| first + values.len() + WIDTH <= to.len() + 1) else {
+            for (i, value) in values.iter().enumerate() {
+                for (sample, weight, _) in self.weights_at(k + i, to.len()) {
+                    to[sample] += weight * value;
+                }
+            }
+            return;
+        };
+        for (i, weight) in self.weights.iter().enumerate() {
+            for (to, value) in to[first + i..].iter_mut().zip(values) {
+                *to += weight * value;
+            }
+        }
+    }
+
     /// Offset of the first sample of the kernel.
     #[must_use]
     pub fn first_offset(&self) -> isize {
@@ -124,6 +159,42 @@ mod tests {
                 numeric,
                 epsilon = 1e-6
             );
+        }
+    }
+
+    #[test]
+    fn many_samples_are_interpolated_as_each_of_them_is() {
+        let values: Vec<f64> = (0..12).map(|k| f64::from(k).sin()).collect();
+        for shift in [-2.3, 0.0, 0.6] {
+            let kernel = InterpolationKernel::at(shift);
+            for (k, count) in [(0, 12), (4, 5)] {
+                let mut many = vec![0.0; count];
+                kernel.interpolate_from(k, &values, &mut many);
+                let each = (0..count).map(|i| kernel.interpolate(k + i, 12, |k| values[k]).0);
+                assert_eq!(many, each.collect::<Vec<_>>());
+            }
+        }
+    }
+
+    #[test]
+    fn sharing_out_is_the_transpose_of_interpolation() {
+        let (values, shares): (Vec<f64>, Vec<f64>) = (0..12)
+            .map(|k| (f64::from(k).sin(), f64::from(k).cos()))
+            .unzip();
+        for shift in [-2.3, 0.0, 0.6] {
+            let kernel = InterpolationKernel::at(shift);
+            for (k, count) in [(0, 12), (4, 5)] {
+                let (mut interpolated, mut shared) = (vec![0.0; count], vec![0.0; 12]);
+                kernel.interpolate_from(k, &values, &mut interpolated);
+                kernel.share_out(k, &shares[..count], &mut shared);
+                let product =
+                    |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+                assert_abs_diff_eq!(
+                    product(&interpolated, &shares),
+                    product(&values, &shared),
+                    epsilon = 1e-12
+                );
+            }
         }
     }
 

@@ -164,19 +164,19 @@ pub fn rate_slopes(x: &State, input: &Inputs, terms: &MeasuredTerms) -> RateSlop
         by_state: SMatrix::zeros(),
         by_input: SMatrix::zeros(),
     };
-    let cross = turning.cross_matrix();
-    let mut by_rates = velocity.cross_matrix() - cross * velocity_by_rates;
     for i in 0..3 {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        // −(ω + Ω) × v along v and along ω, which also moves v; what is zero is left out.
+        out.by_state[(i, j)] = turning[k];
+        out.by_state[(i, k)] = -turning[j];
+        let moved = |along: usize, of: usize| velocity_by_rates[(of, along)];
         let swing = lever(i, terms.arms[i], [omega.x, omega.y, omega.z], [0.0; 3]);
-        for j in 0..3 {
-            by_rates[(i, j)] -= swing.by_rates[j];
-        }
+        out.by_input[(i, i)] =
+            turning[k] * moved(i, j) - turning[j] * moved(i, k) - swing.by_rates[i];
+        out.by_input[(i, j)] = -velocity[k] - turning[j] * moved(j, k) - swing.by_rates[j];
+        out.by_input[(i, k)] = velocity[j] + turning[k] * moved(k, j) - swing.by_rates[k];
         out.by_input[(i, 3 + i)] = 1.0;
     }
-    out.by_state.fixed_view_mut::<3, 3>(0, 0).copy_from(&-cross);
-    out.by_input
-        .fixed_view_mut::<3, 3>(0, 0)
-        .copy_from(&by_rates);
     let by_phi = Vector3::new(0.0, g * ct * cp, -g * ct * sp);
     let by_theta = Vector3::new(-g * ct, -g * st * sp, -g * st * cp);
     out.by_state.fixed_view_mut::<3, 1>(0, 3).copy_from(&by_phi);

@@ -27,6 +27,10 @@ const LEAST_RISE: f64 = 0.01;
 /// Largest move of a parameter, as a share of its bound, at which the fit is settled.
 const SETTLED: f64 = 0.05;
 
+/// Largest move of a parameter, as a share of its bound, after which the sensitivities still serve:
+/// they change with the motion, which a bound hardly moves.
+const LINEAR: f64 = 1.0;
+
 /// Standard deviation of the delays' weighted mean, s: a tenth of the error of the equations'
 /// timing, so that the mean does not move.
 const COMMON_DELAY_S: f64 = 1e-4;
@@ -78,7 +82,7 @@ impl JointState<'_> {
         let zero = DMatrix::zeros(PARAMETERS, PARAMETERS);
         self.windows
             .iter()
-            .fold(zero, |sum, window| sum + &window.information)
+            .fold(zero, |sum, window| sum + window.information())
     }
 
     /// Takes steps until the parameters settle, then estimates R anew. Returns the number of steps.
@@ -90,10 +94,10 @@ impl JointState<'_> {
                 break;
             }
         }
-        let (context, shared) = (&self.context, &self.shared);
+        let context = &self.context;
         self.windows
             .par_iter_mut()
-            .for_each(|window| window.reweigh(context, shared));
+            .for_each(|window| window.reweigh(context));
         Some(steps)
     }
 
@@ -150,11 +154,21 @@ impl JointState<'_> {
                 let largest = self.largest_move(&trial, &inverse);
                 self.windows = moved;
                 self.shared = trial;
+                if largest > LINEAR {
+                    self.linearise();
+                }
                 return Some(largest);
             }
             share *= 0.5;
         }
         Some(0.0)
+    }
+
+    fn linearise(&mut self) {
+        let (context, shared) = (&self.context, &self.shared);
+        self.windows
+            .par_iter_mut()
+            .for_each(|window| window.linearise(context, shared));
     }
 
     /// Largest move of a shared parameter over its bound.
@@ -207,7 +221,7 @@ impl JointState<'_> {
             .sum();
         let common = self.common_delay_weights();
         let mean: f64 = common.iter().zip(shared).map(|(c, v)| c * v).sum();
-        windows.iter().map(WindowFit::cost).sum::<f64>() + of_prior + mean * mean
+        windows.iter().map(|window| window.cost).sum::<f64>() + of_prior + mean * mean
     }
 
     /// Weights of the delays in their mean, over the mean's standard deviation.

@@ -2,10 +2,12 @@
 //! sensitivities.
 //!
 //! An input is corrected before it drives the equations, x(t) = (y(t + delay) − bias)/(1 + scale).
-//! States and readings are integrated sample by sample. Their sensitivities change as slowly as the
-//! aircraft moves, so they obey the linearised equations over steps of a tenth of a second, from node
-//! to node. The inputs' slopes enter a step by their means over its samples: then a delay moves an
-//! integral of an input exactly as it moves the input, however noisy that is.
+//! States are integrated from point to point, a twentieth of a second. Within a step an input is the
+//! parabola through both points that has the input's own mean, so that no part of an integral is lost.
+//! Readings between points are interpolated. Sensitivities change as slowly as the aircraft moves, so
+//! they obey the linearised equations over two steps, from node to node. The inputs' slopes enter by
+//! their means: then a delay moves an integral of an input exactly as it moves the input, however noisy
+//! that is.
 
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 #![expect(
@@ -13,7 +15,7 @@
     reason = "plain indices become straight code for the vectors"
 )]
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, SMatrix};
 use pulp::{Arch, Simd, WithSimd};
 
 use super::equations::{self, Inputs, RateSlopes, STATES, State};
@@ -32,129 +34,143 @@ pub const WIND: usize = 3;
 pub const DRIVING: usize = LOCAL + INPUTS * KINDS;
 /// Parameters that one output depends on: those of the states, then its own bias, scale and delay.
 pub const ROW: usize = DRIVING + KINDS;
-/// Length of a row: the parameters of an output and the residual, in whole vectors.
-pub const WIDE: usize = (ROW + 1).next_multiple_of(8);
-
-/// Step of the sensitivities, s: a tenth of the period of motions at 1 Hz, faster than which an aircraft
-/// hardly turns.
-const SENSITIVITY_STEP_S: f64 = 0.1;
+/// Length of a row in whole vectors.
+pub const WIDE: usize = ROW.next_multiple_of(8);
 
 pub type Local = [f64; LOCAL];
 pub type Row = [f64; WIDE];
 
-/// Readings of a window's output instruments without their own errors, with sensitivities.
-#[derive(Debug)]
-pub struct Reconstructed {
-    /// At every sample.
-    pub readings: Vec<[f64; OUTPUTS]>,
-    /// Sensitivities along the driving parameters, at every node.
+/// Motion of a window that its inputs make, at its points.
+#[derive(Clone, Debug)]
+pub struct Path {
+    inputs: CorrectedInputs,
+    states: Vec<State>,
+    /// Readings of the output instruments without their own errors.
+    pub readings: [Vec<f64>; OUTPUTS],
+}
+
+/// Sensitivities of a window at its nodes.
+#[derive(Clone, Debug)]
+pub struct PathSensitivities {
+    /// Of what the output instruments read, with their own errors, along the parameters of a row.
     pub rows: Vec<[Row; OUTPUTS]>,
-    /// Samples from a node to the next.
-    pub samples_per_node: usize,
+    /// Of the states along the initial state.
+    pub transitions: Vec<SMatrix<f64, STATES, STATES>>,
+    /// Of the states' rates along the inputs.
+    pub by_input: Vec<SMatrix<f64, STATES, INPUTS>>,
 }
 
-/// One input without its error at one instant, in rad/s or ft/s², with its slopes along bias, scale
-/// and delay.
-#[derive(Clone, Copy, Debug, Default)]
-struct CorrectedInput {
-    value: f64,
-    by_error: [f64; KINDS],
+/// Inputs without the errors of their instruments, in rad/s and ft/s².
+#[derive(Clone, Debug)]
+struct CorrectedInputs {
+    /// At points and at the middles between them.
+    values: Vec<Inputs>,
+    /// Slopes in time at points, per s.
+    slopes: Vec<Inputs>,
+    /// Change with the bias of the instrument.
+    by_bias: Inputs,
+    /// Scale factors of the instruments, 1 + scale.
+    gains: Inputs,
 }
 
-/// Inputs at one instant.
-type Point = [CorrectedInput; INPUTS];
-
-/// Reconstructs a window. `None` where the integration diverges.
+/// Reconstructs the motion of a window. `None` where the integration diverges.
 pub fn reconstruct(
     window: &Window,
     aircraft: &Aircraft,
     local: &Local,
     shared: &Parameters,
-) -> Option<Reconstructed> {
-    Arch::new().dispatch(Reconstruction {
+) -> Option<Path> {
+    let inputs = CorrectedInputs::of(window, shared);
+    let (states, readings) = Arch::new().dispatch(Integration {
         window,
         aircraft,
         local,
-        points: &corrected_inputs(window, shared),
-        half_step: half_step(window.step_s),
+        inputs: &inputs,
+    })?;
+    Some(Path {
+        inputs,
+        states,
+        readings,
     })
 }
 
-/// Samples from a node to the middle of its step.
-fn half_step(step_s: f64) -> usize {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a small positive number"
-    )]
-    let half = (0.5 * SENSITIVITY_STEP_S / step_s).round().max(1.0) as usize;
-    half
+/// Computes the sensitivities of a reconstructed window.
+pub fn sensitivities(
+    window: &Window,
+    aircraft: &Aircraft,
+    shared: &Parameters,
+    path: &Path,
+) -> PathSensitivities {
+    Arch::new().dispatch(Linearisation {
+        window,
+        aircraft,
+        shared,
+        path,
+    })
 }
 
 /// Integration of a window, compiled for the processor at hand.
-struct Reconstruction<'a> {
+struct Integration<'a> {
     window: &'a Window,
     aircraft: &'a Aircraft,
     local: &'a Local,
-    /// Inputs at samples and at the halves between them.
-    points: &'a [Point],
-    half_step: usize,
+    inputs: &'a CorrectedInputs,
 }
-
-/// Sensitivities of the states, a row for each state.
-type Sensitivities = [Row; STATES];
 
 /// Magnitude of a state (ft, ft/s, rad) from which the integration has diverged.
 const DIVERGED: f64 = 1e7;
 
-impl WithSimd for Reconstruction<'_> {
-    type Output = Option<Reconstructed>;
+impl WithSimd for Integration<'_> {
+    type Output = Option<(Vec<State>, [Vec<f64>; OUTPUTS])>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Option<Reconstructed> {
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
         let states = self.states()?;
-        let mut readings = Vec::with_capacity(states.len());
-        // A loop: an iterator's closure would not be compiled for the processor at hand.
-        for (k, x) in states.iter().enumerate() {
-            readings.push(self.readings(k, x));
+        let mut readings = [const { Vec::new() }; OUTPUTS];
+        for of_output in &mut readings {
+            of_output.reserve_exact(states.len());
         }
-        Some(Reconstructed {
-            readings,
-            rows: self.rows(simd, &states),
-            samples_per_node: 2 * self.half_step,
-        })
+        // A loop: an iterator's closure would not be compiled for the processor at hand.
+        for (point, x) in states.iter().enumerate() {
+            let (input, terms) = (&self.inputs.values[2 * point], &self.window.terms[point]);
+            let now = equations::readings(self.aircraft, x, input, terms);
+            for o in 0..OUTPUTS {
+                readings[o].push(now[o]);
+            }
+        }
+        Some((states, readings))
     }
 }
 
-impl Reconstruction<'_> {
-    /// States at every sample; `None` where they diverge.
+impl Integration<'_> {
+    /// States at every point; `None` where they diverge.
     #[inline(always)]
     fn states(&self) -> Option<Vec<State>> {
-        let mut states = Vec::with_capacity(self.window.samples);
+        let points = self.window.points();
+        let mut states = Vec::with_capacity(points);
         let mut x = State::from_column_slice(&self.local[..STATES]);
-        for k in 0..self.window.samples {
+        for point in 0..points {
             if !x.iter().all(|x| x.is_finite() && x.abs() < DIVERGED) {
                 return None;
             }
             states.push(x);
-            if k + 1 < self.window.samples {
-                x = self.next_state(k, &x);
+            if point + 1 < points {
+                x = self.next_state(point, &x);
             }
         }
         Some(states)
     }
 
-    /// State one sample later, by a Runge-Kutta step.
+    /// State one point later, by a Runge-Kutta step.
     #[inline(always)]
-    fn next_state(&self, k: usize, x: &State) -> State {
-        let h = self.window.step_s;
+    fn next_state(&self, point: usize, x: &State) -> State {
+        let h = self.window.point_step_s();
         let (reaches_s, weights_s) = (reaches_s(h), weights_s(h));
         let (mut at, mut end) = (*x, *x);
         for stage in 0..STAGES {
-            let sample = if POINT[stage] == 2 { k + 1 } else { k };
-            let input = self.points[2 * k + POINT[stage]].map(|input| input.value);
-            let terms = &self.window.terms[sample];
-            let mut rates = equations::rates(&at, &input, terms);
+            let terms = &self.window.terms[point + POINT[stage] / 2];
+            let input = &self.inputs.values[2 * point + POINT[stage]];
+            let mut rates = equations::rates(&at, input, terms);
             for i in 0..WIND {
                 for j in 0..WIND {
                     rates[i] -= terms.to_body[(i, j)] * self.local[STATES + j];
@@ -165,63 +181,74 @@ impl Reconstruction<'_> {
         }
         end
     }
+}
 
-    /// Readings at a sample, without instrument errors.
-    #[inline(always)]
-    fn readings(&self, k: usize, x: &State) -> [f64; OUTPUTS] {
-        equations::readings(self.aircraft, x, &self.inputs(k), &self.window.terms[k])
-    }
+/// Linearised equations of a window, compiled for the processor at hand.
+struct Linearisation<'a> {
+    window: &'a Window,
+    aircraft: &'a Aircraft,
+    shared: &'a Parameters,
+    path: &'a Path,
+}
+
+/// Sensitivities of the states, a row for each state.
+type Sensitivities = [Row; STATES];
+
+impl WithSimd for Linearisation<'_> {
+    type Output = PathSensitivities;
 
     #[inline(always)]
-    fn inputs(&self, k: usize) -> equations::Inputs {
-        self.points[2 * k].map(|input| input.value)
-    }
-
-    /// Sensitivities of the readings at every node.
-    #[inline(always)]
-    fn rows<S: Simd>(&self, simd: S, states: &[State]) -> Vec<[Row; OUTPUTS]> {
-        let step = 2 * self.half_step;
+    fn with_simd<S: Simd>(self, simd: S) -> PathSensitivities {
+        let nodes = self.window.nodes();
         let mut s = [[0.0; WIDE]; STATES];
         for i in 0..STATES {
             s[i][i] = 1.0;
         }
-        let mut rows = Vec::with_capacity(states.len() / step + 1);
-        let mut start = self.linearised(0, states);
-        for k in (0..states.len()).step_by(step) {
-            rows.push(self.reading_rows(simd, k, &states[k], &s));
-            if k + step < states.len() {
-                let middle = self.linearised(k + self.half_step, states);
-                let end = self.linearised(k + step, states);
-                s = self.advanced(simd, k, &s, [&start, &middle, &end]);
+        let mut out = PathSensitivities {
+            rows: Vec::with_capacity(nodes),
+            transitions: Vec::with_capacity(nodes),
+            by_input: Vec::with_capacity(nodes),
+        };
+        let mut start = self.linearised(0);
+        for node in 0..nodes {
+            out.rows.push(self.reading_rows(simd, node, &s));
+            out.transitions.push(SMatrix::from_fn(|i, j| s[i][j]));
+            out.by_input.push(start.slopes.by_input);
+            if node + 1 < nodes {
+                let middle = self.linearised(2 * node + 1);
+                let end = self.linearised(2 * node + 2);
+                s = self.advanced(simd, node, &s, [&start, &middle, &end]);
                 start = end;
             }
         }
-        rows
+        out
     }
+}
 
-    /// Slopes of the equations at a sample.
+impl Linearisation<'_> {
+    /// Slopes of the equations at a point.
     #[inline(always)]
-    fn linearised(&self, k: usize, states: &[State]) -> Linearised {
-        let terms = &self.window.terms[k];
+    fn linearised(&self, point: usize) -> Linearised {
+        let Path { inputs, states, .. } = self.path;
+        let terms = &self.window.terms[point];
         Linearised {
-            slopes: equations::rate_slopes(&states[k], &self.inputs(k), terms),
+            slopes: equations::rate_slopes(&states[point], &inputs.values[2 * point], terms),
             by_wind: -terms.to_body,
         }
     }
 
-    /// Sensitivities one node later, by a Runge-Kutta step of the linearised equations from sample `k`.
+    /// Sensitivities one node later, by a Runge-Kutta step of the linearised equations.
     #[inline(always)]
     fn advanced<S: Simd>(
         &self,
         simd: S,
-        k: usize,
+        node: usize,
         s: &Sensitivities,
         linearised: [&Linearised; 3],
     ) -> Sensitivities {
-        let step = 2 * self.half_step;
-        let h = step as f64 * self.window.step_s;
+        let h = 2.0 * self.window.point_step_s();
         let (reaches_s, weights_s) = (reaches_s(h), weights_s(h));
-        let by_error = mean_slopes(&self.points[2 * k..=2 * (k + step)]);
+        let by_error = self.path.inputs.mean_by_error(2 * node, h);
         let forcing = linearised.map(|at| at.forcing(&by_error));
         let (mut at, mut end) = (*s, *s);
         for stage in 0..STAGES {
@@ -250,36 +277,48 @@ impl Reconstruction<'_> {
         end
     }
 
-    /// Sensitivities of the readings at a sample.
+    /// Sensitivities of what the instruments read at a node.
     #[inline(always)]
-    fn reading_rows<S: Simd>(
-        &self,
-        simd: S,
-        k: usize,
-        x: &State,
-        s: &Sensitivities,
-    ) -> [Row; OUTPUTS] {
-        let terms = &self.window.terms[k];
-        let at = equations::reading_slopes(self.aircraft, x, &self.inputs(k), terms);
-        let by_error = self.points[2 * k].map(|input| input.by_error);
+    fn reading_rows<S: Simd>(&self, simd: S, node: usize, s: &Sensitivities) -> [Row; OUTPUTS] {
+        let Path {
+            inputs,
+            states,
+            readings,
+        } = self.path;
+        let point = 2 * node;
+        let (x, input) = (&states[point], &inputs.values[2 * point]);
+        let at = equations::reading_slopes(self.aircraft, x, input, &self.window.terms[point]);
+        let by_error = inputs.by_error(point);
         let mut rows = [[0.0; WIDE]; OUTPUTS];
         for o in 0..OUTPUTS {
+            let gain = 1.0 + self.shared[place(INPUTS + o, Kind::Scale)];
             for &rate in equations::READINGS_BY_RATES[o] {
                 let errors = &mut rows[o][error_columns(rate)];
                 for (slope, by_error) in errors.iter_mut().zip(by_error[rate]) {
-                    *slope = at.by_rates[(o, rate)] * by_error;
+                    *slope = gain * at.by_rates[(o, rate)] * by_error;
                 }
             }
             for lane in (0..WIDE).step_by(SIDE_BY_SIDE * S::F64_LANES) {
                 let mut slope = Sum::<S>::of(&rows[o], lane);
                 for &i in equations::READINGS_BY_STATE[o] {
-                    slope.add(simd, at.by_state[(o, i)], &s[i]);
+                    slope.add(simd, gain * at.by_state[(o, i)], &s[i]);
                 }
                 slope.each(|lane, slope| store::<S>(&mut rows[o], lane, slope));
             }
+            let rate = slope_at(&readings[o], point) / self.window.point_step_s();
+            rows[o][DRIVING..ROW].copy_from_slice(&[1.0, readings[o][point], -gain * rate]);
         }
         rows
     }
+}
+
+/// Slope of values at one of them, per step: the fourth-order difference. The end values stand for
+/// those beyond.
+#[inline(always)]
+fn slope_at(values: &[f64], k: usize) -> f64 {
+    let last = values.len() - 1;
+    let difference = |reach: usize| values[(k + reach).min(last)] - values[k.saturating_sub(reach)];
+    (8.0 * difference(1) - difference(2)) / 12.0
 }
 
 /// Slopes of the equations at one instant along states, inputs and the wind's change.
@@ -291,7 +330,7 @@ struct Linearised {
 impl Linearised {
     /// Slopes of the states' rates along the wind's change and the inputs' errors, as rows.
     #[inline(always)]
-    fn forcing(&self, by_error: &[[f64; KINDS]; INPUTS]) -> Sensitivities {
+    fn forcing(&self, by_error: &ByError) -> Sensitivities {
         let mut rows = [[0.0; WIDE]; STATES];
         for i in 0..STATES {
             for &input in equations::RATES_BY_INPUT[i] {
@@ -314,27 +353,6 @@ impl Linearised {
 #[inline(always)]
 fn error_columns(input: usize) -> std::ops::Range<usize> {
     LOCAL + input * KINDS..LOCAL + (input + 1) * KINDS
-}
-
-/// Means of the inputs' slopes over points that begin and end at samples, by Simpson's rule from
-/// sample to sample.
-#[inline(always)]
-fn mean_slopes(points: &[Point]) -> [[f64; KINDS]; INPUTS] {
-    let per_weight = 1.0 / (3 * (points.len() - 1)) as f64;
-    let mut means = [[0.0; KINDS]; INPUTS];
-    for (n, point) in points.iter().enumerate() {
-        let weight = match n {
-            _ if n % 2 == 1 => 4.0,
-            _ if n == 0 || n + 1 == points.len() => 1.0,
-            _ => 2.0,
-        };
-        for input in 0..INPUTS {
-            for kind in 0..KINDS {
-                means[input][kind] += per_weight * weight * point[input].by_error[kind];
-            }
-        }
-    }
-    means
 }
 
 /// Vectors of a row that are summed side by side: independent sums hide the latency of each.
@@ -377,36 +395,79 @@ impl<S: Simd> Sum<S> {
     }
 }
 
-/// Inputs without their errors at samples and at the halves between them, in rad/s and ft/s².
-pub fn input_values(window: &Window, shared: &Parameters) -> Vec<Inputs> {
-    let points = corrected_inputs(window, shared);
-    points.iter().map(|point| point.map(|p| p.value)).collect()
-}
+/// Slopes of the inputs along bias, scale and delay.
+type ByError = [[f64; KINDS]; INPUTS];
 
-/// Corrected inputs at samples and at the halves between them.
-fn corrected_inputs(window: &Window, shared: &Parameters) -> Vec<Point> {
-    let mut points = vec![[CorrectedInput::default(); INPUTS]; 2 * window.samples - 1];
-    for i in 0..INPUTS {
-        let parameter = |kind| shared[place(i, kind)];
-        let (bias, gain, delay) = (
-            parameter(Kind::Bias),
-            1.0 + parameter(Kind::Scale),
-            parameter(Kind::Delay),
-        );
-        let values = &window.inputs[i];
-        let unit = input_factor(i) / gain;
-        let halves = [0.0, 0.5].map(|half| InterpolationKernel::at(delay / window.step_s + half));
-        for (j, point) in points.iter_mut().enumerate() {
-            let (sum, by_shift) =
-                halves[j % 2].interpolate(window.margin + j / 2, values.len(), |k| values[k]);
-            let value = unit * (sum - bias);
-            point[i] = CorrectedInput {
-                value,
-                by_error: [-unit, -value / gain, unit * by_shift / window.step_s],
-            };
+impl CorrectedInputs {
+    fn of(window: &Window, shared: &Parameters) -> CorrectedInputs {
+        let (points, spacing) = (window.points(), window.samples_per_point);
+        let mut values = vec![[0.0; INPUTS]; 2 * points - 1];
+        let mut slopes = vec![[0.0; INPUTS]; points];
+        let gains = std::array::from_fn(|i| 1.0 + shared[place(i, Kind::Scale)]);
+        let by_bias = std::array::from_fn(|i| -input_factor(i) / gains[i]);
+        // One sample more on either side than the window has.
+        let mut corrected = vec![0.0; window.samples + 2];
+        for i in 0..INPUTS {
+            let [bias, delay] = [Kind::Bias, Kind::Delay].map(|kind| shared[place(i, kind)]);
+            let kernel = InterpolationKernel::at(delay / window.step_s);
+            kernel.interpolate_from(window.margin - 1, &window.inputs[i], &mut corrected);
+            for value in &mut corrected {
+                *value = -by_bias[i] * (*value - bias);
+            }
+            for point in 0..points {
+                let around = &corrected[point * spacing..];
+                values[2 * point][i] = around[1];
+                slopes[point][i] = (around[2] - around[0]) / (2.0 * window.step_s);
+            }
+            for point in 1..points {
+                let mean = mean_over_step(&corrected[(point - 1) * spacing..][..spacing + 3]);
+                let ends = values[2 * point - 2][i] + values[2 * point][i];
+                values[2 * point - 1][i] = 1.5 * mean - 0.25 * ends;
+            }
+        }
+        CorrectedInputs {
+            values,
+            slopes,
+            by_bias,
+            gains,
         }
     }
-    points
+
+    /// Slopes at a point.
+    #[inline(always)]
+    fn by_error(&self, point: usize) -> ByError {
+        let mut by_error = [[0.0; KINDS]; INPUTS];
+        for i in 0..INPUTS {
+            let by_scale = -self.values[2 * point][i] / self.gains[i];
+            by_error[i] = [self.by_bias[i], by_scale, self.slopes[point][i]];
+        }
+        by_error
+    }
+
+    /// Means of the slopes over the two steps from a point, `length_s` long together.
+    #[inline(always)]
+    fn mean_by_error(&self, point: usize, length_s: f64) -> ByError {
+        let values = &self.values[2 * point..2 * point + 5];
+        let mut by_error = [[0.0; KINDS]; INPUTS];
+        for i in 0..INPUTS {
+            let middles = 4.0 * (values[1][i] + values[3][i]);
+            let sum = values[0][i] + middles + 2.0 * values[2][i] + values[4][i];
+            let by_scale = -sum / 12.0 / self.gains[i];
+            let rise = values[4][i] - values[0][i];
+            by_error[i] = [self.by_bias[i], by_scale, rise / length_s];
+        }
+        by_error
+    }
+}
+
+/// Mean of a signal from the second of some samples to the last but one: the trapezoids, corrected by
+/// the slopes at both ends (Gregory), exact for cubics.
+fn mean_over_step(samples: &[f64]) -> f64 {
+    let last = samples.len() - 2;
+    let sum: f64 = samples[1..=last].iter().sum();
+    let rise = |k: usize| samples[k + 1] - samples[k - 1];
+    let trapezoids = sum - 0.5 * (samples[1] + samples[last]);
+    (trapezoids - (rise(last) - rise(1)) / 24.0) / (last - 1) as f64
 }
 
 /// Place among the shared parameters of a column of an output's row; the columns before `LOCAL` are
@@ -416,5 +477,23 @@ pub fn shared_place(column: usize, o: usize) -> usize {
         column - LOCAL
     } else {
         (INPUTS + o) * KINDS + column - DRIVING
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_abs_diff_eq;
+
+    use super::*;
+
+    #[test]
+    fn the_mean_over_a_step_is_exact_for_cubics() {
+        let integral = |t: f64| 2.0 * t - 0.5 * t.powi(2) + 0.3 * t.powi(3) - 0.1 * t.powi(4);
+        let slope = |t: f64| 2.0 - t + 0.9 * t.powi(2) - 0.4 * t.powi(3);
+        for steps in [1_u32, 2, 4, 5] {
+            let samples: Vec<f64> = (0..steps + 3).map(|k| slope(f64::from(k) - 1.0)).collect();
+            let exact = integral(f64::from(steps)) / f64::from(steps);
+            assert_abs_diff_eq!(mean_over_step(&samples), exact, epsilon = 1e-12);
+        }
     }
 }

@@ -10,10 +10,10 @@ use super::equations::{
 use super::parameters::{
     INPUTS, INSTRUMENTS, Kind, OUTPUTS, PARAMETERS, SIGNALS, is_observable, place,
 };
-use super::reconstruction::{DRIVING, LOCAL, Local, ROW, reconstruct, shared_place};
+use super::reconstruction::{DRIVING, LOCAL, Local, ROW, reconstruct, sensitivities, shared_place};
 use super::window::{self, Window, choose_windows, input_factor};
 use super::window_fit::{FitContext, WindowFit};
-use super::window_sums::output_sums;
+use super::window_sums::{Comparison, LinearisedWindow};
 use super::*;
 use crate::aircraft::{Position, Sensors, Vane, VaneModel};
 use crate::flight::record::Series;
@@ -384,6 +384,104 @@ fn changed(
     (local, shared)
 }
 
+/// Largest error of a reading that the steps of the integration may cause, in standard deviations of
+/// the instrument's noise.
+const STEP_ERROR: f64 = 0.02;
+
+#[test]
+fn the_path_is_that_of_steps_twenty_times_as_short() {
+    let record = flight(24.0);
+    let window = windows(&record).remove(0);
+    let mut local = [0.0; LOCAL];
+    local[..STATES].copy_from_slice(window.start.as_slice());
+    let shared = [0.0; PARAMETERS];
+    let path = reconstruct(&window, &aircraft(), &local, &shared).unwrap();
+    let samples = window.margin..window.samples - window.margin;
+    let comparison = Comparison::of(&window, &path, &shared, &samples);
+    for o in 0..OUTPUTS {
+        let allowed = STEP_ERROR * NOISE[INPUTS + o];
+        let measured = window.outputs[o].iter().step_by(window.samples_per_point);
+        for (point, (reading, exact)) in path.readings[o].iter().zip(measured).enumerate() {
+            let error = (reading - exact).abs();
+            assert!(
+                error < allowed,
+                "output {o}, point {point}: {error} of {allowed}"
+            );
+        }
+        for k in samples.clone() {
+            let error = comparison.residuals[o][k].abs();
+            assert!(
+                error < 2.0 * allowed,
+                "output {o}, sample {k}: {error} of {allowed}"
+            );
+        }
+    }
+}
+
+/// Inertial acceleration of [`nodding_window`], ft/s².
+const PULL: f64 = 40.0;
+
+/// Pitch angle of [`nodding_window`] at a time, rad: 10° at 1 Hz.
+fn nod(t: f64) -> f64 {
+    0.175 * (2.0 * std::f64::consts::PI * t).sin()
+}
+
+/// Window without gravity in which a body nods while the same acceleration pulls in one direction.
+fn nodding_window(samples: usize) -> Window {
+    let margin = 15;
+    let at = |f: &dyn Fn(f64) -> f64, k: usize| f((k as f64 - margin as f64) * STEP_S);
+    let rate = |t: f64| 0.175 * 2.0 * std::f64::consts::PI * (2.0 * std::f64::consts::PI * t).cos();
+    let column = |input: usize, f: &dyn Fn(f64) -> f64| {
+        let values = (0..samples + 2 * margin).map(|k| at(f, k) / input_factor(input));
+        values.collect::<Vec<f64>>()
+    };
+    let terms = MeasuredTerms {
+        gravity: 0.0,
+        earth: Vector3::zeros(),
+        horizon: Vector3::zeros(),
+        arms: [[0.0; 3]; 3],
+        ..measured_terms()
+    };
+    Window {
+        step_s: STEP_S,
+        samples,
+        samples_per_point: 2,
+        margin,
+        terms: vec![terms; samples.div_ceil(2)],
+        inputs: [
+            column(0, &|_| 0.0),
+            column(1, &rate),
+            column(2, &|_| 0.0),
+            column(3, &|t| PULL * nod(t).cos()),
+            column(4, &|_| 0.0),
+            column(5, &|t| PULL * nod(t).sin()),
+        ],
+        is_recorded: [true; INPUTS],
+        input_variances: [0.0; INPUTS],
+        outputs: std::array::from_fn(|_| vec![f64::NAN; samples]),
+        start: State::from([300.0, 0.0, 0.0, 0.0, 0.0, 0.0, 10_000.0]),
+    }
+}
+
+#[test]
+fn nodding_at_one_hertz_neither_turns_nor_accelerates() {
+    // In the plane of symmetry u + i w = exp(i θ) (u0 + a t) for a specific force a exp(i θ): the body
+    // nods about a velocity that grows at a steady rate.
+    let window = nodding_window(800);
+    let mut local = [0.0; LOCAL];
+    local[..STATES].copy_from_slice(window.start.as_slice());
+    let path = reconstruct(&window, &aircraft(), &local, &[0.0; PARAMETERS]).unwrap();
+    for point in 0..window.points() {
+        let t = point as f64 * window.point_step_s();
+        assert_relative_eq!(
+            path.readings[2][point],
+            300.0 + PULL * t,
+            max_relative = 1e-4
+        );
+        assert_abs_diff_eq!(path.readings[3][point], DEG * nod(t), epsilon = 0.002);
+    }
+}
+
 /// Largest difference of a sensitivity from a finite difference, as a share of its largest size in the
 /// window, and at least of the instrument's noise: the linearised equations are integrated in steps of
 /// four samples.
@@ -393,19 +491,25 @@ const SENSITIVITY_TOLERANCE: f64 = 0.01;
 fn sensitivities_of_the_readings_are_those_of_finite_differences() {
     let (window, local, shared) = disturbed_window();
     let aircraft = aircraft();
-    let at = reconstruct(&window, &aircraft, &local, &shared).unwrap();
-    assert_eq!(at.samples_per_node, 4);
+    assert_eq!(window.samples_per_node(), 4);
+    let readings = |local: &Local, shared: &[f64; PARAMETERS]| {
+        reconstruct(&window, &aircraft, local, shared)
+            .unwrap()
+            .readings
+    };
+    let path = reconstruct(&window, &aircraft, &local, &shared).unwrap();
+    let at = sensitivities(&window, &aircraft, &shared, &path);
     for column in 0..DRIVING {
         let h = 1e-6 * local.get(column).map_or(1.0, |l| l.abs().max(1.0));
         let moved = |change| {
             let (local, shared) = changed((&local, &shared), (column, 0), change);
-            reconstruct(&window, &aircraft, &local, &shared).unwrap()
+            readings(&local, &shared)
         };
         let (up, down) = (moved(h), moved(-h));
         for o in 0..OUTPUTS {
+            let gain = 1.0 + shared[place(INPUTS + o, Kind::Scale)];
             let both = at.rows.iter().enumerate().map(|(node, rows)| {
-                let k = node * at.samples_per_node;
-                let numeric = (up.readings[k][o] - down.readings[k][o]) / (2.0 * h);
+                let numeric = gain * (up[o][2 * node] - down[o][2 * node]) / (2.0 * h);
                 (rows[o][column], numeric)
             });
             let largest = both
@@ -427,23 +531,26 @@ fn the_gradient_of_each_output_is_that_of_finite_differences_of_its_squares() {
     let (window, local, shared) = disturbed_window();
     let aircraft = aircraft();
     let samples = window.margin..window.samples - window.margin;
-    let sums = |local: &Local, shared: &[f64; PARAMETERS]| {
-        let reconstructed = reconstruct(&window, &aircraft, local, shared).unwrap();
-        output_sums(&window, &reconstructed, shared, &samples).0
+    let compared = |local: &Local, shared: &[f64; PARAMETERS]| {
+        let path = reconstruct(&window, &aircraft, local, shared).unwrap();
+        Comparison::of(&window, &path, shared, &samples)
     };
-    let at = sums(&local, &shared);
+    let at = compared(&local, &shared);
+    let path = reconstruct(&window, &aircraft, &local, &shared).unwrap();
+    let slopes = sensitivities(&window, &aircraft, &shared, &path);
+    let gradients = at.gradients(&slopes);
+    let linearised = LinearisedWindow::of(slopes, &at);
     for o in 0..OUTPUTS {
-        for column in 0..ROW {
+        for (column, gradient) in gradients[o].iter().enumerate().take(ROW) {
             let h = 1e-5 * local.get(column).map_or(1.0, |l| l.abs().max(1.0));
             let squares = |change| {
                 let (local, shared) = changed((&local, &shared), (column, o), change);
-                sums(&local, &shared)[o].squared_residuals
+                compared(&local, &shared).squares[o]
             };
             let numeric = -(squares(h) - squares(-h)) / (4.0 * h);
-            let gradient = at[o].gradient(column);
             let least = samples.len() as f64 * NOISE[INPUTS + o].powi(2);
-            let information = at[o].information(column, column).max(least);
-            let size = (information * at[o].squared_residuals).sqrt();
+            let information = linearised.product(o, column, column).max(least);
+            let size = (information * at.squares[o]).sqrt();
             assert!(
                 (gradient - numeric).abs() <= SENSITIVITY_TOLERANCE * size,
                 "output {o}, column {column}: {gradient} not {numeric} of {size}"
@@ -891,7 +998,7 @@ fn the_score_scatters_with_the_noise_of_the_inputs() {
     let mut noisy = exact.clone();
     noisy.input_variances = std::array::from_fn(|i| NOISE[i] * NOISE[i]);
     let fit = WindowFit::begin(&noisy, &context, &shared).unwrap();
-    let covariance = fit.input_noise_covariance(&context, &shared).unwrap();
+    let covariance = fit.input_noise_covariance().unwrap();
     for i in 0..INPUTS {
         for kind in [Kind::Bias, Kind::Scale] {
             let j = place(i, kind);

@@ -33,13 +33,20 @@ const SLOWEST_FT_S: f64 = 50.0;
 /// Change of an angle in one sample beyond which it has wrapped around, deg.
 const TURN_DEG: f64 = 90.0;
 
+/// Step of the integration from point to point, s: a twentieth of the period of motions at 1 Hz, faster
+/// than which an aircraft hardly turns.
+const POINT_STEP_S: f64 = 0.05;
+
 /// Data of a window: samples of inputs with a margin on both sides, outputs, and measured terms.
 #[derive(Clone, Debug)]
 pub struct Window {
     pub step_s: f64,
     pub samples: usize,
+    /// Samples from a point of the integration to the next.
+    pub samples_per_point: usize,
     /// Additional samples of the inputs before the first and after the last.
     pub margin: usize,
+    /// At every point.
     pub terms: Vec<MeasuredTerms>,
     /// Values of the inputs in the signals' units.
     pub inputs: [Vec<f64>; INPUTS],
@@ -197,6 +204,7 @@ impl Window {
     ) -> Window {
         let decimation = decimation(record.step_s);
         let step_s = decimation as f64 * record.step_s;
+        let samples_per_point = samples(POINT_STEP_S, step_s).max(1);
         let (margin, samples) = (margin(settings, step_s), range.len() / decimation);
         let first = range.start.saturating_sub(margin * decimation);
         let wide = first..first + (samples + 2 * margin) * decimation;
@@ -218,16 +226,14 @@ impl Window {
         };
         let centres: Vec<usize> = range
             .clone()
-            .step_by(decimation)
+            .step_by(decimation * samples_per_point)
             .map(|k| k + decimation / 2)
             .collect();
-        let terms: Vec<MeasuredTerms> = centres
-            .iter()
-            .map(|k| measured_terms(record, *k, aircraft))
-            .collect();
+        let terms = measured_terms(record, &centres, aircraft);
         Window {
             step_s,
             samples,
+            samples_per_point,
             margin,
             start: measured_state(
                 record,
@@ -243,6 +249,24 @@ impl Window {
             }),
             outputs: std::array::from_fn(output),
         }
+    }
+
+    /// Number of points of the integration. The first sample is one.
+    pub fn points(&self) -> usize {
+        self.samples.saturating_sub(1) / self.samples_per_point + 1
+    }
+
+    pub fn point_step_s(&self) -> f64 {
+        self.samples_per_point as f64 * self.step_s
+    }
+
+    /// Number of nodes of the sensitivities: every second point.
+    pub fn nodes(&self) -> usize {
+        self.points().div_ceil(2)
+    }
+
+    pub fn samples_per_node(&self) -> usize {
+        2 * self.samples_per_point
     }
 
     /// ω × v as measured at a sample, ft/s².
@@ -321,40 +345,51 @@ fn white_level(record: &Record, name: &str, range: &Range<usize>) -> f64 {
     white_variance(&measured) * spacing
 }
 
-fn measured_terms(record: &Record, k: usize, aircraft: &Aircraft) -> MeasuredTerms {
-    let at = |name: &str| {
-        record
-            .values(name)
-            .and_then(|v| v.get(k))
-            .copied()
-            .unwrap_or(0.0)
+/// Terms of the equations at some samples.
+fn measured_terms(record: &Record, samples: &[usize], aircraft: &Aircraft) -> Vec<MeasuredTerms> {
+    let columns = [
+        s::X_CG,
+        s::Y_CG,
+        s::Z_CG,
+        s::ALPHA_VANE,
+        s::BETA_VANE,
+        s::VELOCITY,
+        s::ALTITUDE,
+        s::PHI,
+        s::THETA,
+        s::PSI,
+    ]
+    .map(|name| record.values(name).unwrap_or_default());
+    let (sensors, heading) = (&aircraft.sensors, record.values(s::PSI).is_some());
+    let terms = |k: &usize| {
+        let now = columns.map(|values| values.get(*k).copied().unwrap_or(0.0));
+        let [
+            x_ft,
+            y_ft,
+            z_ft,
+            alpha,
+            beta,
+            speed,
+            altitude,
+            phi,
+            theta,
+            psi,
+        ] = now;
+        let (cg, alpha, beta) = (Position { x_ft, y_ft, z_ft }, alpha / DEG, beta / DEG);
+        let along = Vector3::new(
+            alpha.cos() * beta.cos(),
+            beta.sin(),
+            alpha.sin() * beta.cos(),
+        );
+        let attitude = [phi, theta, psi].map(|angle| angle / DEG);
+        MeasuredTerms {
+            gravity: gravity_ft_s2(aircraft.latitude_deg, altitude),
+            arms: [sensors.ax.arm(cg), sensors.ay.arm(cg), sensors.an.arm(cg)],
+            cg,
+            ..rotation_terms(aircraft, attitude, along * speed, heading)
+        }
     };
-    let cg = Position {
-        x_ft: at(s::X_CG),
-        y_ft: at(s::Y_CG),
-        z_ft: at(s::Z_CG),
-    };
-    let sensors = &aircraft.sensors;
-    let (alpha, beta, speed) = (
-        at(s::ALPHA_VANE) / DEG,
-        at(s::BETA_VANE) / DEG,
-        at(s::VELOCITY),
-    );
-    MeasuredTerms {
-        gravity: gravity_ft_s2(aircraft.latitude_deg, at(s::ALTITUDE)),
-        arms: [sensors.ax.arm(cg), sensors.ay.arm(cg), sensors.an.arm(cg)],
-        cg,
-        ..rotation_terms(
-            aircraft,
-            [s::PHI, s::THETA, s::PSI].map(|name| at(name) / DEG),
-            Vector3::new(
-                alpha.cos() * beta.cos(),
-                beta.sin(),
-                alpha.sin() * beta.cos(),
-            ) * speed,
-            record.values(s::PSI).is_some(),
-        )
-    }
+    samples.iter().map(terms).collect()
 }
 
 /// Rotation of earth and horizon at an attitude (rad) and a velocity in body axes (ft/s). Without a

@@ -2,16 +2,17 @@
 //! shared parameters.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
 use super::equations::STATES;
-use super::input_noise::{FittedWindow, score_covariance, with_input_noise};
+use super::input_noise::{score_covariance, with_input_noise};
 use super::parameters::{INPUTS, Kind, OUTPUTS, PARAMETERS, Parameters};
-use super::reconstruction::{LOCAL, Local, WIND, reconstruct};
+use super::reconstruction::{LOCAL, Local, Path, WIND, reconstruct, sensitivities};
 use super::settings::Compatibility;
 use super::window::Window;
-use super::window_sums::{OutputSums, Residuals, WindowSums, output_sums};
+use super::window_sums::{Comparison, LinearisedWindow, ReducedInformation, weighted_gradient};
 use crate::aircraft::Aircraft;
 use crate::output_error::coloured;
 
@@ -41,26 +42,28 @@ impl FitContext<'_> {
     }
 }
 
-/// One window with its own parameters.
+/// One window with its own parameters. A small move keeps the linearisation and the information.
 pub struct WindowFit<'a> {
     window: &'a Window,
     local: Local,
     /// R: long-run variances of the outputs' residuals.
     variances: [f64; OUTPUTS],
-    output_sums: Vec<OutputSums>,
-    sums: WindowSums,
-    /// Information on the shared parameters with the local ones eliminated.
-    pub information: DMatrix<f64>,
+    path: Path,
+    comparison: Comparison,
+    linearised: Arc<LinearisedWindow>,
+    information: Arc<ReducedInformation>,
+    /// Gradient on all parameters, the window's own before the shared ones.
+    full_gradient: DVector<f64>,
     /// Gradient on the shared parameters with the local ones eliminated.
     pub gradient: DVector<f64>,
-    /// Both of them with the noise of the inputs counted; set by [`WindowFit::reweigh`].
-    pub evidence: (DMatrix<f64>, DVector<f64>),
-    input_noise: InputNoise,
-    residuals: Residuals,
+    /// Twice the cost.
+    pub cost: f64,
+    /// Information and gradient with the noise of the inputs counted; set by [`WindowFit::reweigh`].
+    pub evidence: Arc<(DMatrix<f64>, DVector<f64>)>,
+    input_noise: Arc<InputNoise>,
 }
 
 /// Covariance of the score from the inputs' noise, with the variances R for which it was computed.
-#[derive(Clone)]
 struct InputNoise {
     variances: [f64; OUTPUTS],
     covariance: DMatrix<f64>,
@@ -83,66 +86,60 @@ impl InputNoise {
     }
 }
 
+/// Prior of one of a window's own parameters.
+struct LocalPrior {
+    parameter: usize,
+    /// Distance from the assumed value.
+    distance: f64,
+    size: f64,
+}
+
 impl<'a> WindowFit<'a> {
     /// Begins at the measured state, with the outputs' ordinary biases as standard deviations.
-    /// `None` where the integration diverges.
+    /// `None` where the integration diverges or does not determine the state.
     pub fn begin(
         window: &'a Window,
         context: &FitContext,
         shared: &Parameters,
     ) -> Option<WindowFit<'a>> {
         let mut local = [0.0; LOCAL];
-        for (parameter, state) in local.iter_mut().zip(window.start.iter()) {
-            *parameter = *state;
-        }
+        local[..STATES].copy_from_slice(window.start.as_slice());
         let variances = std::array::from_fn(|output| {
             let bias = context.settings.ordinary.of(INPUTS + output, Kind::Bias);
             bias.powi(2)
         });
-        WindowFit::at(
-            window,
-            context,
-            local,
-            variances,
-            shared,
-            InputNoise::unknown(),
-        )
-    }
-
-    fn at(
-        window: &'a Window,
-        context: &FitContext,
-        local: Local,
-        variances: [f64; OUTPUTS],
-        shared: &Parameters,
-        input_noise: InputNoise,
-    ) -> Option<WindowFit<'a>> {
-        let reconstructed = reconstruct(window, context.aircraft, &local, shared)?;
-        let (output_sums, residuals) =
-            output_sums(window, &reconstructed, shared, &context.compared(window));
+        let path = reconstruct(window, context.aircraft, &local, shared)?;
+        let comparison = Comparison::of(window, &path, shared, &context.compared(window));
+        let slopes = sensitivities(window, context.aircraft, shared, &path);
+        let linearised = LinearisedWindow::of(slopes, &comparison);
+        let priors = local_priors(window, &local, context);
+        let information = reduced_information(&linearised, &variances, &priors)?;
         let mut fit = WindowFit {
             window,
             local,
             variances,
-            output_sums,
-            sums: WindowSums::zero(),
-            information: DMatrix::zeros(0, 0),
+            path,
+            comparison,
+            linearised: Arc::new(linearised),
+            information: Arc::new(information),
+            full_gradient: DVector::zeros(0),
             gradient: DVector::zeros(0),
-            evidence: (DMatrix::zeros(0, 0), DVector::zeros(0)),
-            input_noise,
-            residuals,
+            cost: 0.0,
+            evidence: Arc::new((DMatrix::zeros(0, 0), DVector::zeros(0))),
+            input_noise: Arc::new(InputNoise::unknown()),
         };
-        fit.weigh(context);
+        fit.weigh_residuals(context);
         Some(fit)
     }
 
-    /// Twice the cost of the window.
-    pub fn cost(&self) -> f64 {
-        self.sums.cost
+    /// Information on the shared parameters with the local ones eliminated.
+    pub fn information(&self) -> &DMatrix<f64> {
+        &self.information.shared
     }
 
     /// The window at other shared parameters, its own following their step. `step` is the full
-    /// step of the shared parameters and `share` the part of it that is taken.
+    /// step of the shared parameters and `share` the part of it that is taken. `None` where the
+    /// integration diverges.
     pub fn moved(
         &self,
         context: &FitContext,
@@ -150,98 +147,99 @@ impl<'a> WindowFit<'a> {
         step: &DVector<f64>,
         share: f64,
     ) -> Option<WindowFit<'a>> {
-        let local_step = self.sums.local_step(step)?;
+        let local_step = self.information.local_step(&self.full_gradient, step);
         let local = std::array::from_fn(|i| self.local[i] + share * local_step[i]);
-        let input_noise = self.input_noise.clone();
-        WindowFit::at(
-            self.window,
-            context,
+        let path = reconstruct(self.window, context.aircraft, &local, shared)?;
+        let samples = context.compared(self.window);
+        let mut moved = WindowFit {
+            window: self.window,
             local,
-            self.variances,
-            shared,
-            input_noise,
-        )
+            variances: self.variances,
+            comparison: Comparison::of(self.window, &path, shared, &samples),
+            path,
+            linearised: Arc::clone(&self.linearised),
+            information: Arc::clone(&self.information),
+            full_gradient: DVector::zeros(0),
+            gradient: DVector::zeros(0),
+            cost: 0.0,
+            evidence: Arc::clone(&self.evidence),
+            input_noise: Arc::clone(&self.input_noise),
+        };
+        moved.weigh_residuals(context);
+        Some(moved)
     }
 
-    /// Adds up the outputs' sums, each with its weight 1/R, and the priors of the wind's change and of
-    /// initial states without instrument.
+    /// Linearises the equations anew, about the present parameters.
+    pub fn linearise(&mut self, context: &FitContext, shared: &Parameters) {
+        let slopes = sensitivities(self.window, context.aircraft, shared, &self.path);
+        self.linearised = Arc::new(LinearisedWindow::of(slopes, &self.comparison));
+        self.weigh(context);
+    }
+
+    /// Computes the information and the gradient for the weights 1/R. A window that no longer
+    /// determines its own parameters keeps the information that it had.
     fn weigh(&mut self, context: &FitContext) {
-        let mut sums = WindowSums::zero();
-        for (output, own) in self.output_sums.iter().enumerate() {
-            sums.add(output, 1.0 / self.variances[output], own);
+        let priors = local_priors(self.window, &self.local, context);
+        let information = reduced_information(&self.linearised, &self.variances, &priors);
+        if let Some(information) = information {
+            self.information = Arc::new(information);
         }
-        let wind = context.settings.wind_change_ft_s2;
-        for j in LOCAL - WIND..LOCAL {
-            sums.local_information[(j, j)] += 1.0 / (wind * wind);
-            sums.local_gradient[j] -= self.local[j] / (wind * wind);
-            sums.cost += (self.local[j] / wind).powi(2);
+        self.weigh_residuals(context);
+    }
+
+    /// Computes the gradient and the cost.
+    fn weigh_residuals(&mut self, context: &FitContext) {
+        let gradients = self.comparison.gradients(&self.linearised.sensitivities);
+        let weights = weights(&self.variances);
+        let mut gradient = weighted_gradient(&gradients, &weights);
+        let squares = self.comparison.squares.iter().zip(weights);
+        self.cost = squares.map(|(square, weight)| weight * square).sum();
+        for prior in local_priors(self.window, &self.local, context) {
+            gradient[prior.parameter] -= prior.distance / (prior.size * prior.size);
+            self.cost += (prior.distance / prior.size).powi(2);
         }
-        for j in (0..STATES).filter(|j| !self.reads(READ_BY[*j], context)) {
-            let (from_start, size) = (self.local[j] - self.window.start[j], UNREAD_START[j]);
-            sums.local_information[(j, j)] += 1.0 / (size * size);
-            sums.local_gradient[j] -= from_start / (size * size);
-            sums.cost += (from_start / size).powi(2);
-        }
-        (self.information, self.gradient) = sums.reduced();
-        self.sums = sums;
+        self.gradient = self.information.gradient(&gradient);
+        self.full_gradient = gradient;
     }
 
     /// Covariance of the gradient on the shared parameters from the inputs' noise.
-    pub fn input_noise_covariance(
-        &self,
-        context: &FitContext,
-        shared: &Parameters,
-    ) -> Option<DMatrix<f64>> {
-        let fitted = FittedWindow {
-            window: self.window,
-            aircraft: context.aircraft,
-            compared: context.compared(self.window),
-            local: &self.local,
-            shared,
-        };
-        let weights = self.variances.map(|variance| 1.0 / variance);
-        score_covariance(&fitted, weights, &self.sums, &self.information)
-    }
-
-    /// `true` where an output is compared.
-    fn reads(&self, output: usize, context: &FitContext) -> bool {
-        let compared = self.window.outputs[output].get(context.compared(self.window));
-        compared.is_some_and(|values| values.iter().any(|v| v.is_finite()))
+    pub fn input_noise_covariance(&self) -> Option<DMatrix<f64>> {
+        let weights = weights(&self.variances);
+        score_covariance(self.window, &self.linearised, &weights, &self.information)
     }
 
     /// Estimates R anew from the residuals: coloured noise counts as white noise as strong as its
     /// slowest part.
-    pub fn reweigh(&mut self, context: &FitContext, shared: &Parameters) {
+    pub fn reweigh(&mut self, context: &FitContext) {
         let range = context.compared(self.window);
         for output in 0..OUTPUTS {
-            let residuals = self.residuals[output]
-                .get(range.clone())
-                .unwrap_or_default();
+            let residuals = &self.comparison.residuals[output];
+            let residuals = residuals.get(range.clone()).unwrap_or_default();
             let bias = context.settings.ordinary.of(INPUTS + output, Kind::Bias);
             let least = LEAST_DEVIATION * bias;
             let level = coloured::slow_noise_level(residuals, self.window.step_s);
             self.variances[output] = level.max(least * least);
         }
         self.weigh(context);
-        self.count_input_noise(context, shared);
+        self.count_input_noise(context);
     }
 
     /// Computes the evidence. A window whose own parameters are not determined has none.
-    fn count_input_noise(&mut self, context: &FitContext, shared: &Parameters) {
+    fn count_input_noise(&mut self, context: &FitContext) {
         if !self.input_noise.serves(&self.variances) {
-            let covariance = self.input_noise_covariance(context, shared);
-            self.input_noise = InputNoise {
+            let covariance = self.input_noise_covariance();
+            self.input_noise = Arc::new(InputNoise {
                 variances: self.variances,
                 covariance: covariance.unwrap_or_else(|| DMatrix::zeros(PARAMETERS, PARAMETERS)),
-            };
+            });
         }
         let sizes: Parameters = std::array::from_fn(|j| context.settings.ordinary.of_parameter(j));
         let noise = &self.input_noise.covariance;
-        let evidence = with_input_noise(&self.information, &self.gradient, noise, &sizes);
-        self.evidence = evidence.unwrap_or_else(|| {
+        let evidence = with_input_noise(self.information(), &self.gradient, noise, &sizes);
+        self.evidence = Arc::new(evidence.unwrap_or_else(|| {
             let none = DMatrix::zeros(PARAMETERS, PARAMETERS);
             (none, DVector::zeros(PARAMETERS))
-        });
+        }));
     }
 
     /// Sums of squares of an output's slow residuals and of its reconstructed motion.
@@ -252,12 +250,51 @@ impl<'a> WindowFit<'a> {
             .filter(|k| measured[*k].is_finite());
         let (residuals, motion): (Vec<f64>, Vec<f64>) = counted
             .map(|k| {
-                let residual = self.residuals[output][k];
+                let residual = self.comparison.residuals[output][k];
                 (residual, measured[k] - residual)
             })
             .unzip();
         (slow_squares(&residuals), squares_about_mean(&motion))
     }
+}
+
+fn weights(variances: &[f64; OUTPUTS]) -> [f64; OUTPUTS] {
+    variances.map(|variance| 1.0 / variance)
+}
+
+/// Priors of the wind's change and of initial states without instrument.
+fn local_priors(window: &Window, local: &Local, context: &FitContext) -> Vec<LocalPrior> {
+    let wind = (LOCAL - WIND..LOCAL).map(|parameter| LocalPrior {
+        parameter,
+        distance: local[parameter],
+        size: context.settings.wind_change_ft_s2,
+    });
+    let is_read = |state: usize| {
+        let compared = window.outputs[READ_BY[state]].get(context.compared(window));
+        compared.is_some_and(|values| values.iter().any(|v| v.is_finite()))
+    };
+    let unread = (0..STATES).filter(|state| !is_read(*state));
+    let start = unread.map(|state| LocalPrior {
+        parameter: state,
+        distance: local[state] - window.start[state],
+        size: UNREAD_START[state],
+    });
+    wind.chain(start).collect()
+}
+
+fn reduced_information(
+    linearised: &LinearisedWindow,
+    variances: &[f64; OUTPUTS],
+    priors: &[LocalPrior],
+) -> Option<ReducedInformation> {
+    let mut information = linearised.information(&weights(variances));
+    for LocalPrior {
+        parameter, size, ..
+    } in priors
+    {
+        information[(*parameter, *parameter)] += 1.0 / (size * size);
+    }
+    ReducedInformation::of(&information)
 }
 
 /// Standard deviations of chance by which the squares must exceed those of white noise.

@@ -1,18 +1,18 @@
-//! Sums of a window's information and gradient over its samples, output by output.
+//! Sums of a window over its samples, output by output: residuals, gradient and information.
 //!
-//! Residuals are those of every sample. Sensitivities are known at nodes and interpolated between them.
-//! So the gradient Σ s v over the samples is one over the nodes, with each residual shared out to the
-//! nodes around it by the weights of the interpolation.
+//! Readings are known at points and sensitivities at nodes, and interpolated between them. So the
+//! gradient Σ s v over the samples is one over the nodes, with each residual shared out to the nodes
+//! around it by the weights of the interpolation.
 
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use std::ops::Range;
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use pulp::{Arch, Simd, WithSimd};
 
 use super::parameters::{ALL_KINDS, INPUTS, KINDS, Kind, OUTPUTS, PARAMETERS, Parameters, place};
-use super::reconstruction::{DRIVING, LOCAL, ROW, Reconstructed, Row, WIDE, shared_place};
+use super::reconstruction::{LOCAL, Path, PathSensitivities, ROW, Row, WIDE, shared_place};
 use super::window::Window;
 use crate::flight::interpolation_kernel::InterpolationKernel;
 use crate::numerics::row_products::StridedRows;
@@ -21,231 +21,263 @@ use crate::numerics::simd::{AlignedBuffer, VECTOR};
 /// Rows of an output that are summed together: they stay in the processor's first cache.
 const CHUNK: usize = 16;
 
-/// Place of the residual in a row.
-const RESIDUAL: usize = ROW;
-
-/// Sums of one output with unit weight.
-pub struct OutputSums {
-    /// Σ of the products of its rows (s, v), s the sensitivities and v the residual. The lower triangle
-    /// counts.
-    products: AlignedBuffer,
-    pub squared_residuals: f64,
-}
-
-impl OutputSums {
-    pub fn information(&self, i: usize, j: usize) -> f64 {
-        self.products.slice()[i.max(j) * WIDE + i.min(j)]
-    }
-
-    pub fn gradient(&self, i: usize) -> f64 {
-        self.information(RESIDUAL, i)
-    }
-}
-
 /// Number of parameters of a window, its own before the shared ones.
 pub const ALL: usize = LOCAL + PARAMETERS;
 
-/// Weighted sums over one window: information and gradient on the window's own (local) and on the
-/// shared parameters.
-#[derive(Clone, Debug)]
-pub struct WindowSums {
-    pub local_information: DMatrix<f64>,
-    /// Local parameters by rows, shared ones by columns.
-    pub cross_information: DMatrix<f64>,
-    pub shared_information: DMatrix<f64>,
-    pub local_gradient: DVector<f64>,
-    pub shared_gradient: DVector<f64>,
-    pub cost: f64,
+/// Place among all parameters of a column of an output's row.
+pub fn place_among_all(column: usize, output: usize) -> usize {
+    if column < LOCAL {
+        column
+    } else {
+        LOCAL + shared_place(column, output)
+    }
 }
 
-impl WindowSums {
-    pub fn zero() -> WindowSums {
-        WindowSums {
-            local_information: DMatrix::zeros(LOCAL, LOCAL),
-            cross_information: DMatrix::zeros(LOCAL, PARAMETERS),
-            shared_information: DMatrix::zeros(PARAMETERS, PARAMETERS),
-            local_gradient: DVector::zeros(LOCAL),
-            shared_gradient: DVector::zeros(PARAMETERS),
-            cost: 0.0,
+/// Comparison of a window's outputs with what the instruments read along a path.
+#[derive(Clone, Debug)]
+pub struct Comparison {
+    /// Residuals of each output at every sample; NaN where the output does not count.
+    pub residuals: [Vec<f64>; OUTPUTS],
+    pub squares: [f64; OUTPUTS],
+    /// Residuals shared out to the nodes.
+    sums: [Vec<f64>; OUTPUTS],
+    /// Numbers of samples shared out to the nodes.
+    counts: [Vec<f64>; OUTPUTS],
+}
+
+/// Samples at the same place after points that are `spacing` samples apart.
+struct Phase {
+    spacing: usize,
+    /// Place after the point, in samples.
+    offset: usize,
+    /// Points before the samples.
+    points: Range<usize>,
+    /// Kernel of the instant that such a sample shows.
+    kernel: InterpolationKernel,
+}
+
+impl Phase {
+    fn samples(&self) -> impl Iterator<Item = usize> {
+        let (spacing, offset) = (self.spacing, self.offset);
+        self.points
+            .clone()
+            .map(move |point| point * spacing + offset)
+    }
+}
+
+/// Phases of some samples that show what was `late` samples before.
+fn phases(spacing: usize, late: f64, samples: &Range<usize>) -> impl Iterator<Item = Phase> {
+    let Range { start, end } = *samples;
+    let point = move |sample: usize, offset: usize| sample.saturating_sub(offset).div_ceil(spacing);
+    (0..spacing).map(move |offset| Phase {
+        spacing,
+        offset,
+        points: point(start, offset)..point(end, offset),
+        kernel: InterpolationKernel::at((offset as f64 - late) / spacing as f64),
+    })
+}
+
+impl Comparison {
+    /// Compares some samples of a window.
+    pub fn of(
+        window: &Window,
+        path: &Path,
+        shared: &Parameters,
+        samples: &Range<usize>,
+    ) -> Comparison {
+        let zeros = || std::array::from_fn(|_| vec![0.0; window.nodes()]);
+        let mut comparison = Comparison {
+            residuals: std::array::from_fn(|_| vec![f64::NAN; window.samples]),
+            squares: [0.0; OUTPUTS],
+            sums: zeros(),
+            counts: zeros(),
+        };
+        for output in 0..OUTPUTS {
+            let error = ALL_KINDS.map(|kind| shared[place(INPUTS + output, kind)]);
+            comparison.compare(output, window, &path.readings[output], error, samples);
+            let late = error[Kind::Delay as usize] / window.step_s;
+            comparison.share_out(output, window.samples_per_node(), late, samples);
+        }
+        comparison
+    }
+
+    /// Writes the residuals of an output.
+    fn compare(
+        &mut self,
+        output: usize,
+        window: &Window,
+        readings: &[f64],
+        [bias, scale, delay_s]: [f64; KINDS],
+        samples: &Range<usize>,
+    ) {
+        let (measured, residuals) = (&window.outputs[output], &mut self.residuals[output]);
+        let mut read = vec![0.0; readings.len()];
+        for phase in phases(window.samples_per_point, delay_s / window.step_s, samples) {
+            let read = &mut read[..phase.points.len()];
+            phase
+                .kernel
+                .interpolate_from(phase.points.start, readings, read);
+            for (k, reading) in phase.samples().zip(read) {
+                residuals[k] = measured[k] - ((1.0 + scale) * *reading + bias);
+            }
         }
     }
 
-    /// Adds the sums of one output.
-    pub fn add(&mut self, output: usize, weight: f64, sums: &OutputSums) {
-        self.cost += weight * sums.squared_residuals;
-        for i in 0..ROW {
-            for j in 0..ROW {
-                let h = weight * sums.information(i, j);
-                match (i < LOCAL, j < LOCAL) {
-                    (true, true) => self.local_information[(i, j)] += h,
-                    (true, false) => {
-                        self.cross_information[(i, shared_place(j, output))] += h;
-                    }
-                    (false, true) => {}
-                    (false, false) => {
-                        let place = (shared_place(i, output), shared_place(j, output));
-                        self.shared_information[place] += h;
+    /// Shares the residuals of an output out to the nodes.
+    fn share_out(&mut self, output: usize, spacing: usize, late: f64, samples: &Range<usize>) {
+        let residuals = &self.residuals[output];
+        let (mut values, mut counted) = (Vec::new(), Vec::new());
+        for phase in phases(spacing, late, samples) {
+            values.clear();
+            counted.clear();
+            for residual in phase.samples().map(|k| residuals[k]) {
+                let counts = residual.is_finite();
+                let value = if counts { residual } else { 0.0 };
+                self.squares[output] += value * value;
+                values.push(value);
+                counted.push(f64::from(u8::from(counts)));
+            }
+            let first = phase.points.start;
+            phase
+                .kernel
+                .share_out(first, &values, &mut self.sums[output]);
+            phase
+                .kernel
+                .share_out(first, &counted, &mut self.counts[output]);
+        }
+    }
+
+    /// Σ s v of each output, s its sensitivities.
+    pub fn gradients(&self, sensitivities: &PathSensitivities) -> [Row; OUTPUTS] {
+        let mut gradients = [[0.0; WIDE]; OUTPUTS];
+        Arch::new().dispatch(|| {
+            for (node, rows) in sensitivities.rows.iter().enumerate() {
+                for (output, row) in rows.iter().enumerate() {
+                    let residual = self.sums[output][node];
+                    for (sum, slope) in gradients[output].iter_mut().zip(row) {
+                        *sum += residual * slope;
                     }
                 }
             }
-            if i < LOCAL {
-                self.local_gradient[i] += weight * sums.gradient(i);
-            } else {
-                self.shared_gradient[shared_place(i, output)] += weight * sums.gradient(i);
+        });
+        gradients
+    }
+}
+
+/// Equations of a window linearised about a path, with the sums that do not depend on the weights of
+/// the outputs.
+#[derive(Debug)]
+pub struct LinearisedWindow {
+    pub sensitivities: PathSensitivities,
+    /// Numbers of samples that each node stands for.
+    pub counts: [Vec<f64>; OUTPUTS],
+    /// Σ s sᵀ of each output. The lower triangle counts.
+    products: Vec<AlignedBuffer>,
+}
+
+impl LinearisedWindow {
+    pub fn of(sensitivities: PathSensitivities, comparison: &Comparison) -> LinearisedWindow {
+        let mut rows = AlignedBuffer::zeros(sensitivities.rows.len() * WIDE);
+        let products = |output: usize| {
+            let mut filled = 0;
+            let counts = comparison.counts[output].iter();
+            // Beyond the first and the last sample the weights are negative and next to nothing.
+            for (own, count) in sensitivities
+                .rows
+                .iter()
+                .zip(counts)
+                .filter(|(_, c)| **c > 0.0)
+            {
+                let root = count.sqrt();
+                let row = &mut rows.slice_mut()[filled * WIDE..][..WIDE];
+                row.iter_mut()
+                    .zip(&own[output])
+                    .for_each(|(to, slope)| *to = root * slope);
+                filled += 1;
+            }
+            let mut products = AlignedBuffer::zeros(WIDE * WIDE);
+            Arch::new().dispatch(Products {
+                rows: &rows.slice()[..filled * WIDE],
+                products: products.slice_mut(),
+            });
+            products
+        };
+        LinearisedWindow {
+            products: (0..OUTPUTS).map(products).collect(),
+            counts: comparison.counts.clone(),
+            sensitivities,
+        }
+    }
+
+    /// Σ of the products of two sensitivities of an output.
+    pub fn product(&self, output: usize, i: usize, j: usize) -> f64 {
+        self.products[output].slice()[i.max(j) * WIDE + i.min(j)]
+    }
+
+    /// Information on all parameters for the weights 1/R of the outputs.
+    pub fn information(&self, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {
+        let mut information = DMatrix::zeros(ALL, ALL);
+        for (output, weight) in weights.iter().enumerate() {
+            for i in 0..ROW {
+                let row = place_among_all(i, output);
+                for j in 0..=i {
+                    let column = place_among_all(j, output);
+                    information[(row, column)] += weight * self.product(output, i, j);
+                }
             }
         }
-    }
-
-    /// Information and gradient on the shared parameters with the local ones eliminated (Schur's
-    /// complement). Zero where the local parameters are not determined.
-    pub fn reduced(&self) -> (DMatrix<f64>, DVector<f64>) {
-        let Some(own) = Cholesky::new(self.local_information.clone()) else {
-            return (
-                DMatrix::zeros(PARAMETERS, PARAMETERS),
-                DVector::zeros(PARAMETERS),
-            );
-        };
-        let cross = self.cross_information.transpose();
-        let information = &self.shared_information - &cross * own.solve(&self.cross_information);
-        let gradient = &self.shared_gradient - &cross * own.solve(&self.local_gradient);
-        (information, gradient)
-    }
-
-    /// Scores on the shared parameters with the local ones eliminated, from scores on all, one a
-    /// column. `None` where the local parameters are not determined.
-    pub fn eliminated(&self, scores: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-        let own = Cholesky::new(self.local_information.clone())?;
-        let local_steps = own.solve(&scores.rows(0, LOCAL).into_owned());
-        Some(scores.rows(LOCAL, PARAMETERS) - self.cross_information.tr_mul(&local_steps))
-    }
-
-    /// Step of the local parameters that follows a step of the shared ones.
-    pub fn local_step(&self, shared_step: &DVector<f64>) -> Option<DVector<f64>> {
-        let own = Cholesky::new(self.local_information.clone())?;
-        Some(own.solve(&(&self.local_gradient - &self.cross_information * shared_step)))
+        information.fill_upper_triangle_with_lower_triangle();
+        information
     }
 }
 
-/// Residuals of each output at every sample; NaN where the output does not count.
-pub type Residuals = [Vec<f64>; OUTPUTS];
-
-/// Compares the outputs of some samples of a reconstructed window with the measured ones.
-pub fn output_sums(
-    window: &Window,
-    reconstructed: &Reconstructed,
-    shared: &Parameters,
-    samples: &Range<usize>,
-) -> (Vec<OutputSums>, Residuals) {
-    let mut rows = AlignedBuffer::zeros(reconstructed.rows.len() * WIDE);
-    let mut all = Vec::with_capacity(OUTPUTS);
-    let residuals = std::array::from_fn(|output| {
-        let comparison = Comparison {
-            reconstructed,
-            step_s: window.step_s,
-            output,
-            error: ALL_KINDS.map(|kind| shared[place(INPUTS + output, kind)]),
-        };
-        let mut residuals = vec![f64::NAN; window.samples];
-        let shares = comparison.shares(&window.outputs[output], samples, &mut residuals);
-        let filled = comparison.fill_rows(&shares.of_nodes, rows.slice_mut());
-        let mut products = AlignedBuffer::zeros(WIDE * WIDE);
-        Arch::new().dispatch(Products {
-            rows: &rows.slice()[..filled * WIDE],
-            products: products.slice_mut(),
-        });
-        all.push(OutputSums {
-            products,
-            squared_residuals: shares.squared_residuals,
-        });
-        residuals
-    });
-    (all, residuals)
-}
-
-/// Comparison of one output.
-struct Comparison<'a> {
-    reconstructed: &'a Reconstructed,
-    step_s: f64,
-    output: usize,
-    /// Errors of its instrument.
-    error: [f64; KINDS],
-}
-
-/// An output's samples shared out to the nodes.
-struct Shares {
-    squared_residuals: f64,
-    /// Number of samples and sum of residuals of each node.
-    of_nodes: Vec<[f64; 2]>,
-}
-
-impl Comparison<'_> {
-    /// Writes the residuals and shares them out to the nodes around the instant that a sample shows.
-    fn shares(&self, measured: &[f64], samples: &Range<usize>, residuals: &mut [f64]) -> Shares {
-        let readings = &self.reconstructed.readings;
-        let [bias, scale, delay_s] = self.error;
-        let late = delay_s / self.step_s;
-        let kernel = InterpolationKernel::at(-late);
-        let nodes = self.reconstructed.rows.len();
-        let per_node = self.reconstructed.samples_per_node;
-        let between = |k: usize| InterpolationKernel::at((k as f64 - late) / per_node as f64);
-        let between: Vec<InterpolationKernel> = (0..per_node).map(between).collect();
-        let mut shares = Shares {
-            squared_residuals: 0.0,
-            of_nodes: vec![[0.0; 2]; nodes],
-        };
-        for k in samples.clone().filter(|k| measured[*k].is_finite()) {
-            let (reading, _) = kernel.interpolate(k, readings.len(), |i| readings[i][self.output]);
-            let residual = measured[k] - ((1.0 + scale) * reading + bias);
-            residuals[k] = residual;
-            shares.squared_residuals += residual * residual;
-            for (node, share, _) in between[k % per_node].weights_at(k / per_node, nodes) {
-                let [count, sum] = &mut shares.of_nodes[node];
-                *count += share;
-                *sum += share * residual;
-            }
+/// Gradient on all parameters for the weights 1/R of the outputs.
+pub fn weighted_gradient(gradients: &[Row; OUTPUTS], weights: &[f64; OUTPUTS]) -> DVector<f64> {
+    let mut gradient = DVector::zeros(ALL);
+    for (output, (own, weight)) in gradients.iter().zip(weights).enumerate() {
+        for (column, slope) in own[..ROW].iter().enumerate() {
+            gradient[place_among_all(column, output)] += weight * slope;
         }
-        shares
+    }
+    gradient
+}
+
+/// Information of a window on the shared parameters, its own ones eliminated (Schur's complement).
+#[derive(Debug)]
+pub struct ReducedInformation {
+    pub shared: DMatrix<f64>,
+    own: Cholesky<f64, Dyn>,
+    /// Change of the own parameters against that of the shared ones.
+    following: DMatrix<f64>,
+}
+
+impl ReducedInformation {
+    /// Eliminates a window's own parameters. `None` where they are not determined.
+    pub fn of(all: &DMatrix<f64>) -> Option<ReducedInformation> {
+        let own = Cholesky::new(all.view((0, 0), (LOCAL, LOCAL)).into_owned())?;
+        let cross = all.view((0, LOCAL), (LOCAL, PARAMETERS));
+        let following = own.solve(&cross);
+        let shared = all.view((LOCAL, LOCAL), (PARAMETERS, PARAMETERS));
+        Some(ReducedInformation {
+            shared: shared - cross.tr_mul(&following),
+            own,
+            following,
+        })
     }
 
-    /// Writes the rows of the nodes that have samples, and returns their number. Beyond the first and the
-    /// last sample the weights are negative and next to nothing.
-    fn fill_rows(&self, shares: &[[f64; 2]], rows: &mut [f64]) -> usize {
-        let mut filled = 0;
-        for (node, [count, sum]) in shares
-            .iter()
-            .enumerate()
-            .filter(|(_, [count, _])| *count > 0.0)
-        {
-            let root = count.sqrt();
-            let row = &mut rows[filled * WIDE..][..WIDE];
-            row.copy_from_slice(&self.row(node, root));
-            row[RESIDUAL] = sum / root;
-            filled += 1;
-        }
-        filled
+    /// Scores on the shared parameters, from scores on all, one a column.
+    pub fn eliminated(&self, scores: &DMatrix<f64>) -> DMatrix<f64> {
+        scores.rows(LOCAL, PARAMETERS) - self.following.tr_mul(&scores.rows(0, LOCAL))
     }
 
-    /// Sensitivities of the output at a node, times a factor.
-    fn row(&self, node: usize, factor: f64) -> Row {
-        let Reconstructed {
-            readings,
-            rows,
-            samples_per_node,
-        } = self.reconstructed;
-        let gain = 1.0 + self.error[Kind::Scale as usize];
-        let mut row = rows[node][self.output].map(|slope| factor * gain * slope);
-        let sample = node * samples_per_node;
-        let (before, after) = (
-            sample.saturating_sub(1),
-            (sample + 1).min(readings.len() - 1),
-        );
-        let rise = readings[after][self.output] - readings[before][self.output];
-        let rate = rise / ((after - before) as f64 * self.step_s);
-        let own = [1.0, readings[sample][self.output], -gain * rate];
-        for (column, slope) in row[DRIVING..].iter_mut().zip(own) {
-            *column = factor * slope;
-        }
-        row
+    /// Gradient on the shared parameters, from that on all.
+    pub fn gradient(&self, all: &DVector<f64>) -> DVector<f64> {
+        all.rows(LOCAL, PARAMETERS) - self.following.tr_mul(&all.rows(0, LOCAL))
+    }
+
+    /// Step of a window's own parameters that follows a step of the shared ones.
+    pub fn local_step(&self, gradient: &DVector<f64>, shared_step: &DVector<f64>) -> DVector<f64> {
+        self.own.solve(&gradient.rows(0, LOCAL)) - &self.following * shared_step
     }
 }
 
