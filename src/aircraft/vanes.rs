@@ -12,7 +12,7 @@
 
 use super::geometry::{Sensors, Vane, VaneModel};
 use super::position::Position;
-use crate::numerics::trig::sin_cos;
+use crate::numerics::trig::{angle_of, sin_cos};
 
 /// Flow at the c.g. and rotation: angles in rad, velocity in ft/s, body rates in rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,12 +39,77 @@ struct Local {
     by_alpha: [f64; 3],
     by_beta: [f64; 3],
     by_rates: [[f64; 3]; 3],
+    /// Sine and cosine of α and β.
+    directions: [(f64, f64); 2],
+}
+
+/// Sine and cosine of an angle from a given direction, times the speed, with the angle's slopes.
+struct Turn {
+    sine: f64,
+    cosine: f64,
+    by_alpha: f64,
+    by_beta: f64,
+    by_rates: [f64; 3],
+}
+
+impl Local {
+    /// Angle in the plane of symmetry from a direction given by sine and cosine.
+    #[inline(always)]
+    fn alpha_from(&self, (s, c): (f64, f64)) -> Turn {
+        let [u, _, w] = self.velocity;
+        let per_square = 1.0 / (u * u + w * w);
+        let slope = |d: [f64; 3]| (u * d[2] - w * d[0]) * per_square;
+        Turn {
+            sine: w * c - u * s,
+            cosine: u * c + w * s,
+            by_alpha: slope(self.by_alpha),
+            by_beta: slope(self.by_beta),
+            by_rates: self.by_rates.map(slope),
+        }
+    }
+
+    /// Angle from the plane of symmetry, from a direction given by sine and cosine.
+    #[inline(always)]
+    fn beta_from(&self, (s, c): (f64, f64)) -> Turn {
+        let [u, v, w] = self.velocity;
+        let across = (u * u + w * w).sqrt();
+        let per_square = 1.0 / (across * across + v * v);
+        let along = v / across;
+        let slope = |d: [f64; 3]| (across * d[1] - along * (u * d[0] + w * d[2])) * per_square;
+        Turn {
+            sine: v * c - across * s,
+            cosine: across * c + v * s,
+            by_alpha: slope(self.by_alpha),
+            by_beta: slope(self.by_beta),
+            by_rates: self.by_rates.map(slope),
+        }
+    }
+}
+
+impl Turn {
+    /// Reading of a vane, where the angle is from the direction `from`.
+    #[inline(always)]
+    fn reading(&self, from: f64) -> Reading {
+        Reading {
+            angle: from + angle_of(self.sine, self.cosine),
+            by_alpha: self.by_alpha,
+            by_beta: self.by_beta,
+            by_rates: self.by_rates,
+        }
+    }
+
+    /// Tangent of the angle to the direction.
+    #[inline(always)]
+    fn tangent_left(&self) -> f64 {
+        -self.sine / self.cosine
+    }
 }
 
 impl Flow {
     #[inline(always)]
     fn at(&self, arm: [f64; 3]) -> Local {
-        let ([(sa, ca), (sb, cb)], v) = (sin_cos([self.alpha, self.beta]), self.velocity);
+        let (directions, v) = (sin_cos([self.alpha, self.beta]), self.velocity);
+        let [(sa, ca), (sb, cb)] = directions;
         let ([p, q, r], [x, y, z]) = (self.rates, arm);
         Local {
             velocity: [
@@ -55,11 +120,12 @@ impl Flow {
             by_alpha: [-v * sa * cb, 0.0, v * ca * cb],
             by_beta: [-v * ca * sb, v * cb, -v * sa * sb],
             by_rates: [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]],
+            directions,
         }
     }
 }
 
-/// Error of a reading, rad, from which one more step of Newton's iteration leaves rounding only.
+/// Error of an angle, rad, from which one more step of Newton's iteration leaves rounding only.
 const CLOSE: f64 = 1e-7;
 
 /// Most steps of Newton's iteration; three are usual.
@@ -74,10 +140,7 @@ impl Vane {
         let exact = match model {
             VaneModel::Exact => {
                 let local = flow.at(arm);
-                let [u, _, w] = local.velocity;
-                let speed2 = u * u + w * w;
-                let slope = |d: [f64; 3]| (u * d[2] - w * d[0]) / speed2;
-                reading(w.atan2(u), slope, &local)
+                local.alpha_from(local.directions[0]).reading(flow.alpha)
             }
             VaneModel::SmallAngle => {
                 return self.alpha_small(
@@ -144,12 +207,7 @@ impl Vane {
         let exact = match model {
             VaneModel::Exact => {
                 let local = flow.at(arm);
-                let [u, v, w] = local.velocity;
-                let across = u.hypot(w);
-                let speed2 = across * across + v * v;
-                let slope =
-                    |d: [f64; 3]| (across * d[1] - v * (u * d[0] + w * d[2]) / across) / speed2;
-                reading(v.atan2(across), slope, &local)
+                local.beta_from(local.directions[1]).reading(flow.beta)
             }
             VaneModel::SmallAngle => {
                 return self.beta_small(
@@ -179,7 +237,8 @@ impl Sensors {
     }
 
     /// Flow at the c.g. from the readings of the two vanes (`alpha`, `beta` of `read`). Small-angle
-    /// readings are solved; exact ones are almost linear and inverted by Newton's iteration.
+    /// readings are solved; exact ones are almost linear and inverted by Newton's iteration on the tangents
+    /// of what is left of the angles.
     #[inline(always)]
     #[must_use]
     pub fn flow_at_cg(&self, read: &Flow, cg: Position) -> Flow {
@@ -188,17 +247,22 @@ impl Sensors {
             beta: read.beta * (1.0 / self.beta_vane.factor),
             ..*read
         };
+        let at_vanes = sin_cos([flow.alpha, flow.beta]);
+        flow.alpha -= dot(
+            self.alpha_vane.alpha_by_rates(read.velocity, cg),
+            read.rates,
+        );
+        flow.beta -= dot(self.beta_vane.beta_by_rates(read.velocity, cg), read.rates);
         if self.vane_model == VaneModel::SmallAngle {
-            flow.alpha -= dot(
-                self.alpha_vane.alpha_by_rates(read.velocity, cg),
-                read.rates,
-            );
-            flow.beta -= dot(self.beta_vane.beta_by_rates(read.velocity, cg), read.rates);
             return flow;
         }
+        let arms = [self.alpha_vane, self.beta_vane].map(|vane| vane.position().arm(cg));
         for _ in 0..MOST_STEPS {
-            let (alpha, beta) = (self.alpha_reading(&flow, cg), self.beta_reading(&flow, cg));
-            let (alpha_error, beta_error) = (read.alpha - alpha.angle, read.beta - beta.angle);
+            let (alpha, beta) = (
+                flow.at(arms[0]).alpha_from(at_vanes[0]),
+                flow.at(arms[1]).beta_from(at_vanes[1]),
+            );
+            let (alpha_error, beta_error) = (alpha.tangent_left(), beta.tangent_left());
             let determinant = alpha.by_alpha * beta.by_beta - alpha.by_beta * beta.by_alpha;
             flow.alpha += (alpha_error * beta.by_beta - beta_error * alpha.by_beta) / determinant;
             flow.beta += (beta_error * alpha.by_alpha - alpha_error * beta.by_alpha) / determinant;
@@ -207,16 +271,6 @@ impl Sensors {
             }
         }
         flow
-    }
-}
-
-#[inline(always)]
-fn reading(angle: f64, slope: impl Fn([f64; 3]) -> f64, local: &Local) -> Reading {
-    Reading {
-        angle,
-        by_alpha: slope(local.by_alpha),
-        by_beta: slope(local.by_beta),
-        by_rates: local.by_rates.map(slope),
     }
 }
 

@@ -3,9 +3,10 @@
 //!
 //! Parameters in order: free derivatives, free biases and initial states, as in output error, then
 //! those of the noise ([`NoiseParameter::all`]).
+#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use nalgebra::{DMatrix, DVector, SVector};
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 
 use super::gains::{
     self, Outputs, ParameterSlope, Pattern, PatternGain, steady_variance_slopes, steady_variances,
@@ -17,7 +18,9 @@ use super::riccati::{NoisySystem, States};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
 use crate::dynamics::{InGusts, OUTPUTS};
+use crate::numerics::matrix::AlignedMatrix;
 use crate::numerics::simd::AlignedBuffer;
+use crate::numerics::small::product;
 use crate::output_error::case::blocks::samples_per_block;
 use crate::output_error::case::layout::LaneLayout;
 use crate::output_error::kernel::normal_equations::NormalSums;
@@ -405,36 +408,46 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
 
     /// Gains of all patterns with their slopes.
     fn gains(&self, parameters: &[f64]) -> Result<Vec<PatternGain<NX>>, Diverged> {
+        let gains = Arch::new().dispatch(GainsAt {
+            filter: self,
+            parameters,
+        });
+        gains.ok_or(Diverged { sample: 0 })
+    }
+
+    #[inline(always)]
+    fn compute_gains(&self, parameters: &[f64]) -> Option<Vec<PatternGain<NX>>> {
         let noise = self.noise(parameters);
         let step_s = self.case.step_s;
         let decay = decay_matrix::<NX, E>(noise.decay(step_s));
-        let discrete = self.linearised.discrete(parameters);
+        let (discrete, by_derivative) = self.linearised.discrete(parameters);
         let system = NoisySystem {
-            a: discrete.step * decay,
+            a: product(&discrete.step, &decay),
             c: discrete.outputs,
             q: noise.covariance::<NX, E>(step_s),
             r: steady_variances(&noise, &self.patterns),
         };
-        let by_derivative = self.linearised.discrete_slopes(parameters);
-        let by_derivative = by_derivative.iter().enumerate();
-        let mut slopes: Vec<ParameterSlope<NX>> = by_derivative
-            .map(|(parameter, slope)| ParameterSlope {
+        let mut slopes = Vec::with_capacity(self.parameters());
+        for (parameter, slope) in by_derivative.iter().enumerate() {
+            slopes.push(ParameterSlope {
                 parameter,
                 system: derivative_slope(slope, &decay),
-            })
-            .collect();
+            });
+        }
         let first = self.first_noise();
         let kinds = self.noise_parameters.iter().enumerate();
         let numbered: Vec<(usize, NoiseParameter)> = kinds.map(|(n, p)| (first + n, *p)).collect();
-        slopes.extend(numbered.iter().map(|(parameter, kind)| ParameterSlope {
-            parameter: *parameter,
-            system: self.noise_slope(&noise, *kind, &discrete),
-        }));
+        for (parameter, kind) in &numbered {
+            slopes.push(ParameterSlope {
+                parameter: *parameter,
+                system: self.noise_slope(&noise, *kind, &discrete),
+            });
+        }
         gains::gains(system, &noise, &slopes, &numbered, &self.patterns)
-            .ok_or(Diverged { sample: 0 })
     }
 
     /// Slope of the system along a parameter of the noise.
+    #[inline(always)]
     fn noise_slope(
         &self,
         noise: &Noise,
@@ -444,7 +457,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         let step_s = self.case.step_s;
         let slope = noise.decay_slope(kind, step_s);
         NoisySystem {
-            a: discrete.step * decay_matrix_slope::<NX, E>(slope),
+            a: product(&discrete.step, &decay_matrix_slope::<NX, E>(slope)),
             c: nalgebra::SMatrix::zeros(),
             q: noise.covariance_slope::<NX, E>(kind, step_s),
             r: steady_variance_slopes(noise, &self.patterns, kind),
@@ -465,21 +478,17 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
             let samples = pattern.samples as f64;
             response.cost += 0.5 * samples * gain.log_determinant;
             let products = self.innovation_products(number, &response.innovations);
-            let excess = (Outputs::identity() * samples - gain.inverse * products) * gain.inverse;
-            let relative: Vec<(usize, Outputs)> = gain
-                .slopes
-                .iter()
-                .map(|s| (s.parameter, gain.inverse * s.innovations))
-                .collect();
-            for slope in &gain.slopes {
-                let trace = (excess * slope.innovations).trace();
-                response.other_gradient[slope.parameter] -= 0.5 * trace;
-            }
-            for (i, a) in &relative {
-                for (j, b) in &relative {
-                    let trace = a.component_mul(&b.transpose()).sum();
-                    response.other_information[(*i, *j)] += 0.5 * samples * trace;
+            let excess = Outputs::identity() * samples - gain.inverse * products;
+            let traces = covariance_traces(gain, &excess);
+            let mut rows = traces.rows();
+            for (own, row) in gain.slopes.iter().zip(&mut rows) {
+                for (other, trace) in gain.slopes.iter().zip(row) {
+                    let information = &mut response.other_information;
+                    information[(own.parameter, other.parameter)] += 0.5 * samples * trace;
                 }
+            }
+            for (slope, trace) in gain.slopes.iter().zip(rows.flatten()) {
+                response.other_gradient[slope.parameter] -= 0.5 * trace;
             }
         }
         for gust in 0..E::FELT_RATES.len() {
@@ -524,6 +533,43 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     }
 }
 
+/// Gains at some parameters, compiled for the processor at hand.
+struct GainsAt<'a, const NX: usize, E: InGusts<NX>> {
+    filter: &'a Filter<NX, E>,
+    parameters: &'a [f64],
+}
+
+impl<const NX: usize, E: InGusts<NX>> WithSimd for GainsAt<'_, NX, E> {
+    type Output = Option<Vec<PatternGain<NX>>>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        self.filter.compute_gains(self.parameters)
+    }
+}
+
+/// Traces tr(S⁻¹ S_i S⁻¹ S_j) of the slopes of S along the parameters, row by row, and tr(E S⁻¹ S_j) in a
+/// last row.
+fn covariance_traces<const NX: usize>(gain: &PatternGain<NX>, excess: &Outputs) -> AlignedMatrix {
+    const ENTRIES: usize = OUTPUTS * OUTPUTS;
+    let count = gain.slopes.len();
+    let mut relative: Vec<Outputs> = Vec::with_capacity(count + 1);
+    relative.extend(gain.slopes.iter().map(|s| gain.inverse * s.innovations));
+    let mut right = AlignedMatrix::zeros(ENTRIES, count);
+    for (entry, row) in right.rows_mut().enumerate() {
+        let (k, l) = (entry % OUTPUTS, entry / OUTPUTS);
+        for (to, of) in row.iter_mut().zip(&relative) {
+            *to = of[(l, k)];
+        }
+    }
+    relative.push(*excess);
+    let mut left = AlignedMatrix::zeros(count + 1, ENTRIES);
+    for (row, of) in left.rows_mut().zip(&relative) {
+        row[..ENTRIES].copy_from_slice(of.as_slice());
+    }
+    left.product(&right)
+}
+
 /// Names of derivatives, biases and initial states.
 fn own_names<const NX: usize, E: InGusts<NX>>(model: &Model) -> Vec<String> {
     let mut free = model.free.clone();
@@ -552,9 +598,10 @@ fn decay_matrix_slope<const NX: usize, E: InGusts<NX>>(slope: f64) -> States<NX>
 }
 
 /// Slope of the system along a derivative.
+#[inline(always)]
 fn derivative_slope<const NX: usize>(slope: &Discrete<NX>, decay: &States<NX>) -> NoisySystem<NX> {
     NoisySystem {
-        a: slope.step * decay,
+        a: product(&slope.step, decay),
         c: slope.outputs,
         q: States::zeros(),
         r: [0.0; OUTPUTS],

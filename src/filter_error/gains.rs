@@ -1,10 +1,12 @@
 //! Gain of the filter and covariance of its innovations, for each pattern of outputs that count.
+#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use nalgebra::{Cholesky, SMatrix};
 
 use super::noise::{Noise, NoiseParameter};
 use super::riccati::{NoisySystem, Observation, States, SteadyFilter, SystemSlope};
 use crate::dynamics::OUTPUTS;
+use crate::numerics::small::{product, product_transposed, sandwich};
 
 /// Square matrix of the outputs.
 pub(super) type Outputs = SMatrix<f64, OUTPUTS, OUTPUTS>;
@@ -73,6 +75,7 @@ fn share(output: usize, patterns: &[Pattern], all: usize) -> f64 {
 }
 
 /// Gains of all patterns; `None` where the filter has no finite covariance.
+#[inline(always)]
 pub(super) fn gains<const NX: usize>(
     system: NoisySystem<NX>,
     noise: &Noise,
@@ -85,17 +88,18 @@ pub(super) fn gains<const NX: usize>(
     } else {
         SteadyFilter::of(system)?
     };
-    let changes: Vec<(usize, Observation<NX>, States<NX>)> = slopes
-        .iter()
-        .map(|s| (s.parameter, s.system.c, filter.slope(&s.system)))
-        .collect();
-    let pattern_gain = |pattern: &Pattern| {
+    let mut changes = Vec::with_capacity(slopes.len());
+    for slope in slopes {
+        changes.push((slope.parameter, slope.system.c, filter.slope(&slope.system)));
+    }
+    let mut gains = Vec::with_capacity(patterns.len());
+    for pattern in patterns {
         let mut own = PatternGain::of(&filter.prediction, &system.c, noise, pattern)?;
         own.slopes = own.slopes_along(&filter.prediction, &system.c, &changes, pattern);
         own.add_output_noise(noise, noise_parameters, pattern);
-        Some(own)
-    };
-    patterns.iter().map(pattern_gain).collect()
+        gains.push(own);
+    }
+    Some(gains)
 }
 
 impl<const NX: usize> PatternGain<NX> {
@@ -110,13 +114,14 @@ impl<const NX: usize> PatternGain<NX> {
         }
     }
 
+    #[inline(always)]
     fn of(
         prediction: &States<NX>,
         c: &Observation<NX>,
         noise: &Noise,
         pattern: &Pattern,
     ) -> Option<Self> {
-        let mut s = c * prediction * c.transpose();
+        let mut s = sandwich(c, prediction);
         for o in 0..OUTPUTS {
             s[(o, o)] += noise.outputs[o].powi(2);
         }
@@ -133,7 +138,7 @@ impl<const NX: usize> PatternGain<NX> {
             whitening[(o, o)] = 0.0;
         }
         Some(PatternGain {
-            gain: prediction * c.transpose() * inverse,
+            gain: product(&product_transposed(prediction, c), &inverse),
             inverse,
             whitening,
             log_determinant: 2.0 * root.l().diagonal().map(f64::ln).sum(),
@@ -143,6 +148,7 @@ impl<const NX: usize> PatternGain<NX> {
 
     /// Slopes through the prediction's covariance and the outputs' slopes: dK = (dP Cᵀ + P dCᵀ −
     /// K dS) S⁻¹.
+    #[inline(always)]
     fn slopes_along(
         &self,
         prediction: &States<NX>,
@@ -150,17 +156,20 @@ impl<const NX: usize> PatternGain<NX> {
         changes: &[(usize, Observation<NX>, States<NX>)],
         pattern: &Pattern,
     ) -> Vec<GainSlope<NX>> {
-        let slope = |(parameter, c_slope, p_slope): &(usize, Observation<NX>, States<NX>)| {
-            let cross = p_slope * c.transpose() + prediction * c_slope.transpose();
-            let mut innovations = c * cross + c_slope * prediction * c.transpose();
+        let seen = product_transposed(prediction, c);
+        let mut slopes = Vec::with_capacity(changes.len());
+        for (parameter, c_slope, p_slope) in changes {
+            let cross = product_transposed(p_slope, c) + product_transposed(prediction, c_slope);
+            let mut innovations = product(c, &cross) + product(c_slope, &seen);
             clear_unused(&mut innovations, pattern);
-            GainSlope {
+            let gain = product(&(cross - product(&self.gain, &innovations)), &self.inverse);
+            slopes.push(GainSlope {
                 parameter: *parameter,
-                gain: (cross - self.gain * innovations) * self.inverse,
+                gain,
                 innovations,
-            }
-        };
-        changes.iter().map(slope).collect()
+            });
+        }
+        slopes
     }
 
     /// Adds the direct effect of the outputs' own noise on S.

@@ -1,9 +1,11 @@
 //! Mean linear system of a maneuver. Rates and outputs are linear in the coefficients, and these in
 //! the derivatives, so its slopes are affine in the derivatives: A = A₀ + Σ ξ_j A_j.
+#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use nalgebra::{SMatrix, SVector};
 
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
+use crate::numerics::small::product;
 use crate::output_error::Case;
 
 /// Samples between two at which the slopes are taken: the mean needs no more.
@@ -84,31 +86,26 @@ impl<const NX: usize> Linearised<NX> {
         }
     }
 
-    /// System of one step with these derivatives.
-    pub fn discrete(&self, derivatives: &[f64]) -> Discrete<NX> {
-        let slopes = self.slopes(derivatives);
-        Discrete {
-            step: exponential(&(slopes.rates * self.step_s)),
-            outputs: slopes.outputs,
-        }
-    }
-
-    /// Slope of [`Linearised::discrete`] along each derivative.
-    pub fn discrete_slopes(&self, derivatives: &[f64]) -> Vec<Discrete<NX>> {
-        let rates = self.slopes(derivatives).rates * self.step_s;
-        let slope = |free: &Slopes<NX>| Discrete {
-            step: exponential_slope(&rates, &(free.rates * self.step_s)),
-            outputs: free.outputs,
-        };
-        self.free.iter().map(slope).collect()
-    }
-
-    fn slopes(&self, derivatives: &[f64]) -> Slopes<NX> {
-        let mut sum = self.held;
+    /// System of one step with these derivatives, and its slope along each.
+    #[inline(always)]
+    pub fn discrete(&self, derivatives: &[f64]) -> (Discrete<NX>, Vec<Discrete<NX>>) {
+        let mut mean = self.held;
         for (free, value) in self.free.iter().zip(derivatives) {
-            sum.add(free, *value);
+            mean.add(free, *value);
         }
-        sum
+        let exponential = Exponential::of(mean.rates * self.step_s);
+        let mut slopes = Vec::with_capacity(self.free.len());
+        for free in &self.free {
+            slopes.push(Discrete {
+                step: exponential.slope(&(free.rates * self.step_s)),
+                outputs: free.outputs,
+            });
+        }
+        let system = Discrete {
+            step: exponential.sums[ORDER],
+            outputs: mean.outputs,
+        };
+        (system, slopes)
     }
 }
 
@@ -124,7 +121,10 @@ struct UnitSlopes<const NX: usize> {
 
 impl<const NX: usize> UnitSlopes<NX> {
     fn at<E: Equations<NX>>(case: &Case<NX, E>, sample: usize, x: &SVector<f64, NX>) -> Self {
-        let (inputs, sensors) = (&case.rate_inputs[2 * sample], &case.sensor_inputs[sample]);
+        let (inputs, sensors) = (
+            &case.rate_inputs[2 * sample],
+            &case.sensor_inputs[sample],
+        );
         let slopes = |c: &[f64; COEFFICIENTS]| Slopes {
             rates: E::rates(inputs, x, c).by_state,
             outputs: E::outputs(inputs, sensors, x, c).by_state,
@@ -165,25 +165,36 @@ impl<const NX: usize> UnitSlopes<NX> {
     }
 }
 
-/// exp A to fourth order, as a Runge-Kutta step has it.
-fn exponential<const N: usize>(a: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
-    let mut sum = SMatrix::identity();
-    for order in (1..=4).rev() {
-        sum = SMatrix::identity() + a * sum / f64::from(order);
-    }
-    sum
+/// Order of the exponential: that of a Runge-Kutta step.
+const ORDER: usize = 4;
+
+/// exp A by Horner's rule: sums S₀ = 1 and S_n = 1 + A S_(n−1) / (5 − n), the last of which it is.
+struct Exponential<const N: usize> {
+    a: SMatrix<f64, N, N>,
+    sums: [SMatrix<f64, N, N>; ORDER + 1],
 }
 
-/// Slope of [`exponential`] along dA.
-fn exponential_slope<const N: usize>(
-    a: &SMatrix<f64, N, N>,
-    change: &SMatrix<f64, N, N>,
-) -> SMatrix<f64, N, N> {
-    let (mut sum, mut slope) = (SMatrix::<f64, N, N>::identity(), SMatrix::zeros());
-    for order in (1..=4).rev() {
-        let share = 1.0 / f64::from(order);
-        slope = (change * sum + a * slope) * share;
-        sum = SMatrix::identity() + a * sum * share;
+impl<const N: usize> Exponential<N> {
+    #[inline(always)]
+    fn of(a: SMatrix<f64, N, N>) -> Self {
+        let mut sums = [SMatrix::identity(); ORDER + 1];
+        for n in 1..=ORDER {
+            let rest = product(&a, &sums[n - 1]) * SHARES[n - 1];
+            sums[n] += rest;
+        }
+        Exponential { a, sums }
     }
-    slope
+
+    /// Slope along dA.
+    #[inline(always)]
+    fn slope(&self, change: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
+        let mut slope = SMatrix::zeros();
+        for n in 1..=ORDER {
+            slope = (product(change, &self.sums[n - 1]) + product(&self.a, &slope)) * SHARES[n - 1];
+        }
+        slope
+    }
 }
+
+/// 1/(5 − n) at the n-th sum.
+const SHARES: [f64; ORDER] = [1.0 / 4.0, 1.0 / 3.0, 1.0 / 2.0, 1.0];

@@ -127,15 +127,40 @@ impl RecordedRows {
 
     /// Σ s u over all samples and outputs, lane by lane.
     pub fn weighted_sum(&self, values: &[[f64; OUTPUTS]]) -> Vec<f64> {
-        let mut sum = vec![0.0; self.width];
-        let rows = self.rows.slice().chunks_exact(self.width);
-        Arch::new().dispatch(|| {
-            for (row, u) in rows.zip(values.iter().flatten()) {
-                for (sum, s) in sum.iter_mut().zip(row) {
-                    *sum += s * u;
+        Arch::new().dispatch(WeightedSum {
+            rows: self,
+            weights: values.as_flattened(),
+        })
+    }
+}
+
+/// Weighted sum of rows, some vectors of all rows at a time.
+struct WeightedSum<'a> {
+    rows: &'a RecordedRows,
+    weights: &'a [f64],
+}
+
+impl WithSimd for WeightedSum<'_> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Vec<f64> {
+        let width = self.rows.width;
+        let mut sum = vec![0.0; width];
+        for (block, sum) in sum.chunks_exact_mut(VECTOR).enumerate() {
+            let mut partial = [simd.splat_f64s(0.0); VECTOR];
+            let vectors = VECTOR / S::F64_LANES;
+            let rows = self.rows.rows.slice().chunks_exact(width);
+            for (row, weight) in rows.zip(self.weights) {
+                let row = S::as_simd_f64s(&row[block * VECTOR..][..VECTOR]).0;
+                let weight = simd.splat_f64s(*weight);
+                for v in 0..vectors {
+                    partial[v] = simd.mul_add_f64s(row[v], weight, partial[v]);
                 }
             }
-        });
+            let sum = S::as_mut_simd_f64s(sum).0;
+            sum.copy_from_slice(&partial[..vectors]);
+        }
         sum
     }
 }

@@ -3,10 +3,12 @@
 //!
 //! It is solved by doubling: a round goes on by as many steps as all rounds before it. Slopes of P
 //! obey the closed loop's Lyapunov equation, which is doubled likewise.
+#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use nalgebra::SMatrix;
 
 use crate::dynamics::OUTPUTS;
+use crate::numerics::small::{product, product_transposed, sandwich};
 
 /// Most rounds: 2²⁴ steps.
 const ROUNDS: usize = 24;
@@ -46,21 +48,25 @@ pub(super) struct SteadyFilter<const NX: usize> {
 
 impl<const NX: usize> SteadyFilter<NX> {
     /// Solves the Riccati equation; `None` where it has no finite solution.
+    #[inline(always)]
     pub fn of(system: NoisySystem<NX>) -> Option<Self> {
         let prediction = solve(&system)?;
-        let mut s = system.c * prediction * system.c.transpose();
+        let mut s = sandwich(&system.c, &prediction);
         for o in 0..OUTPUTS {
             s[(o, o)] += system.r[o];
         }
-        let gain = prediction * system.c.transpose() * s.try_inverse()?;
-        let open = States::identity() - gain * system.c;
-        let corrected = symmetric(open * prediction);
+        let gain = product(
+            &product_transposed(&prediction, &system.c),
+            &s.try_inverse()?,
+        );
+        let open = States::identity() - product(&gain, &system.c);
+        let corrected = symmetric(product(&open, &prediction));
         let mut filter = SteadyFilter {
             prediction,
             corrected,
             gain,
             system,
-            powers: vec![system.a * open],
+            powers: vec![product(&system.a, &open)],
         };
         filter.square_powers();
         Some(filter)
@@ -77,9 +83,10 @@ impl<const NX: usize> SteadyFilter<NX> {
         }
     }
 
+    #[inline(always)]
     fn square_powers(&mut self) {
-        while let Some(last) = self.powers.last().copied() {
-            let square = last * last;
+        while let Some(last) = self.powers.last() {
+            let square = product(last, last);
             if square.amax() < SETTLED || self.powers.len() >= ROUNDS {
                 break;
             }
@@ -91,29 +98,31 @@ impl<const NX: usize> SteadyFilter<NX> {
     ///
     /// The corrected covariance is stationary in the gain, so only changes of the system count:
     /// dP = Ā dP Āᵀ + A [K dR Kᵀ − K dC P⁺ − (K dC P⁺)ᵀ] Aᵀ + dA P⁺ Aᵀ + A P⁺ dAᵀ + dQ.
+    #[inline(always)]
     pub fn slope(&self, change: &SystemSlope<NX>) -> States<NX> {
         if self.powers.is_empty() {
             return States::zeros();
         }
         let a = &self.system.a;
         let mut inner = States::zeros();
-        for o in 0..OUTPUTS {
+        for (o, r) in change.r.iter().enumerate().filter(|(_, r)| **r != 0.0) {
             let column = self.gain.column(o);
-            inner += column * column.transpose() * change.r[o];
+            inner += column * column.transpose() * *r;
         }
-        let through_outputs = self.gain * change.c * self.corrected;
+        let through_outputs = product(&product(&self.gain, &change.c), &self.corrected);
         inner -= through_outputs + through_outputs.transpose();
-        let through_step = change.a * self.corrected * a.transpose();
-        let source = a * inner * a.transpose() + through_step + through_step.transpose() + change.q;
-        let mut sum = symmetric(source);
+        let through_step = product_transposed(&product(&change.a, &self.corrected), a);
+        let step = through_step + through_step.transpose();
+        let mut sum = symmetric(sandwich(a, &inner) + step + change.q);
         for power in &self.powers {
-            sum += power * sum * power.transpose();
+            sum += sandwich(power, &sum);
         }
         sum
     }
 }
 
 /// Doubles the Riccati recursion until it settles.
+#[inline(always)]
 fn solve<const NX: usize>(system: &NoisySystem<NX>) -> Option<States<NX>> {
     let mut information = Observation::<NX>::zeros();
     for o in 0..OUTPUTS {
@@ -121,14 +130,15 @@ fn solve<const NX: usize>(system: &NoisySystem<NX>) -> Option<States<NX>> {
     }
     let (mut a, mut g, mut h) = (
         system.a.transpose(),
-        system.c.transpose() * information,
+        product(&system.c.transpose(), &information),
         system.q,
     );
     for _ in 0..ROUNDS {
-        let w = (States::identity() + g * h).try_inverse()?;
-        let step = a.transpose() * h * w * a;
-        g = symmetric(g + a * w * g * a.transpose());
-        a = a * w * a;
+        let w = (States::identity() + product(&g, &h)).try_inverse()?;
+        let step = product(&product(&product(&a.transpose(), &h), &w), &a);
+        let aw = product(&a, &w);
+        g = symmetric(g + product_transposed(&product(&aw, &g), &a));
+        a = product(&aw, &a);
         h = symmetric(h + step);
         if !h.iter().all(|v| v.is_finite()) {
             return None;
@@ -140,6 +150,7 @@ fn solve<const NX: usize>(system: &NoisySystem<NX>) -> Option<States<NX>> {
     Some(h)
 }
 
+#[inline(always)]
 fn symmetric<const N: usize>(m: SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
     (m + m.transpose()) * 0.5
 }

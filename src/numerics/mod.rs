@@ -1,5 +1,5 @@
-//! Numerical methods that several rooms share: vectors of the processor, aligned matrices, the
-//! inverse of a symmetric matrix, dual numbers, Fourier sums, one Runge-Kutta step, a running integral,
+//! Numerical methods that several rooms share: vectors of the processor, aligned matrices, small
+//! matrices, the inverse of a symmetric matrix, dual numbers, Fourier sums, one Runge-Kutta step, a running integral,
 //! Student's t, χ².
 
 pub mod chi_squared;
@@ -17,6 +17,7 @@ pub mod root;
 pub(crate) mod row_products;
 pub mod runge_kutta;
 pub(crate) mod simd;
+pub(crate) mod small;
 pub mod student;
 pub mod symmetric;
 pub mod trapezoid;

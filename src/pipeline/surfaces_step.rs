@@ -45,7 +45,7 @@ impl<'a> Step for SurfacesStep<'a> {
     type Artefact = FlightEvidence;
 
     const KIND: Kind = Kind::Surfaces;
-    const VERSION: u32 = 1;
+    const VERSION: u32 = 2;
 
     fn item(&self) -> &str {
         self.flight.id()

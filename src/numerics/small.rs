@@ -1,0 +1,81 @@
+//! Products of matrices of a few rows, whose sizes the compiler knows. The library's product packs
+//! and allocates from six rows on, which costs more than the product.
+#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
+#![expect(
+    clippy::needless_range_loop,
+    reason = "plain indices become straight code for the vectors"
+)]
+
+use nalgebra::{ArrayStorage, SMatrix};
+
+/// a b, with fused multiplication.
+#[inline(always)]
+#[must_use]
+pub(crate) fn product<const N: usize, const M: usize, const P: usize>(
+    a: &SMatrix<f64, N, M>,
+    b: &SMatrix<f64, M, P>,
+) -> SMatrix<f64, N, P> {
+    let (a, b) = (&a.data.0, &b.data.0);
+    let mut columns = [[0.0; N]; P];
+    for j in 0..P {
+        for k in 0..M {
+            for i in 0..N {
+                columns[j][i] = a[k][i].mul_add(b[j][k], columns[j][i]);
+            }
+        }
+    }
+    SMatrix::from_array_storage(ArrayStorage(columns))
+}
+
+/// a bᵀ, with fused multiplication.
+#[inline(always)]
+#[must_use]
+pub(crate) fn product_transposed<const N: usize, const M: usize, const P: usize>(
+    a: &SMatrix<f64, N, M>,
+    b: &SMatrix<f64, P, M>,
+) -> SMatrix<f64, N, P> {
+    let (a, b) = (&a.data.0, &b.data.0);
+    let mut columns = [[0.0; N]; P];
+    for j in 0..P {
+        for k in 0..M {
+            for i in 0..N {
+                columns[j][i] = a[k][i].mul_add(b[k][j], columns[j][i]);
+            }
+        }
+    }
+    SMatrix::from_array_storage(ArrayStorage(columns))
+}
+
+/// a b aᵀ, with fused multiplication.
+#[inline(always)]
+#[must_use]
+pub(crate) fn sandwich<const N: usize, const M: usize>(
+    a: &SMatrix<f64, N, M>,
+    b: &SMatrix<f64, M, M>,
+) -> SMatrix<f64, N, N> {
+    product_transposed(&product(a, b), a)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn products_are_those_of_the_definition() {
+        let a = SMatrix::<f64, 3, 4>::from_fn(|i, k| (1.3 * i as f64 - 0.7 * k as f64).sin());
+        let b = SMatrix::<f64, 4, 5>::from_fn(|k, j| (0.9 * k as f64 + 2.1 * j as f64).cos());
+        let square = SMatrix::<f64, 4, 4>::from_fn(|k, j| (k * k + 3 * j) as f64);
+        let entry = |i: usize, j: usize| -> f64 { (0..4).map(|k| a[(i, k)] * b[(k, j)]).sum() };
+        let whole = product(&a, &b);
+        for (i, j) in (0..3).flat_map(|i| (0..5).map(move |j| (i, j))) {
+            assert_relative_eq!(whole[(i, j)], entry(i, j), epsilon = 1e-14);
+        }
+        assert_eq!(product_transposed(&a, &b.transpose()), whole);
+        assert_relative_eq!(
+            sandwich(&a, &square),
+            a * square * a.transpose(),
+            epsilon = 1e-12
+        );
+    }
+}
