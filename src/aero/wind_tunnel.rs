@@ -267,37 +267,19 @@ impl WindTunnel {
     /// refused.
     #[must_use]
     pub fn at(&self, derivative: &str, condition: &Condition) -> Option<TunnelValue> {
-        let table = self.tables.get(&key(derivative))?;
-        let refused = self.settings.extrapolation == Extrapolation::Refuse;
-        if refused && !self.extrapolations(derivative, condition).is_empty() {
-            return None;
-        }
-        let scheme = self.settings.interpolation;
-        let blocks: Vec<&[Entry]> = table.chunk_by(|a, b| a.third == b.third).collect();
-        let third = |i: usize| blocks[i][0].third.unwrap_or(0.0);
-        let across_mach = |i: usize| {
-            let rows = rows_of_mach(blocks[i]);
-            let mach = |j: usize| rows[j][0].point.mach.unwrap_or(0.0);
-            let along_alpha = |j: usize| {
-                let row = rows[j];
-                let alpha = |k: usize| row[k].point.alpha_deg;
-                interpolated(
-                    row.len(),
-                    alpha,
-                    |k| row[k].value(),
-                    condition.alpha_deg,
-                    scheme,
-                )
-            };
-            interpolated(rows.len(), mach, along_alpha, condition.mach, scheme)
-        };
-        Some(interpolated(
-            blocks.len(),
-            third,
-            across_mach,
-            self.third_at(condition),
-            scheme,
-        ))
+        self.reader(derivative)?.at(condition)
+    }
+
+    /// Table of a derivative, for many readings; `None` without one.
+    #[must_use]
+    pub fn reader(&self, derivative: &str) -> Option<TableReader<'_>> {
+        let (derivative, table) = self.tables.get_key_value(&key(derivative))?;
+        let blocks = table.chunk_by(|a, b| a.third == b.third);
+        Some(TableReader {
+            tunnel: self,
+            derivative,
+            blocks: blocks.map(rows_of_mach).collect(),
+        })
     }
 
     fn third_at(&self, condition: &Condition) -> f64 {
@@ -369,6 +351,51 @@ impl Entry {
             value: self.point.value,
             uncertainty: self.point.uncertainty,
         }
+    }
+}
+
+/// Table of one derivative: blocks of the third variable, in them rows of Mach, in them α.
+#[derive(Clone, Debug)]
+pub struct TableReader<'a> {
+    tunnel: &'a WindTunnel,
+    derivative: &'a str,
+    blocks: Vec<Vec<&'a [Entry]>>,
+}
+
+impl TableReader<'_> {
+    /// Value at a flight condition; `None` where extrapolation is needed and refused.
+    #[must_use]
+    pub fn at(&self, condition: &Condition) -> Option<TunnelValue> {
+        let (tunnel, blocks) = (self.tunnel, &self.blocks);
+        let refused = tunnel.settings.extrapolation == Extrapolation::Refuse;
+        if refused && !tunnel.extrapolations(self.derivative, condition).is_empty() {
+            return None;
+        }
+        let scheme = tunnel.settings.interpolation;
+        let third = |i: usize| blocks[i][0][0].third.unwrap_or(0.0);
+        let across_mach = |i: usize| {
+            let rows = &blocks[i];
+            let mach = |j: usize| rows[j][0].point.mach.unwrap_or(0.0);
+            let along_alpha = |j: usize| {
+                let row = rows[j];
+                let alpha = |k: usize| row[k].point.alpha_deg;
+                interpolated(
+                    row.len(),
+                    alpha,
+                    |k| row[k].value(),
+                    condition.alpha_deg,
+                    scheme,
+                )
+            };
+            interpolated(rows.len(), mach, along_alpha, condition.mach, scheme)
+        };
+        Some(interpolated(
+            blocks.len(),
+            third,
+            across_mach,
+            tunnel.third_at(condition),
+            scheme,
+        ))
     }
 }
 

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 
 use super::lever::lever;
 use crate::aircraft::{Aircraft, Flow, Position, Sensors, Thrust};
@@ -174,24 +174,11 @@ impl Window {
 
     /// α and β at the c.g. at every point, from the vanes.
     fn flow_at_cg(&self) -> Vec<[f64; 2]> {
-        let signals = FLOW_SIGNALS.map(|name| self.signal(name));
-        let mut angles = Vec::with_capacity(self.len());
-        // A loop: an iterator's closure would not be compiled for the processor at hand.
-        Arch::new().dispatch(|| {
-            for i in 0..self.len() {
-                let [alpha, beta, velocity, p, q, r, x_ft, y_ft, z_ft] = signals.map(|s| s[i]);
-                let read = Flow {
-                    alpha: alpha * RAD,
-                    beta: beta * RAD,
-                    velocity,
-                    rates: [p * RAD, q * RAD, r * RAD],
-                };
-                let cg = Position { x_ft, y_ft, z_ft };
-                let flow = self.sensors.flow_at_cg(&read, cg);
-                angles.push([flow.alpha, flow.beta]);
-            }
-        });
-        angles
+        Arch::new().dispatch(VaneInversion {
+            sensors: &self.sensors,
+            signals: FLOW_SIGNALS.map(|name| self.signal(name)),
+            points: self.len(),
+        })
     }
 
     /// Replaces the points of a signal, or adds one.
@@ -211,6 +198,18 @@ impl Window {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.samples == 0
+    }
+
+    /// Returns true if all signals of the motion are those of another window: only surfaces differ.
+    #[must_use]
+    pub fn shares_motion_with(&self, other: &Window) -> bool {
+        let slopes = [signal::P, signal::Q, signal::R].map(slope_name);
+        let slopes = slopes.iter().map(String::as_str);
+        let is_same = |name: &str| match (self.points.get(name), other.points.get(name)) {
+            (Some(own), Some(other)) => Arc::ptr_eq(own, other),
+            _ => false,
+        };
+        signal::REQUIRED.iter().copied().chain(slopes).all(is_same)
     }
 
     /// Values of a signal at the points; empty for a signal that was not cut out.
@@ -299,6 +298,39 @@ impl Window {
             inertia: [signal::IX, signal::IY, signal::IZ, signal::IXZ]
                 .map(|name| self.signal(name)),
         }
+    }
+}
+
+/// Inversion of the vanes at every point, compiled for the processor at hand.
+struct VaneInversion<'a> {
+    sensors: &'a Sensors,
+    signals: [&'a [f64]; FLOW_SIGNALS.len()],
+    points: usize,
+}
+
+impl WithSimd for VaneInversion<'_> {
+    type Output = Vec<[f64; 2]>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Vec<[f64; 2]> {
+        let mut angles = Vec::with_capacity(self.points);
+        let [alpha, beta, velocity, p, q, r, x_ft, y_ft, z_ft] = self.signals;
+        for i in 0..self.points {
+            let read = Flow {
+                alpha: alpha[i] * RAD,
+                beta: beta[i] * RAD,
+                velocity: velocity[i],
+                rates: [p[i] * RAD, q[i] * RAD, r[i] * RAD],
+            };
+            let cg = Position {
+                x_ft: x_ft[i],
+                y_ft: y_ft[i],
+                z_ft: z_ft[i],
+            };
+            let flow = self.sensors.flow_at_cg(&read, cg);
+            angles.push([flow.alpha, flow.beta]);
+        }
+        angles
     }
 }
 

@@ -99,9 +99,10 @@ impl Task<'_> {
     fn table(&self, name: &str) -> impl Fn(f64) -> Option<f64> {
         let tunnel = self.context.tunnel;
         let flown = self.maneuver.condition(tunnel);
+        let table = tunnel.reader(name);
         move |alpha_deg| {
             let condition = Condition { alpha_deg, ..flown };
-            tunnel.at(name, &condition).map(|v| v.value)
+            table.as_ref()?.at(&condition).map(|v| v.value)
         }
     }
 }

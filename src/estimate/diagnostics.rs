@@ -92,12 +92,7 @@ impl Task<'_> {
             held: vec![],
             ..model.clone()
         };
-        let wide = Case::<NX, E>::new(
-            self.context.aircraft,
-            window,
-            case.measurements.clone(),
-            &all,
-        );
+        let wide = case.with_model(self.context.aircraft, window, &all);
         let flown = acting.into_iter().filter_map(|derivative| {
             let j = wide.names.iter().position(|n| *n == derivative.name)?;
             let history = wide.measured_regressor(j);

@@ -127,7 +127,7 @@ impl Task<'_> {
         fit: &Fit,
     ) -> Vec<String> {
         let first = case.parameters() - NX;
-        let Some(measured) = case.states.first() else {
+        let Some(measured) = case.motion.states.first() else {
             return vec![];
         };
         if case.initial_state != InitialState::Estimated {

@@ -6,7 +6,7 @@ use crate::dynamics::Equations;
 use crate::output_error::{Case, Fit, Outcome, equation_error, estimation};
 
 impl Task<'_> {
-    /// Estimates from the configured starting values, and from the other ones where the iteration
+    /// Estimates, without bounds, from the configured starting values, and from the other ones where the iteration
     /// does not converge.
     pub(super) fn fit<const NX: usize, E: Equations<NX>>(
         &self,
@@ -25,7 +25,7 @@ impl Task<'_> {
         let resolution = self.resolution();
         let weights = self.weights()?;
         let from = |start| {
-            estimation::estimate(
+            estimation::estimate_values(
                 case,
                 start,
                 weights,

@@ -1,5 +1,7 @@
 //! Filter error on one maneuver, and the choice between it and output error.
 
+use std::cmp::Ordering;
+
 use nalgebra::{DMatrix, DVector, SVector};
 
 use super::alpha_slopes::AlphaSlopes;
@@ -81,11 +83,12 @@ impl<'a> Task<'a> {
 
     /// Estimates a maneuver by filter error, from still or from moving air as the residuals of output
     /// error are, then from the other; `None` where neither converges or the data determine no
-    /// covariance. Where rotary gusts account for the rates, both are tried: they can be taken for
+    /// covariance. `wide` has the held derivatives free as well. Where rotary gusts account for the rates, both are tried: they can be taken for
     /// the rates' own effect.
     pub(super) fn filtered<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
         &self,
         prepared: &PreparedCase<'a, NX, E>,
+        wide: &Case<NX, E>,
         output_error: &Fit,
     ) -> Option<Filtered> {
         let case = &prepared.case;
@@ -98,21 +101,19 @@ impl<'a> Task<'a> {
         } else {
             (moving, still)
         };
-        let slopes = self.alpha_slopes(&prepared.window, &self.with_held_free(prepared));
+        let slopes = self.alpha_slopes(&prepared.window, wide);
         let constant = Sweep::constant(slopes);
-        let from = |(own, noise): &(Vec<f64>, Noise)| {
-            self.fit_filter::<NX, E, NG, G>(prepared, &constant, own, noise, &resolution)
-        };
-        let fitted = match from(&first) {
+        let filter = self.filter::<NX, E, NG, G>(prepared, &constant, &prepared.model, None);
+        let from = |start: &FilterStart| self.fit_filter(&filter, start, &resolution);
+        let found = match from(&first) {
             None => from(&second)?,
-            Some(fitted) if fitted.is_mostly_air(&case.states) => {
-                let both = [Some(fitted), from(&second)];
-                let by_cost =
-                    |a: &FilterFit<_, _>, b: &FilterFit<_, _>| a.cost().total_cmp(&b.cost());
-                both.into_iter().flatten().min_by(by_cost)?
+            Some(found) if found.is_mostly_air(&filter, &case.motion.states) => {
+                let both = [Some(found), from(&second)];
+                both.into_iter().flatten().min_by(Minimum::by_cost)?
             }
-            Some(fitted) => fitted,
+            Some(found) => found,
         };
+        let fitted = FilterFit { filter, found };
         let start = self.swept(prepared, constant, fitted)?;
         let swept = self.with_slopes(prepared, start, &resolution);
         let Swept {
@@ -122,7 +123,7 @@ impl<'a> Task<'a> {
             effect,
         } = &swept;
         let mut fit = fitted.fit();
-        self.add_held(prepared, pass, &fitted.bounds, effect.as_ref(), &mut fit);
+        self.add_held(prepared, pass, fitted.bounds(), effect.as_ref(), &mut fit);
         self.add_calibration(prepared, sweep, fitted, &mut fit);
         Some(Filtered {
             information: fitted.information(),
@@ -156,12 +157,19 @@ impl<'a> Task<'a> {
                 let own = swept.fitted.moved(&effect.change, *share);
                 let near = (own, swept.fitted.noise());
                 let implied = (self.implied(prepared, &sweep), Noise::starting(*resolution));
-                let fits = [near, implied].into_iter().filter_map(|(own, noise)| {
-                    self.fit_filter::<NX, E, NG, G>(prepared, &sweep, &own, &noise, resolution)
-                });
-                let fitted = fits.min_by(|a, b| a.cost().total_cmp(&b.cost()))?;
-                let is_borne_out = fitted.cost() < swept.fitted.cost() + ALLOWED_RISE;
-                is_borne_out.then_some(self.swept(prepared, sweep, fitted)?)
+                let model = sweep.held_in(&prepared.model);
+                let like = Some(&swept.fitted.filter);
+                let filter = self.filter::<NX, E, NG, G>(prepared, &sweep, &model, like);
+                let from = |start: &FilterStart| self.fit_filter(&filter, start, resolution);
+                let starts = [near, implied];
+                let found = starts.iter().filter_map(from);
+                let found = found.min_by(Minimum::by_cost)?;
+                let fitted = FilterFit { filter, found };
+                if fitted.cost() < swept.fitted.cost() + ALLOWED_RISE {
+                    self.swept(prepared, sweep, fitted)
+                } else {
+                    None
+                }
             });
             match next {
                 Some(next) => swept = next,
@@ -171,7 +179,7 @@ impl<'a> Task<'a> {
         if let Some(effect) = &mut swept.effect
             && swept
                 .fitted
-                .bounds
+                .bounds()
                 .are_exceeded_by(&effect.change, SMALL_CHANGE)
         {
             effect.become_uncertainty();
@@ -196,9 +204,10 @@ impl<'a> Task<'a> {
         sweep: &Sweep,
         model: &Model,
     ) -> Case<NX, E> {
-        let measurements = prepared.case.measurements.clone();
         let window = &sweep.slopes.window;
-        Case::new(self.context.aircraft, window, measurements, model)
+        prepared
+            .case
+            .with_model(self.context.aircraft, window, model)
     }
 
     /// A fit with what is left of the slopes' effect on it.
@@ -209,7 +218,7 @@ impl<'a> Task<'a> {
         fitted: FilterFit<NG, G>,
     ) -> Option<Swept<NG, G>> {
         let pass = self.wide_pass(prepared, &sweep, &fitted)?;
-        let effect = sweep.effect(&pass, &fitted.bounds);
+        let effect = sweep.effect(&pass, fitted.bounds());
         Some(Swept {
             sweep,
             fitted,
@@ -218,32 +227,23 @@ impl<'a> Task<'a> {
         })
     }
 
-    /// Fits the filter with slopes over α held; `None` where it does not converge.
-    fn fit_filter<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
+    /// Minimum of a filter's cost from a start; `None` where the iteration does not converge.
+    fn fit_filter<const NG: usize, G: InGusts<NG>>(
         &self,
-        prepared: &PreparedCase<'a, NX, E>,
-        sweep: &Sweep,
-        own: &[f64],
-        noise: &Noise,
+        filter: &Filter<NG, G>,
+        (own, noise): &FilterStart,
         resolution: &[f64; OUTPUTS],
-    ) -> Option<FilterFit<NG, G>> {
+    ) -> Option<Minimum> {
         let settings = self.context.settings;
-        let model = sweep.held_in(&prepared.model);
-        let measurements = &prepared.case.measurements;
-        let filter = self.filter::<NG, G>(&sweep.slopes.window, measurements, &model);
         let start = filter.with_noise(own, noise);
         let floors = resolution.map(|deviation| LEAST_SHARE * deviation);
-        let scored = minimise(&filter, start, &floors, &settings.filter)?;
+        let scored = minimise(filter, start, &floors, &settings.filter)?;
         if !scored.converged {
             return None;
         }
         let limit = settings.iteration.max_condition_number;
-        let bounds = bounds::bounds(&filter, &scored, limit).ok()?;
-        Some(FilterFit {
-            filter,
-            scored,
-            bounds,
-        })
+        let bounds = bounds::bounds(filter, &scored, limit).ok()?;
+        Some(Minimum { scored, bounds })
     }
 
     /// Pass at a fit with the held derivatives and the slopes free as well.
@@ -260,10 +260,9 @@ impl<'a> Task<'a> {
         } else {
             all
         };
-        let measurements = &prepared.case.measurements;
-        let wide = self.filter::<NG, G>(&sweep.slopes.window, measurements, &all);
+        let wide = self.filter(prepared, sweep, &all, Some(&fitted.filter));
         let values = values_by_name(&model, fitted.filter.names(), fitted.own());
-        WidePass::of(&fitted.filter, &fitted.scored.parameters, &wide, &values)
+        WidePass::of(&fitted.filter, fitted.parameters(), &wide, &values)
     }
 
     /// Equation error with the slopes over α that a fit holds; `None` without any.
@@ -280,25 +279,28 @@ impl<'a> Task<'a> {
         (!sweep.is_constant()).then(|| regression(&case(&all_free(&model))))
     }
 
-    fn filter<const NG: usize, G: InGusts<NG>>(
+    /// Filter of a model in the window of the slopes; `like` is another one of the maneuver.
+    fn filter<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
         &self,
-        window: &crate::dynamics::motion::Window,
-        measurements: &Measurements,
+        prepared: &PreparedCase<'a, NX, E>,
+        sweep: &Sweep,
         model: &Model,
+        like: Option<&Filter<NG, G>>,
     ) -> Filter<NG, G> {
+        let (aircraft, window) = (self.context.aircraft, &sweep.slopes.window);
         let calibration = &self.context.settings.calibration;
         let uncertainty = |output: crate::aero::Output| {
             let known = calibration.get(output.signal())?;
             (known.bias > 0.0).then_some(known.bias)
         };
         let biases: Vec<Option<f64>> = model.biases.iter().map(|b| uncertainty(b.output)).collect();
-        Filter::new(
-            self.context.aircraft,
-            window,
-            measurements.clone(),
-            model,
-            &biases,
-        )
+        match like {
+            Some(filter) => filter.with_model(aircraft, window, model, &biases),
+            None => {
+                let measurements = prepared.case.measurements.clone();
+                Filter::new(aircraft, window, measurements, model, &biases)
+            }
+        }
     }
 
     /// Standard deviations of the outputs' own noise: of the second differences of the measured
@@ -357,14 +359,15 @@ impl<'a> Task<'a> {
         let cases = errors.iter().map(|error| {
             let misread_window = error.of_window(window);
             let measured = misread(&prepared.case, error);
-            Filter::<NG, G>::case_of(self.context.aircraft, &misread_window, measured, &model)
+            let windows = [window, &misread_window];
+            let filter = &fitted.filter;
+            filter.as_recorded(self.context.aircraft, windows, measured, &model)
         });
-        let parameters = &fitted.scored.parameters;
-        let Ok(shifts) = fitted.filter.gradient_shifts(parameters, cases) else {
+        let Ok(shifts) = fitted.filter.gradient_shifts(fitted.parameters(), cases) else {
             fit.reason.push_str(super::calibration_effect::NOT_COUNTED);
             return;
         };
-        let changes = fitted.bounds.changes(&shifts);
+        let changes = fitted.bounds().changes(&shifts);
         let common = covariance_of(&changes, fit.values.len());
         let effects = errors.iter().zip(&changes);
         fit.shared_errors
@@ -470,23 +473,38 @@ struct Swept<const NG: usize, G: InGusts<NG>> {
 impl<const NG: usize, G: InGusts<NG>> Swept<NG, G> {
     /// Effect of the slopes, if it moves the estimates by more than a small part of their bounds.
     fn moving_effect(&self) -> Option<&SlopeEffect> {
-        let bounds = &self.fitted.bounds;
+        let bounds = self.fitted.bounds();
         let moves = |e: &&SlopeEffect| bounds.are_exceeded_by(&e.change, SMALL_CHANGE);
         self.effect.as_ref().filter(moves)
     }
 }
 
-/// Converged filter with its bounds.
-struct FilterFit<const NG: usize, G: InGusts<NG>> {
-    filter: Filter<NG, G>,
+/// Start of a filter's iteration: derivatives, biases and initial states, and the noise.
+type FilterStart = (Vec<f64>, Noise);
+
+/// Minimum of a filter's cost with its bounds.
+struct Minimum {
     scored: Scored,
     bounds: Bounds,
 }
 
-impl<const NG: usize, G: InGusts<NG>> FilterFit<NG, G> {
+impl Minimum {
+    /// −log of the likelihood.
+    fn cost(&self) -> f64 {
+        self.scored.response.cost
+    }
+
+    fn by_cost(&self, other: &Minimum) -> Ordering {
+        self.cost().total_cmp(&other.cost())
+    }
+
     /// True where a rotary gust is as large as a good part of the rate that it adds to.
-    fn is_mostly_air<const NX: usize>(&self, states: &[SVector<f64, NX>]) -> bool {
-        let gusts = self.noise().gusts;
+    fn is_mostly_air<const NX: usize, const NG: usize, G: InGusts<NG>>(
+        &self,
+        filter: &Filter<NG, G>,
+        states: &[SVector<f64, NX>],
+    ) -> bool {
+        let gusts = filter.noise(&self.scored.parameters).gusts;
         let mut rates = G::FELT_RATES.iter().zip(gusts);
         rates.any(|((rate, _), gust)| {
             let values = states.iter().map(|x| x[*rate]);
@@ -494,10 +512,25 @@ impl<const NG: usize, G: InGusts<NG>> FilterFit<NG, G> {
             gust > MOSTLY * values.variance().sqrt()
         })
     }
+}
 
-    /// −log of the likelihood.
+/// Converged filter.
+struct FilterFit<const NG: usize, G: InGusts<NG>> {
+    filter: Filter<NG, G>,
+    found: Minimum,
+}
+
+impl<const NG: usize, G: InGusts<NG>> FilterFit<NG, G> {
     fn cost(&self) -> f64 {
-        self.scored.response.cost
+        self.found.cost()
+    }
+
+    fn bounds(&self) -> &Bounds {
+        &self.found.bounds
+    }
+
+    fn parameters(&self) -> &[f64] {
+        &self.found.scored.parameters
     }
 
     /// Derivatives, biases and initial states, moved by a share of a change.
@@ -508,43 +541,43 @@ impl<const NG: usize, G: InGusts<NG>> FilterFit<NG, G> {
 
     /// Derivatives, biases and initial states.
     fn own(&self) -> &[f64] {
-        &self.scored.parameters[..self.filter.first_noise()]
+        &self.parameters()[..self.filter.first_noise()]
     }
 
     fn noise(&self) -> Noise {
-        self.filter.noise(&self.scored.parameters)
+        self.filter.noise(self.parameters())
     }
 
     /// Information of derivatives, biases and initial states.
     fn information(&self) -> DMatrix<f64> {
         let n = self.filter.first_noise();
-        let all = self.scored.response.information();
+        let all = self.found.scored.response.information();
         all.view((0, 0), (n, n)).into_owned()
     }
 
     fn outputs_along_air(&self) -> Option<Vec<[f64; OUTPUTS]>> {
-        self.filter.outputs_along_air(&self.scored.parameters).ok()
+        self.filter.outputs_along_air(self.parameters()).ok()
     }
 
     /// Fit in the form of output error: the noise's parameters are left out, and the outputs are the
     /// predicted ones.
     fn fit(&self) -> Fit {
-        let response = &self.scored.response;
+        let Minimum { scored, bounds } = &self.found;
         Fit {
             outcome: Outcome::Converged,
-            reason: self.scored.reason.clone(),
-            iterations: self.scored.iterations,
-            initial_cost: Some(self.scored.initial_cost),
-            final_cost: Some(response.cost),
+            reason: scored.reason.clone(),
+            iterations: scored.iterations,
+            initial_cost: Some(scored.initial_cost),
+            final_cost: Some(scored.response.cost),
             values: self.own().to_vec(),
             weights: self.noise().outputs.map(|deviation| deviation.powi(-2)),
-            response: Response::of_outputs(response.predicted.clone()),
-            condition_number: Some(self.bounds.condition_number),
+            response: Response::of_outputs(scored.response.predicted.clone()),
+            condition_number: Some(bounds.condition_number),
             undetermined: vec![],
-            covariance: Some(self.bounds.covariance.clone()),
+            covariance: Some(bounds.covariance.clone()),
             covariance_held: None,
             covariance_calibration: None,
-            covariance_corrected: Some(self.bounds.corrected.clone()),
+            covariance_corrected: Some(bounds.corrected(&self.filter, scored)),
             shared_errors: vec![],
         }
     }

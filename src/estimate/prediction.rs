@@ -158,7 +158,7 @@ fn predict<const NX: usize, E: Equations<NX>>(
         };
     }
     let start = case.starting_values(value);
-    let fit: Fit = estimation::estimate(
+    let fit: Fit = estimation::estimate_values(
         case,
         start,
         weights,

@@ -103,12 +103,7 @@ impl<'a> Task<'a> {
             case,
             ..
         } = prepared;
-        Case::new(
-            self.context.aircraft,
-            window,
-            case.measurements.clone(),
-            &all_free(model),
-        )
+        case.with_model(self.context.aircraft, window, &all_free(model))
     }
 }
 

@@ -17,7 +17,7 @@ use crate::dynamics::{
 use crate::flight::Record;
 use crate::maneuver::{Class, Maneuver};
 use crate::output_error::equation_error::{self, Regression};
-use crate::output_error::{Fit, Measurements, Outcome, consider, cost};
+use crate::output_error::{Fit, Measurements, Outcome, consider, cost, estimation};
 use crate::tables::StartingValues;
 
 /// Estimates one maneuver. The outcome has any failure.
@@ -85,13 +85,14 @@ impl Task<'_> {
         let uncertainties = self.held_uncertainties(&prepared.model);
         let second = equation_error::regression(case, &with_held_free, &uncertainties);
         if self.needs_filter(&case.measurements, &fit)
-            && let Some(filtered) = self.filtered::<NX, E, NG, G>(&prepared, &fit)
+            && let Some(filtered) = self.filtered::<NX, E, NG, G>(&prepared, &with_held_free, &fit)
         {
             return Ok(self.estimated_in_gusts(&prepared, &filtered, &second));
         }
         if self.needs_filter(&case.measurements, &fit) {
             discard_in_gusts(&case.measurements, &mut fit);
         }
+        estimation::add_bounds(case, &mut fit, &self.context.settings.iteration);
         if self.context.settings.hold == Hold::Evidence {
             fit.reason
                 .push_str(&self.undetermined_without_tunnel(case, &fit));

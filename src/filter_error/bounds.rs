@@ -25,7 +25,6 @@ use crate::output_error::likelihood::information::Identification;
 #[derive(Clone, Debug)]
 pub struct Bounds {
     pub covariance: DMatrix<f64>,
-    pub corrected: DMatrix<f64>,
     pub condition_number: f64,
     /// H⁻¹ of the filter's own parameters at known noise.
     inverse: DMatrix<f64>,
@@ -75,27 +74,11 @@ pub fn bounds<const NX: usize, E: InGusts<NX>>(
     let covariance = own(&inverse);
     let at_known_noise = symmetric::inverse(&own(&information));
     let at_known_noise = at_known_noise.unwrap_or_else(|| covariance.clone());
-    let corrected = corrected(filter, &scored.response, &at_known_noise);
     Ok(Bounds {
-        corrected: symmetric::raise_variances(corrected, &covariance),
         covariance,
         condition_number,
         inverse: at_known_noise,
     })
-}
-
-/// Covariance of a filter's own parameters from H⁻¹ and the innovations'
-/// autocovariance, at known noise: the noise's parameters hardly correlate with the others.
-fn corrected<const NX: usize, E: InGusts<NX>>(
-    filter: &Filter<NX, E>,
-    response: &Response,
-    inverse: &DMatrix<f64>,
-) -> DMatrix<f64> {
-    let aligned = AlignedMatrix::from_symmetric(inverse);
-    let innovations = coloured::covariance(&aligned, &filter.series(response)).widened();
-    let n = inverse.nrows();
-    let others = response.other_information().view((0, 0), (n, n));
-    innovations + inverse * others * inverse
 }
 
 impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
@@ -127,6 +110,23 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
 }
 
 impl Bounds {
+    /// Covariance of a filter's own parameters from H⁻¹ and the innovations' autocovariance, at known
+    /// noise: the noise's parameters hardly correlate with the others.
+    #[must_use]
+    pub fn corrected<const NX: usize, E: InGusts<NX>>(
+        &self,
+        filter: &Filter<NX, E>,
+        scored: &Scored,
+    ) -> DMatrix<f64> {
+        let response = &scored.response;
+        let aligned = AlignedMatrix::from_symmetric(&self.inverse);
+        let innovations = coloured::covariance(&aligned, &filter.series(response)).widened();
+        let n = self.inverse.nrows();
+        let others = response.other_information().view((0, 0), (n, n));
+        let corrected = innovations + &self.inverse * others * &self.inverse;
+        symmetric::raise_variances(corrected, &self.covariance)
+    }
+
     /// Returns true if a change of the parameters is large beside their bounds.
     #[must_use]
     pub fn are_exceeded_by(&self, change: &DVector<f64>, share: f64) -> bool {

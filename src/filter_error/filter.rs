@@ -13,7 +13,9 @@ use super::gains::{
 };
 use super::linearised::{Discrete, Linearised};
 use super::noise::{Noise, NoiseParameter, Prior, RotaryCost};
-use super::pass::{Corrections, FilterPass, LaneGain, PassOutputs, RecordedRows, RowSink};
+use super::pass::{
+    Corrections, FilterPass, LaneBlocks, LaneGain, PassOutputs, RecordedRows, RowSink,
+};
 use super::riccati::{NoisySystem, States};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
@@ -93,7 +95,24 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         model: &Model,
         biases: &[Option<f64>],
     ) -> Self {
-        let case = Self::case_of(aircraft, window, measurements, model);
+        let case = Case::new(aircraft, window, measurements, &without_own(model));
+        Self::of_case(case, model, biases)
+    }
+
+    /// Prepares the same maneuver with another model. `window` may have other surfaces.
+    #[must_use]
+    pub fn with_model(
+        &self,
+        aircraft: &Aircraft,
+        window: &Window,
+        model: &Model,
+        biases: &[Option<f64>],
+    ) -> Self {
+        let case = self.case.with_model(aircraft, window, &without_own(model));
+        Self::of_case(case, model, biases)
+    }
+
+    fn of_case(case: Case<NX, E>, model: &Model, biases: &[Option<f64>]) -> Self {
         let biased_outputs = model.biased_outputs::<NX, E>();
         let initial_states = match model.initial_state {
             InitialState::Estimated => E::own_states(),
@@ -101,7 +120,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         };
         let noise_parameters = NoiseParameter::all(E::FELT_RATES.len());
         let others = biased_outputs.len() + initial_states + noise_parameters.len();
-        let layout = LaneLayout::new(&case.terms, E::REGRESSOR_STATES, others, 0);
+        let layout = LaneLayout::dense(&case.terms, E::REGRESSOR_STATES, others);
         let (patterns, pattern_of) = patterns(&case.measurements.used);
         let mut filter = Filter {
             linearised: Linearised::of(&case),
@@ -327,20 +346,19 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         Ok(shifts)
     }
 
-    /// Case of this maneuver as other instruments would have recorded it.
+    /// Case of this maneuver as other instruments would have recorded it. `windows` are the filter's own
+    /// one and theirs.
     #[must_use]
-    pub fn case_of(
+    pub fn as_recorded(
+        &self,
         aircraft: &Aircraft,
-        window: &Window,
+        windows: [&Window; 2],
         measurements: Measurements,
         model: &Model,
     ) -> Case<NX, E> {
-        let own = Model {
-            biases: vec![],
-            initial_state: InitialState::Measured,
-            ..model.clone()
-        };
-        Case::<NX, E>::new(aircraft, window, measurements, &own)
+        let model = without_own(model);
+        self.case
+            .as_recorded(aircraft, windows, measurements, &model)
     }
 
     pub(super) fn biases(&self, parameters: &[f64]) -> [f64; OUTPUTS] {
@@ -357,11 +375,10 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         self.layout.parameter_lanes[parameter]
     }
 
-    fn bias_rows(&self) -> AlignedBuffer {
-        let width = self.layout.width();
-        let mut rows = AlignedBuffer::zeros(OUTPUTS * width);
+    fn bias_rows(&self) -> LaneBlocks {
+        let mut rows = LaneBlocks::zeros(OUTPUTS, self.layout.width());
         for (b, &o) in self.biased_outputs.iter().enumerate() {
-            rows.slice_mut()[o * width + self.lane(self.case.derivatives() + b)] = 1.0;
+            rows.set(o, self.lane(self.case.derivatives() + b), 1.0);
         }
         rows
     }
@@ -568,6 +585,15 @@ fn covariance_traces<const NX: usize>(gain: &PatternGain<NX>, excess: &Outputs) 
         row[..ENTRIES].copy_from_slice(of.as_slice());
     }
     left.product(&right)
+}
+
+/// Model of the filter's case: biases and initial states are the filter's own.
+fn without_own<'a>(model: &Model<'a>) -> Model<'a> {
+    Model {
+        biases: vec![],
+        initial_state: InitialState::Measured,
+        ..model.clone()
+    }
 }
 
 /// Names of derivatives, biases and initial states.

@@ -64,7 +64,7 @@ impl<const NX: usize> Linearised<NX> {
     }
 
     fn add_sample<E: Equations<NX>>(&mut self, case: &Case<NX, E>, sample: usize, share: f64) {
-        let x = &case.states[sample];
+        let x = &case.motion.states[sample];
         let unit = UnitSlopes::at(case, sample, x);
         let held = case.held.at(2 * sample);
         let mut whole = unit.still;
@@ -122,8 +122,8 @@ struct UnitSlopes<const NX: usize> {
 impl<const NX: usize> UnitSlopes<NX> {
     fn at<E: Equations<NX>>(case: &Case<NX, E>, sample: usize, x: &SVector<f64, NX>) -> Self {
         let (inputs, sensors) = (
-            &case.rate_inputs[2 * sample],
-            &case.sensor_inputs[sample],
+            &case.motion.rate_inputs[2 * sample],
+            &case.motion.sensor_inputs[sample],
         );
         let slopes = |c: &[f64; COEFFICIENTS]| Slopes {
             rates: E::rates(inputs, x, c).by_state,

@@ -33,25 +33,73 @@ use crate::output_error::kernel::trajectory::{STATE_BOUND, StageHistory, Traject
 /// Gain of a pattern with its slopes in the lanes of the parameters.
 pub(super) struct LaneGain<const NX: usize> {
     gain: Gain<NX>,
+    /// −K, by which a state's sensitivities follow those of the outputs.
+    reaction: Gain<NX>,
     whitening: Outputs,
-    /// Slopes of the gain: state by state, output by output a row of lanes.
-    slopes: AlignedBuffer,
+    /// Slopes of the gain: state by state, output by output.
+    slopes: LaneBlocks,
+}
+
+/// Rows of numbers in the lanes of the parameters, so that the rows of a widest vector stand together:
+/// vector by vector, row by row.
+pub(super) struct LaneBlocks {
+    values: AlignedBuffer,
+    rows: usize,
+}
+
+impl LaneBlocks {
+    pub fn zeros(rows: usize, width: usize) -> Self {
+        LaneBlocks {
+            values: AlignedBuffer::zeros(rows * width),
+            rows,
+        }
+    }
+
+    pub fn set(&mut self, row: usize, lane: usize, value: f64) {
+        let block = lane / VECTOR * self.rows;
+        self.values.slice_mut()[(block + row) * VECTOR + lane % VECTOR] = value;
+    }
+
+    /// Rows of the vector at a lane; `rows` is their number, which the compiler knows.
+    #[inline(always)]
+    fn at<S: Simd>(&self, rows: usize, lane: usize) -> LaneRows<'_, S> {
+        let first = lane / VECTOR * rows * VECTOR;
+        let block = &self.values.slice()[first..first + rows * VECTOR];
+        LaneRows {
+            vectors: S::as_simd_f64s(block).0,
+            within: lane % VECTOR / S::F64_LANES,
+        }
+    }
+}
+
+/// Rows in the lanes of one vector.
+#[derive(Clone, Copy)]
+struct LaneRows<'a, S: Simd> {
+    vectors: &'a [S::f64s],
+    within: usize,
+}
+
+impl<S: Simd> LaneRows<'_, S> {
+    #[inline(always)]
+    fn row(self, row: usize) -> S::f64s {
+        self.vectors[row * (VECTOR / S::F64_LANES) + self.within]
+    }
 }
 
 impl<const NX: usize> LaneGain<NX> {
     pub fn new(pattern: &PatternGain<NX>, layout: &LaneLayout) -> Self {
-        let width = layout.width();
-        let mut slopes = AlignedBuffer::zeros(NX * OUTPUTS * width);
+        let mut slopes = LaneBlocks::zeros(NX * OUTPUTS, layout.width());
         for slope in &pattern.slopes {
             let lane = layout.parameter_lanes[slope.parameter];
             for i in 0..NX {
                 for o in 0..OUTPUTS {
-                    slopes.slice_mut()[(i * OUTPUTS + o) * width + lane] = slope.gain[(i, o)];
+                    slopes.set(i * OUTPUTS + o, lane, slope.gain[(i, o)]);
                 }
             }
         }
         LaneGain {
             gain: pattern.gain,
+            reaction: -pattern.gain,
             whitening: pattern.whitening,
             slopes,
         }
@@ -65,8 +113,8 @@ pub(super) struct Corrections<'a, const NX: usize> {
     /// Pattern of each sample.
     pub pattern_of: &'a [u8],
     pub biases: [f64; OUTPUTS],
-    /// Lanes of the biases: output by output a row, one where a bias shifts the output.
-    pub bias_rows: AlignedBuffer,
+    /// Lanes of the biases: output by output, one where a bias shifts the output.
+    pub bias_rows: LaneBlocks,
     /// Share of a rotary gust that is left after a step, and its slope in each lane.
     pub decay: f64,
     pub decay_row: AlignedBuffer,
@@ -202,7 +250,6 @@ pub(super) struct FilterPass<'a, const NX: usize, E: InGusts<NX>, K: RowSink> {
 /// Samples of a chunk as the filter meets them.
 struct ChunkCorrections<'a, const NX: usize, E> {
     corrections: &'a Corrections<'a, NX>,
-    width: usize,
     /// Slots of products of a state: (slot, state).
     products: &'a [(usize, usize)],
     /// Factors of the first vector's regressors at the predicted states.
@@ -221,47 +268,56 @@ impl<const NX: usize, E: InGusts<NX>> Correction<NX> for &ChunkCorrections<'_, N
     }
 
     #[inline(always)]
-    fn correct<S: Simd>(
+    fn correct<S: Simd, const N: usize>(
         &self,
         simd: S,
         k: usize,
-        lane: usize,
-        s: &mut [S::f64s; NX],
-        y: &mut [S::f64s; OUTPUTS],
+        lanes: [usize; N],
+        s: &mut [[S::f64s; NX]; N],
+        y: &mut [[S::f64s; OUTPUTS]; N],
     ) {
-        let Corrections {
-            gains,
-            bias_rows,
-            decay,
-            decay_row,
-            ..
-        } = self.corrections;
-        let gain = &gains[usize::from(self.patterns[k])];
-        let slopes = gain.slopes.slice();
+        let corrections = self.corrections;
+        let gain = &corrections.gains[usize::from(self.patterns[k])];
+        let mut slopes = [gain.slopes.at::<S>(NX * OUTPUTS, lanes[0]); N];
+        for n in 0..N {
+            slopes[n] = gain.slopes.at(NX * OUTPUTS, lanes[n]);
+            let biases = corrections.bias_rows.at::<S>(OUTPUTS, lanes[n]);
+            for o in 0..OUTPUTS {
+                y[n][o] = simd.add_f64s(y[n][o], biases.row(o));
+            }
+        }
         for o in 0..OUTPUTS {
-            y[o] = simd.add_f64s(y[o], load::<S>(bias_rows.slice(), o * self.width + lane));
             let v = simd.splat_f64s(self.innovations[k][o]);
             for i in 0..NX {
-                let slope = load::<S>(slopes, (i * OUTPUTS + o) * self.width + lane);
-                s[i] = simd.mul_add_f64s(slope, v, s[i]);
-                s[i] = simd.mul_add_f64s(simd.splat_f64s(-gain.gain[(i, o)]), y[o], s[i]);
+                let reaction = simd.splat_f64s(gain.reaction[(i, o)]);
+                for n in 0..N {
+                    s[n][i] = simd.mul_add_f64s(slopes[n].row(i * OUTPUTS + o), v, s[n][i]);
+                    s[n][i] = simd.mul_add_f64s(reaction, y[n][o], s[n][i]);
+                }
             }
         }
-        let decay_slope = load::<S>(decay_row.slice(), lane);
-        for &(rate, felt) in E::FELT_RATES {
-            let gust = simd.sub_f64s(s[felt], s[rate]);
-            s[felt] = simd.mul_add_f64s(simd.splat_f64s(*decay), gust, s[rate]);
-            let gust = simd.splat_f64s(self.gusts[k][felt]);
-            s[felt] = simd.mul_add_f64s(decay_slope, gust, s[felt]);
+        let decay = simd.splat_f64s(corrections.decay);
+        for n in 0..N {
+            let decay_slope = load::<S>(corrections.decay_row.slice(), lanes[n]);
+            for &(rate, felt) in E::FELT_RATES {
+                let gust = simd.sub_f64s(s[n][felt], s[n][rate]);
+                s[n][felt] = simd.mul_add_f64s(decay, gust, s[n][rate]);
+                let gust = simd.splat_f64s(self.gusts[k][felt]);
+                s[n][felt] = simd.mul_add_f64s(decay_slope, gust, s[n][felt]);
+            }
         }
-        let read = *y;
-        for o in 0..OUTPUTS {
-            let mut white = simd.splat_f64s(0.0);
+        // From the last output on, as the first ones are read till the end.
+        for o in (0..OUTPUTS).rev() {
+            let mut white = [simd.splat_f64s(0.0); N];
             for p in 0..=o {
                 let factor = simd.splat_f64s(gain.whitening[(o, p)]);
-                white = simd.mul_add_f64s(factor, read[p], white);
+                for n in 0..N {
+                    white[n] = simd.mul_add_f64s(factor, y[n][p], white[n]);
+                }
             }
-            y[o] = white;
+            for n in 0..N {
+                y[n][o] = white[n];
+            }
         }
     }
 }
@@ -270,7 +326,6 @@ impl<'a, const NX: usize, E: InGusts<NX>> ChunkCorrections<'a, NX, E> {
     fn new(corrections: &'a Corrections<'a, NX>, layout: &'a LaneLayout) -> Self {
         ChunkCorrections {
             corrections,
-            width: layout.width(),
             products: &layout.products,
             factors: [[1.0; VECTOR]; CHUNK],
             innovations: [[0.0; OUTPUTS]; CHUNK],
@@ -348,7 +403,16 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink> WithSimd for FilterPass<'_, NX
                 if !x.iter().all(|x| x.abs() < STATE_BOUND) {
                     return Err(Diverged { sample });
                 }
-                let mut y = propagators.read_outputs(case, &build_up, &x, sample, k);
+                let mut y = if self.sink.is_some() {
+                    propagators.read_outputs(case, &build_up, &x, sample, k)
+                } else {
+                    let c = build_up.coefficients::<E>(2 * k, &x);
+                    let inputs = (
+                        &case.motion.rate_inputs[2 * sample],
+                        &case.motion.sensor_inputs[sample],
+                    );
+                    E::outputs(inputs.0, inputs.1, &x, &c).outputs.into()
+                };
                 for o in 0..OUTPUTS {
                     y[o] += self.corrections.biases[o];
                 }
@@ -357,7 +421,11 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink> WithSimd for FilterPass<'_, NX
                 self.outputs.predicted[sample] = y;
                 self.outputs.innovations[sample] = chunk.innovations[k];
                 self.outputs.whitened[sample] = white;
-                x = trajectory.step_from(corrected);
+                x = if self.sink.is_some() {
+                    trajectory.step_from(corrected)
+                } else {
+                    trajectory.state_after(k, corrected)
+                };
             }
             let Some(sink) = self.sink.as_deref_mut() else {
                 continue;

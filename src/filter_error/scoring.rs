@@ -124,11 +124,16 @@ impl Scored {
         information: &DMatrix<f64>,
         damping: &mut f64,
     ) -> bool {
+        let mut failed = false;
         while *damping < MOST_DAMPING {
             if let Some(step) = step(information, gradient, *damping) {
                 let next = moved(&self.parameters, &step, floors, filter.first_noise());
-                if let Ok(response) = filter.respond(&next)
-                    && response.cost < self.response.cost
+                let lowers = |response: &Response| response.cost < self.response.cost;
+                // A step after one that failed may fail as well: its cost alone is cheap.
+                let may_lower = !failed || filter.innovations(&next).is_ok_and(|r| lowers(&r));
+                if may_lower
+                    && let Ok(response) = filter.respond(&next)
+                    && lowers(&response)
                 {
                     let predicted = gradient.dot(&step) - 0.5 * (information * &step).dot(&step);
                     let kept = (self.response.cost - response.cost) / predicted;
@@ -137,6 +142,7 @@ impl Scored {
                     return true;
                 }
             }
+            failed = true;
             *damping = (*damping * 10.0).max(FIRST_DAMPING);
         }
         false

@@ -100,8 +100,8 @@ fn plain_outputs<const NX: usize, E: Equations<NX>>(
     x: &SVector<f64, NX>,
 ) -> SVector<f64, OUTPUTS> {
     let c = case.build_up_at(parameters, 2 * sample).coefficients(x);
-    let inputs = &case.rate_inputs[2 * sample];
-    E::outputs(inputs, &case.sensor_inputs[sample], x, &c).outputs
+    let inputs = &case.motion.rate_inputs[2 * sample];
+    E::outputs(inputs, &case.motion.sensor_inputs[sample], x, &c).outputs
 }
 
 fn plain_step<const NX: usize, E: Equations<NX>>(
@@ -114,7 +114,7 @@ fn plain_step<const NX: usize, E: Equations<NX>>(
     let slope = |stage: usize, x: &SVector<f64, NX>| {
         let point = (2 * sample + POINT[stage]).min(last);
         let c = case.build_up_at(parameters, point).coefficients(x);
-        E::rates(&case.rate_inputs[point], x, &c).rates
+        E::rates(&case.motion.rate_inputs[point], x, &c).rates
     };
     runge_kutta::step(x, case.step_s, slope, |x, slope, h| x + slope * h)
 }
@@ -334,7 +334,8 @@ fn assert_estimates_scatter_as_bounded<const NX: usize, E: InGusts<NX>>() {
         let settings = scoring::Settings::default();
         let scored = minimise(&simulated.filter, start, &floors, &settings).unwrap();
         assert!(scored.converged, "{}", scored.reason);
-        let covariance = bounds(&simulated.filter, &scored, 1e10).unwrap().corrected;
+        let bounds = bounds(&simulated.filter, &scored, 1e10).unwrap();
+        let covariance = bounds.corrected(&simulated.filter, &scored);
         for j in 0..simulated.filter.case.derivatives() {
             let z = (scored.parameters[j] - simulated.own[j]) / covariance[(j, j)].sqrt();
             square += z * z;

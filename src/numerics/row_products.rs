@@ -60,17 +60,22 @@ impl StridedRows<'_> {
         interleaved: &mut impl Interleaved,
     ) {
         for vector in 0..used.len() {
-            let first = vector * VECTOR;
-            match used[vector] {
+            let (mut first, mut rows) = (vector * VECTOR, used[vector]);
+            // Narrower vectors have half the registers: a tile of half the rows, and one more vector.
+            while S::F64_LANES < VECTOR && rows > 4 {
+                self.add_gram_rows::<S, 4, 3>(simd, first, matrix, width, interleaved);
+                (first, rows) = (first + 4, rows - 4);
+            }
+            match rows {
                 0 => {}
-                1 => self.add_gram_rows::<S, 1>(simd, first, matrix, width, interleaved),
-                2 => self.add_gram_rows::<S, 2>(simd, first, matrix, width, interleaved),
-                3 => self.add_gram_rows::<S, 3>(simd, first, matrix, width, interleaved),
-                4 => self.add_gram_rows::<S, 4>(simd, first, matrix, width, interleaved),
-                5 => self.add_gram_rows::<S, 5>(simd, first, matrix, width, interleaved),
-                6 => self.add_gram_rows::<S, 6>(simd, first, matrix, width, interleaved),
-                7 => self.add_gram_rows::<S, 7>(simd, first, matrix, width, interleaved),
-                _ => self.add_gram_rows::<S, VECTOR>(simd, first, matrix, width, interleaved),
+                1 => self.add_gram_rows::<S, 1, 3>(simd, first, matrix, width, interleaved),
+                2 => self.add_gram_rows::<S, 2, 3>(simd, first, matrix, width, interleaved),
+                3 => self.add_gram_rows::<S, 3, 3>(simd, first, matrix, width, interleaved),
+                4 => self.add_gram_rows::<S, 4, 3>(simd, first, matrix, width, interleaved),
+                5 => self.add_gram_rows::<S, 5, 2>(simd, first, matrix, width, interleaved),
+                6 => self.add_gram_rows::<S, 6, 2>(simd, first, matrix, width, interleaved),
+                7 => self.add_gram_rows::<S, 7, 2>(simd, first, matrix, width, interleaved),
+                _ => self.add_gram_rows::<S, VECTOR, 2>(simd, first, matrix, width, interleaved),
             }
         }
     }
@@ -112,9 +117,9 @@ impl StridedRows<'_> {
         into.copy_from_slice(&sums);
     }
 
-    /// Adds to `T` rows of the matrix, from its left edge to the diagonal.
+    /// Adds to `T` rows of the matrix, from its left edge to the diagonal, in tiles of `C` vectors.
     #[inline(always)]
-    fn add_gram_rows<S: Simd, const T: usize>(
+    fn add_gram_rows<S: Simd, const T: usize, const C: usize>(
         self,
         simd: S,
         first: usize,
@@ -122,12 +127,14 @@ impl StridedRows<'_> {
         width: usize,
         interleaved: &mut impl Interleaved,
     ) {
-        let mut lane = 0;
-        while lane + S::F64_LANES < first + T {
-            self.add_tile::<S, T, 2>(simd, first, lane, matrix, width, interleaved);
-            lane += 2 * S::F64_LANES;
+        let (mut lane, end) = (0, first + T);
+        while lane + (C - 1) * S::F64_LANES < end {
+            self.add_tile::<S, T, C>(simd, first, lane, matrix, width, interleaved);
+            lane += C * S::F64_LANES;
         }
-        if lane < first + T {
+        if lane + S::F64_LANES < end {
+            self.add_tile::<S, T, 2>(simd, first, lane, matrix, width, interleaved);
+        } else if lane < end {
             self.add_tile::<S, T, 1>(simd, first, lane, matrix, width, interleaved);
         }
     }

@@ -26,6 +26,21 @@ pub fn estimate<D: Bounded>(
     resolution: [f64; OUTPUTS],
     settings: &Settings,
 ) -> Fit<D::Response> {
+    let mut fit = estimate_values(data, start, table, weights, resolution, settings);
+    add_bounds(data, &mut fit, settings);
+    fit
+}
+
+/// Estimates as [`estimate`] does, without bounds: [`add_bounds`] adds them.
+#[must_use]
+pub fn estimate_values<D: Bounded>(
+    data: &D,
+    start: Vec<f64>,
+    table: [f64; OUTPUTS],
+    weights: Weights,
+    resolution: [f64; OUTPUTS],
+    settings: &Settings,
+) -> Fit<D::Response> {
     let mut fit = minimise(data, start, table, settings);
     if weights == Weights::Estimated {
         fit = settle_weights(data, fit, resolution, settings);
@@ -33,7 +48,7 @@ pub fn estimate<D: Bounded>(
         let cost = |_| data.sums(&fit.response, &table).cost();
         fit.final_cost = fit.final_cost.map(cost);
     }
-    add_bounds(data, &mut fit, settings);
+    identify(data, &mut fit, settings);
     fit
 }
 
@@ -71,22 +86,16 @@ fn have_settled(next: &[f64; OUTPUTS], weights: &[f64; OUTPUTS]) -> bool {
     both.all(|(a, b)| (a / b - 1.0).abs() < WEIGHTS_SETTLED)
 }
 
-/// Adds the bounds to a fit, or names the parameters that the data do not determine.
-fn add_bounds<D: Bounded>(data: &D, fit: &mut Fit<D::Response>, settings: &Settings) {
+/// Adds the condition number to a fit, or names the parameters that the data do not determine.
+fn identify<D: Bounded>(data: &D, fit: &mut Fit<D::Response>, settings: &Settings) {
     if fit.final_cost.is_none() {
         return;
     }
     let sums = data.sums(&fit.response, &fit.weights);
     match Identification::of(&sums.information, settings.max_condition_number) {
         Identification::Determined {
-            inverse,
-            condition_number,
-        } => {
-            let bounds = cramer_rao::bounds(&inverse, data, fit);
-            fit.condition_number = Some(condition_number);
-            fit.covariance = Some(bounds.covariance);
-            fit.covariance_corrected = Some(bounds.corrected);
-        }
+            condition_number, ..
+        } => fit.condition_number = Some(condition_number),
         Identification::Undetermined {
             condition_number,
             parameters,
@@ -98,5 +107,19 @@ fn add_bounds<D: Bounded>(data: &D, fit: &mut Fit<D::Response>, settings: &Setti
             fit.reason = format!("the data do not tell apart {}", names.join(", "));
             fit.undetermined = parameters;
         }
+    }
+}
+
+/// Adds the bounds to a fit whose parameters the data determine.
+pub fn add_bounds<D: Bounded>(data: &D, fit: &mut Fit<D::Response>, settings: &Settings) {
+    if fit.final_cost.is_none() {
+        return;
+    }
+    let sums = data.sums(&fit.response, &fit.weights);
+    let identification = Identification::of(&sums.information, settings.max_condition_number);
+    if let Identification::Determined { inverse, .. } = identification {
+        let bounds = cramer_rao::bounds(&inverse, data, fit);
+        fit.covariance = Some(bounds.covariance);
+        fit.covariance_corrected = Some(bounds.corrected);
     }
 }

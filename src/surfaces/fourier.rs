@@ -62,20 +62,38 @@ impl Band {
         numbers.map(|k| k as f64 / length_s).collect()
     }
 
-    /// Fourier sums of a series without its mean, tapered.
-    pub fn spectrum(&self, series: &[f64]) -> Spectrum {
-        let [spectrum] = self.sums(&[without_mean(series, &self.taper)]);
-        spectrum
+    /// Fourier sums of series without their means, tapered.
+    pub fn spectra(&self, series: &[Vec<f64>]) -> Vec<Spectrum> {
+        let tapered = series.iter().map(|s| without_mean(s, &self.taper));
+        self.sums(&tapered.collect::<Vec<_>>())
     }
 
-    /// Fourier sums of series, each a spectrum.
-    fn sums<const N: usize>(&self, series: &[Vec<f64>; N]) -> [Spectrum; N] {
+    /// Spectra of series, for shifts in time.
+    pub fn shifted(&self, series: &[Vec<f64>]) -> Vec<Shifted> {
+        let both = series.iter().flat_map(|series| {
+            [
+                without_mean(series, &self.taper),
+                without_mean(series, &self.taper_slope),
+            ]
+        });
+        let mut spectra = self.sums(&both.collect::<Vec<_>>()).into_iter();
+        std::iter::from_fn(|| {
+            Some(Shifted {
+                spectrum: spectra.next()?,
+                edges: spectra.next()?,
+            })
+        })
+        .collect()
+    }
+
+    /// Fourier sums of series, each a spectrum; all at once, which fills the processor's vectors.
+    fn sums(&self, series: &[Vec<f64>]) -> Vec<Spectrum> {
         let (sums, count) = (self.harmonics.sums(series), self.harmonics.len());
         let spectrum = |column: usize| {
             let sum = |k: usize| Complex::new(sums[(k, column)], sums[(count + k, column)]);
             (0..count).map(sum).collect()
         };
-        std::array::from_fn(spectrum)
+        (0..series.len()).map(spectrum).collect()
     }
 }
 
@@ -113,14 +131,6 @@ pub struct Shifted {
 }
 
 impl Shifted {
-    pub fn new(band: &Band, series: &[f64]) -> Shifted {
-        let [spectrum, edges] = band.sums(&[
-            without_mean(series, &band.taper),
-            without_mean(series, &band.taper_slope),
-        ]);
-        Shifted { spectrum, edges }
-    }
-
     /// Spectrum of the series `delay_s` later, and its slope along the delay, 1/s.
     pub fn at(&self, frequencies_hz: &[f64], delay_s: f64) -> (Spectrum, Spectrum) {
         let all = frequencies_hz.iter().zip(&self.spectrum).zip(&self.edges);
@@ -160,17 +170,17 @@ mod tests {
     #[test]
     fn a_late_series_is_shifted_back() {
         let band = Band::new(700, STEP_S).unwrap();
-        let exact = band.spectrum(&series(0.0));
-        let late = Shifted::new(&band, &series(0.012));
+        let exact = &band.spectra(&[series(0.0)])[0];
+        let late = &band.shifted(&[series(0.5), series(0.012)])[1];
         let (shifted, _) = late.at(&band.frequencies_hz(), 0.012);
         let (recorded, _) = late.at(&band.frequencies_hz(), 0.0);
-        assert!(distance(&shifted, &exact) < 0.01 * distance(&recorded, &exact));
+        assert!(distance(&shifted, exact) < 0.01 * distance(&recorded, exact));
     }
 
     #[test]
     fn the_slope_along_the_delay_is_that_of_the_shifted_spectrum() {
         let band = Band::new(700, STEP_S).unwrap();
-        let late = Shifted::new(&band, &series(0.0));
+        let late = &band.shifted(&[series(0.0)])[0];
         let frequencies_hz = band.frequencies_hz();
         let (before, after) = (
             late.at(&frequencies_hz, 0.009_999).0,
@@ -190,7 +200,8 @@ mod tests {
             .map(|k| (2.0 * PI * 10.0 * k as f64 / samples as f64).sin())
             .collect();
         let band = Band::new(samples, STEP_S).unwrap();
-        let power: Vec<f64> = band.spectrum(&sine).iter().map(|x| x.norm()).collect();
+        let power = band.spectra(&[sine])[0].clone();
+        let power: Vec<f64> = power.iter().map(|x| x.norm()).collect();
         let all = power.iter().enumerate();
         let (at, largest) = all.max_by(|a, b| a.1.total_cmp(b.1)).unwrap();
         assert_abs_diff_eq!(band.frequencies_hz()[at], 0.5, epsilon = 1e-12);

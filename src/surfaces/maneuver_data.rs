@@ -87,12 +87,10 @@ impl ManeuverData {
         let case = Case::<NX, E>::new(basis.aircraft, &window, Measurements::default(), &model);
         let frequencies_hz = band.frequencies_hz();
         let slope_response = slope_response(&frequencies_hz, record.step_s);
-        let mut columns = BTreeMap::new();
-        let mut term = |j: usize| {
+        let regressors = regressors(&band, &case);
+        let term = |j: usize| {
             let derivative = basis.buildup.derivative(&case.names[j])?;
-            let regressor = columns
-                .entry(case.terms[j].column)
-                .or_insert_with(|| Shifted::new(&band, &case.measured_regressor(j)));
+            let regressor = regressors.get(&case.terms[j].column)?;
             let condition = maneuver.condition(basis.tunnel);
             Some(TermData {
                 regressor: regressor.clone(),
@@ -104,16 +102,17 @@ impl ManeuverData {
                 size: basis.tunnel.root_mean_square(&derivative.name),
             })
         };
-        let coefficients = (0..COEFFICIENTS)
-            .map(|k| {
-                let implied: Vec<f64> = case.implied.iter().map(|implied| implied[k]).collect();
-                let mut implied = band.spectrum(&implied);
+        let implied = |k: usize| case.motion.implied.iter().map(|c| c[k]).collect();
+        let implied: Vec<Vec<f64>> = (0..COEFFICIENTS).map(implied).collect();
+        let coefficients = band.spectra(&implied).into_iter().enumerate();
+        let coefficients = coefficients
+            .map(|(k, mut implied)| {
                 if E::AXIS.coefficients()[k].is_moment() {
                     divide(&mut implied, &slope_response);
                 }
                 CoefficientData {
                     implied,
-                    terms: case.ranges[k].clone().filter_map(&mut term).collect(),
+                    terms: case.ranges[k].clone().filter_map(&term).collect(),
                 }
             })
             .collect();
@@ -123,6 +122,20 @@ impl ManeuverData {
             coefficients,
         })
     }
+}
+
+/// Spectra of the distinct columns of regressors.
+fn regressors<const NX: usize, E: Equations<NX>>(
+    band: &Band,
+    case: &Case<NX, E>,
+) -> BTreeMap<usize, Shifted> {
+    let columns = case.terms.iter().enumerate();
+    let first: BTreeMap<usize, usize> = columns.rev().map(|(j, term)| (term.column, j)).collect();
+    let series: Vec<Vec<f64>> = first
+        .values()
+        .map(|j| case.measured_regressor(*j))
+        .collect();
+    first.into_keys().zip(band.shifted(&series)).collect()
 }
 
 /// Derivatives of an axis without the constants, which the mean removes, and without surfaces that

@@ -193,12 +193,11 @@ impl<const NX: usize, E: Equations<NX>> Fitted<'_, NX, E> {
             initial_state: InitialState::Measured,
             ..Model::default()
         };
-        let mut case = Case::<NX, E>::new(
-            self.aircraft,
-            window,
-            self.case.measurements.clone(),
-            &model,
-        );
+        let windows = [self.window, window];
+        let measurements = self.case.measurements.clone();
+        let mut case = self
+            .case
+            .as_recorded(self.aircraft, windows, measurements, &model);
         if self.case.initial_state == InitialState::Estimated {
             let first = self.values.len() - NX;
             case.start.copy_from_slice(&self.values[first..]);
@@ -247,8 +246,7 @@ impl<'a> SurfaceErrors<'a> {
             initial_state: case.initial_state,
         };
         let window = fitted.window.with_constant(ONE, 1.0);
-        let measurements = case.measurements.clone();
-        let mut wide = Case::<NX, E>::new(fitted.aircraft, &window, measurements, &wide);
+        let mut wide = case.with_model(fitted.aircraft, &window, &wide);
         wide.start = case.start;
         let values = wide
             .names

@@ -167,7 +167,7 @@ impl<const NX: usize, E: Equations<NX>> Adjoint<'_, NX, E> {
     #[inline(always)]
     fn slopes(&self, k: usize, samples: usize) -> BlockSlopes<NX> {
         let case = self.case;
-        let x = &case.states[k];
+        let x = &case.motion.states[k];
         let build_up = case.build_up_at(self.parameters, 2 * k);
         let c = build_up.coefficients(x);
         let mut c_by_state = SMatrix::<f64, COEFFICIENTS, NX>::zeros();
@@ -176,8 +176,13 @@ impl<const NX: usize, E: Equations<NX>> Adjoint<'_, NX, E> {
                 c_by_state[(k, i)] = build_up.slope[k][i];
             }
         }
-        let rates = E::rates(&case.rate_inputs[2 * k], x, &c);
-        let read = E::outputs(&case.rate_inputs[2 * k], &case.sensor_inputs[k], x, &c);
+        let rates = E::rates(&case.motion.rate_inputs[2 * k], x, &c);
+        let read = E::outputs(
+            &case.motion.rate_inputs[2 * k],
+            &case.motion.sensor_inputs[k],
+            x,
+            &c,
+        );
         let half_s = 0.5 * samples as f64 * case.step_s;
         let a = (rates.by_state + rates.by_coefficient * c_by_state) * half_s;
         let square = a * a;
@@ -204,7 +209,7 @@ impl<const NX: usize, E: Equations<NX>> Adjoint<'_, NX, E> {
         let mut covariance = [[0.0; COEFFICIENTS]; COEFFICIENTS];
         if self.case.pressure_variance > 0.0 {
             let build_up = self.case.build_up_at(self.parameters, 2 * k);
-            let effects = build_up.coefficients(&self.case.states[k]);
+            let effects = build_up.coefficients(&self.case.motion.states[k]);
             add_product(&mut covariance, self.case.pressure_variance, &effects);
         }
         for surface in &self.case.noisy_surfaces {

@@ -5,12 +5,14 @@
 //! The derivatives of one coefficient form a group of whole vectors, so one coefficient's slope
 //! serves all lanes of a vector. Derivatives along a state come first, in the order of the states,
 //! then those along products of a state: the same lanes of each group. All groups are equally long.
-//! Initial states are the last group. Two spare lanes hold the residual and a one while sums are
-//! taken.
+//! Parameters without a regressor, such as initial states, are the last group. Two spare lanes hold the
+//! residual and a one while sums are taken.
 //!
 //! Regressors stand in rows, point by point. Where the columns of all coefficients fit into the
 //! widest group, all groups read the same part of a row: most derivatives come three at a time, one
 //! of each coefficient, along the same surface. Lanes without a parameter are computed and ignored.
+//! In a dense layout each group has regressors of its own, zero in the lanes that no derivative takes;
+//! there other parameters stand.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -63,12 +65,31 @@ impl LaneLayout {
         biases: usize,
     ) -> LaneLayout {
         let slots = GroupSlots::new(terms, followed);
-        let mut layout = LaneLayout::with_groups(&slots);
+        let mut layout = LaneLayout::with_terms(terms, followed, &slots);
+        layout.place_others(initial_states);
+        layout.place_spare_lanes(biases);
+        layout
+    }
+
+    /// Layout that fills the groups of the coefficients with the other parameters, which are many.
+    pub fn dense(terms: &[Term], followed: &[usize], others: usize) -> LaneLayout {
+        let slots = GroupSlots::new(terms, followed).apart(terms);
+        let mut layout = LaneLayout::with_terms(terms, followed, &slots);
+        let free = (0..layout.groups[COEFFICIENTS - 1].end)
+            .filter(|lane| !layout.parameter_lanes.contains(lane))
+            .take(others);
+        let free: Vec<usize> = free.collect();
+        layout.parameter_lanes.extend(&free);
+        layout.place_others(others - free.len());
+        layout.place_spare_lanes(0);
+        layout
+    }
+
+    fn with_terms(terms: &[Term], followed: &[usize], slots: &GroupSlots) -> LaneLayout {
+        let mut layout = LaneLayout::with_groups(slots);
         let products = slots.along_states.iter().enumerate().skip(followed.len());
         layout.products = products.map(|(slot, (state, _))| (slot, *state)).collect();
-        layout.place_terms(terms, &slots);
-        layout.place_initial_states(initial_states);
-        layout.place_spare_lanes(biases);
+        layout.place_terms(terms, slots);
         layout
     }
 
@@ -101,7 +122,8 @@ impl LaneLayout {
         self.columns.dedup();
     }
 
-    fn place_initial_states(&mut self, count: usize) {
+    /// Places parameters behind the groups of the coefficients.
+    fn place_others(&mut self, count: usize) {
         let first = self.groups[COEFFICIENTS - 1].end;
         self.groups[COEFFICIENTS] = first..first + padded(count);
         self.parameter_lanes.extend(first..first + count);
@@ -176,6 +198,15 @@ impl GroupSlots {
             columns,
             width,
             shared,
+        }
+    }
+
+    /// Slots of groups that share no columns.
+    fn apart(self, terms: &[Term]) -> GroupSlots {
+        GroupSlots {
+            columns: std::array::from_fn(|k| columns_of(terms, k)),
+            shared: false,
+            ..self
         }
     }
 

@@ -15,6 +15,7 @@ pub mod surface_noise;
 
 use std::marker::PhantomData;
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::SVector;
 
@@ -75,8 +76,8 @@ impl Model<'_> {
 #[derive(Debug)]
 pub struct Case<const NX: usize, E: Equations<NX>> {
     pub(crate) step_s: f64,
-    pub(crate) rate_inputs: Vec<E::RateInputs>,
-    pub(crate) sensor_inputs: Vec<E::SensorInputs>,
+    /// Measured motion, which cases of one maneuver share.
+    pub(crate) motion: Arc<PreparedMotion<NX, E>>,
     /// Build-up of the held derivatives.
     pub(crate) held: BuildUp<NX>,
     /// Distinct regressors and factors of proportion, each at every point.
@@ -91,12 +92,6 @@ pub struct Case<const NX: usize, E: Equations<NX>> {
     /// State at which the integration starts unless it is estimated.
     pub(crate) start: SVector<f64, NX>,
     pub(crate) initial_state: InitialState,
-    /// Measured states at every sample.
-    pub(crate) states: Vec<SVector<f64, NX>>,
-    /// Coefficients that the measured motion implies at every sample.
-    pub(crate) implied: Vec<[f64; COEFFICIENTS]>,
-    /// The same without the part that is proportional to the angular accelerations.
-    pub(crate) implied_without_accelerations: Vec<[f64; COEFFICIENTS]>,
     /// Surfaces whose noise the corrected bounds count; empty by default.
     pub noisy_surfaces: Vec<NoisySurface>,
     /// Relative variance of the dynamic pressure's noise that the corrected bounds count; zero by
@@ -117,6 +112,50 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         measurements: Measurements,
         model: &Model,
     ) -> Self {
+        let motion = Arc::new(PreparedMotion::new(aircraft, window));
+        Case::of_motion(motion, aircraft, window, measurements, model)
+    }
+
+    /// Prepares the same maneuver with another model. `window` may have other surfaces than this case's,
+    /// but the same motion.
+    #[must_use]
+    pub fn with_model(&self, aircraft: &Aircraft, window: &Window, model: &Model) -> Self {
+        let measurements = self.measurements.clone();
+        Case::of_motion(
+            Arc::clone(&self.motion),
+            aircraft,
+            window,
+            measurements,
+            model,
+        )
+    }
+
+    /// Prepares the same maneuver as another recorder would have recorded it. `windows` are the case's own
+    /// one and that of the other recorder.
+    #[must_use]
+    pub fn as_recorded(
+        &self,
+        aircraft: &Aircraft,
+        windows: [&Window; 2],
+        measurements: Measurements,
+        model: &Model,
+    ) -> Self {
+        let [own, window] = windows;
+        if window.shares_motion_with(own) {
+            let motion = Arc::clone(&self.motion);
+            Case::of_motion(motion, aircraft, window, measurements, model)
+        } else {
+            Case::new(aircraft, window, measurements, model)
+        }
+    }
+
+    fn of_motion(
+        motion: Arc<PreparedMotion<NX, E>>,
+        aircraft: &Aircraft,
+        window: &Window,
+        measurements: Measurements,
+        model: &Model,
+    ) -> Self {
         let mut free = model.free.clone();
         free.sort_by_key(|d| d.coefficient.index());
         let mut columns = RegressorColumns::<NX, E>::new(aircraft, window);
@@ -126,7 +165,6 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
             value: *value,
         });
         let held: Vec<ValuedTerm> = held.collect();
-        let motion = PreparedMotion::<NX, E>::new(aircraft, window);
         let columns = columns.values(&motion);
         let biased_outputs = model.biased_outputs::<NX, E>();
         let initial_states = match model.initial_state {
@@ -141,8 +179,6 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         );
         Case {
             step_s: window.step_s,
-            rate_inputs: motion.rate_inputs,
-            sensor_inputs: motion.sensor_inputs,
             held: build_up_of(&held, &columns),
             columns,
             ranges: ranges_by_coefficient(&terms),
@@ -150,10 +186,8 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
             layout,
             biased_outputs,
             start: mean(motion.states.iter().take(TRIMMED_SAMPLES)),
+            motion,
             initial_state: model.initial_state,
-            states: motion.states,
-            implied: motion.implied,
-            implied_without_accelerations: motion.without_accelerations,
             noisy_surfaces: vec![],
             pressure_variance: 0.0,
             measurements,
@@ -164,7 +198,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
 
     /// Starts the integration at the mean of the first measured states.
     pub fn start_from_mean_of(&mut self, samples: usize) {
-        self.start = mean(self.states.iter().take(samples));
+        self.start = mean(self.motion.states.iter().take(samples));
     }
 
     #[must_use]
@@ -194,7 +228,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     #[must_use]
     pub fn measured_regressor(&self, derivative: usize) -> Vec<f64> {
         let term = self.terms[derivative];
-        let states = self.states.iter().enumerate();
+        let states = self.motion.states.iter().enumerate();
         states
             .map(|(sample, x)| self.regressor(term, 2 * sample, x))
             .collect()

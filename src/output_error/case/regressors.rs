@@ -16,14 +16,20 @@ use crate::flight::signal;
 use crate::units::DEG;
 
 /// Measured motion of a window, prepared for the equations of one axis.
-pub(super) struct PreparedMotion<const NX: usize, E: Equations<NX>> {
+#[derive(Debug)]
+pub(crate) struct PreparedMotion<const NX: usize, E: Equations<NX>> {
+    /// At every point.
     pub rate_inputs: Vec<E::RateInputs>,
     /// α and β at the c.g. at every point, rad.
     flow: Vec<[f64; 2]>,
+    /// At every sample.
     pub sensor_inputs: Vec<E::SensorInputs>,
+    /// Measured states at every sample.
     pub states: Vec<SVector<f64, NX>>,
+    /// Coefficients that the motion implies at every sample.
     pub implied: Vec<[f64; COEFFICIENTS]>,
-    pub without_accelerations: Vec<[f64; COEFFICIENTS]>,
+    /// The same without the part that is proportional to the angular accelerations.
+    pub implied_without_accelerations: Vec<[f64; COEFFICIENTS]>,
 }
 
 impl<const NX: usize, E: Equations<NX>> PreparedMotion<NX, E> {
@@ -35,7 +41,7 @@ impl<const NX: usize, E: Equations<NX>> PreparedMotion<NX, E> {
             sensor_inputs: Vec::with_capacity(samples),
             states: Vec::with_capacity(samples),
             implied: Vec::with_capacity(samples),
-            without_accelerations: Vec::with_capacity(samples),
+            implied_without_accelerations: Vec::with_capacity(samples),
         };
         Arch::new().dispatch(Preparation {
             aircraft,
@@ -80,7 +86,7 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Preparation<'_, NX, E> {
                 prepared.implied.push(implied);
                 let rest = motion.without_angular_accelerations(aircraft);
                 let rest = E::implied_coefficients(aircraft, &rest, &inputs);
-                prepared.without_accelerations.push(rest);
+                prepared.implied_without_accelerations.push(rest);
             }
             prepared.rate_inputs.push(inputs);
         }

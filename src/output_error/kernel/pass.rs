@@ -221,15 +221,15 @@ pub(crate) trait Correction<const NX: usize> {
     /// of the step's first stage.
     fn output_factors(&self, k: usize) -> Option<&[f64; VECTOR]>;
 
-    /// Corrects the sensitivities `s` of the states in the vector at a lane, after those of the
+    /// Corrects the sensitivities `s` of the states in the vectors at some lanes, after those of the
     /// outputs, `y`, were taken at the chunk's sample k. `y` becomes what the sink receives.
-    fn correct<S: Simd>(
+    fn correct<S: Simd, const N: usize>(
         &self,
         simd: S,
         k: usize,
-        lane: usize,
-        s: &mut [S::f64s; NX],
-        y: &mut [S::f64s; OUTPUTS],
+        lanes: [usize; N],
+        s: &mut [[S::f64s; NX]; N],
+        y: &mut [[S::f64s; OUTPUTS]; N],
     );
 }
 
@@ -243,13 +243,13 @@ impl<const NX: usize> Correction<NX> for Uncorrected {
     }
 
     #[inline(always)]
-    fn correct<S: Simd>(
+    fn correct<S: Simd, const N: usize>(
         &self,
         _: S,
         _: usize,
-        _: usize,
-        _: &mut [S::f64s; NX],
-        _: &mut [S::f64s; OUTPUTS],
+        _: [usize; N],
+        _: &mut [[S::f64s; NX]; N],
+        _: &mut [[S::f64s; OUTPUTS]; N],
     ) {
     }
 }
@@ -287,82 +287,80 @@ impl<S: Simd, const NX: usize, K: Correction<NX>> Propagation<'_, S, NX, K> {
     /// Propagates one vector of each of some groups, which begins at a lane of the group.
     #[inline(always)]
     fn propagate<E: Equations<NX>, const N: usize>(&mut self, lane: usize, groups: [usize; N]) {
-        let width = self.layout.width();
+        let vectors = self.layout.width() / S::F64_LANES;
+        let lanes = groups.map(|group| self.layout.groups[group].start + lane);
+        let places = groups.map(|group| match self.layout.regressors.get(group) {
+            Some(first) => (first + lane) / S::F64_LANES,
+            None => 0,
+        });
         let mut s = [[self.simd.splat_f64s(0.0); NX]; N];
         for n in 0..N {
             for i in 0..NX {
-                s[n][i] = self.sensitivities
-                    [(i * width + self.layout.groups[groups[n]].start + lane) / S::F64_LANES];
+                s[n][i] = self.sensitivities[i * vectors + lanes[n] / S::F64_LANES];
             }
         }
         for k in 0..self.count {
-            let r = self.regressors_at::<N>(lane, groups, k);
+            let (r, mut y) = self.read::<E, N>(k, lane, groups, places, &s);
+            self.correction.correct(self.simd, k, lanes, &mut s, &mut y);
             for n in 0..N {
-                let mut y = output_sensitivities::<S, NX, E>(
-                    self.simd,
-                    groups[n],
-                    self.propagators,
-                    k,
-                    &s[n],
-                    self.output_regressor(lane, groups[n], k).unwrap_or(r[n][0]),
-                );
-                let at = self.layout.groups[groups[n]].start + lane;
-                self.correction.correct(self.simd, k, at, &mut s[n], &mut y);
+                let first = k * OUTPUTS * vectors + lanes[n] / S::F64_LANES;
                 for o in 0..OUTPUTS {
-                    self.rows[((k * OUTPUTS + o) * width + at) / S::F64_LANES] = y[o];
+                    self.rows[first + o * vectors] = y[n][o];
                 }
             }
             s = next_sensitivities::<S, NX, E, N>(self.simd, groups, self.propagators, k, &s, &r);
         }
         for n in 0..N {
             for i in 0..NX {
-                self.sensitivities
-                    [(i * width + self.layout.groups[groups[n]].start + lane) / S::F64_LANES] =
-                    s[n][i];
+                self.sensitivities[i * vectors + lanes[n] / S::F64_LANES] = s[n][i];
             }
         }
     }
 
-    /// Regressor of a group's lanes in the outputs, where it is not that of the step's first stage.
+    /// Regressors of some groups' lanes at the stages of a step, zero for initial states, and the
+    /// sensitivities of the outputs.
     #[inline(always)]
-    fn output_regressor(&self, lane: usize, group: usize, k: usize) -> Option<S::f64s> {
-        if lane >= VECTOR || group == COEFFICIENTS {
-            return None;
-        }
-        let factors = load::<S>(self.correction.output_factors(k)?, lane);
-        let place = 2 * k * self.layout.row + self.layout.regressors[group] + lane;
-        Some(
-            self.simd
-                .mul_f64s(self.regressors[place / S::F64_LANES], factors),
-        )
-    }
-
-    /// Regressors of some groups' lanes at the stages of a step; zero for initial states.
-    #[inline(always)]
-    fn regressors_at<const N: usize>(
+    fn read<E: Equations<NX>, const N: usize>(
         &self,
+        k: usize,
         lane: usize,
         groups: [usize; N],
-        k: usize,
-    ) -> [[S::f64s; STAGES]; N] {
-        let mut r = [[self.simd.splat_f64s(0.0); STAGES]; N];
+        places: [usize; N],
+        s: &[[S::f64s; NX]; N],
+    ) -> ([[S::f64s; STAGES]; N], [[S::f64s; OUTPUTS]; N]) {
+        let zero = self.simd.splat_f64s(0.0);
+        let (mut r, mut y) = ([[zero; STAGES]; N], [[zero; OUTPUTS]; N]);
         for n in 0..N {
-            if groups[n] == COEFFICIENTS {
-                continue;
+            let mut in_outputs = None;
+            if groups[n] != COEFFICIENTS {
+                let points = self.points(k, places[n]);
+                for stage in 0..STAGES {
+                    r[n][stage] = points[POINT[stage]];
+                    if lane < VECTOR {
+                        let factors = load::<S>(&self.history.factors[stage][k], lane);
+                        r[n][stage] = self.simd.mul_f64s(r[n][stage], factors);
+                    }
+                }
+                if let Some(factors) = self.correction.output_factors(k)
+                    && lane < VECTOR
+                {
+                    let factors = load::<S>(factors, lane);
+                    in_outputs = Some(self.simd.mul_f64s(points[0], factors));
+                }
             }
-            for stage in 0..STAGES {
-                let row = (2 * k + POINT[stage]) * self.layout.row;
-                let regressor = self.regressors
-                    [(row + self.layout.regressors[groups[n]] + lane) / S::F64_LANES];
-                r[n][stage] = if lane < VECTOR {
-                    let factors = load::<S>(&self.history.factors[stage][k], lane);
-                    self.simd.mul_f64s(regressor, factors)
-                } else {
-                    regressor
-                };
-            }
+            let in_outputs = in_outputs.unwrap_or(r[n][0]);
+            let at = self.propagators;
+            y[n] = output_sensitivities::<S, NX, E>(self.simd, groups[n], at, k, &s[n], in_outputs);
         }
-        r
+        (r, y)
+    }
+
+    /// Regressors of a vector at the start, the middle and the end of a step.
+    #[inline(always)]
+    fn points(&self, k: usize, place: usize) -> [S::f64s; 3] {
+        let row = self.layout.row / S::F64_LANES;
+        let from = &self.regressors[2 * k * row + place..];
+        [from[0], from[row], from[2 * row]]
     }
 }
 

@@ -58,8 +58,8 @@ impl<const NX: usize> Propagators<NX> {
         k: usize,
     ) -> [f64; OUTPUTS] {
         let c = build_up.coefficients::<E>(2 * k, x);
-        let inputs = &case.rate_inputs[2 * sample];
-        let read = E::outputs(inputs, &case.sensor_inputs[sample], x, &c);
+        let inputs = &case.motion.rate_inputs[2 * sample];
+        let read = E::outputs(inputs, &case.motion.sensor_inputs[sample], x, &c);
         for &(o, c) in E::OUTPUTS_BY_COEFFICIENT {
             self.d[o][c][k] = read.by_coefficient[(o, c)];
         }

@@ -115,6 +115,24 @@ impl<'a, const NX: usize, E: Equations<NX>> Trajectory<'a, NX, E> {
         self.x
     }
 
+    /// Returns the state a step after the sample `k`, whose state is corrected to `x`, and records
+    /// nothing.
+    #[inline(always)]
+    pub fn state_after(&self, k: usize, x: SVector<f64, NX>) -> SVector<f64, NX> {
+        let (mut at, mut next) = (x, x);
+        for stage in 0..STAGES {
+            let point = 2 * k + POINT[stage];
+            let c = self.build_up.coefficients::<E>(point, &at);
+            let inputs = &self.case.motion.rate_inputs[self.points.index(point)];
+            let rates = E::rates(inputs, &at, &c).rates;
+            for i in 0..NX {
+                next[i] = rates[i].mul_add(self.weights_s[stage], next[i]);
+                at[i] = rates[i].mul_add(self.reaches_s[stage], x[i]);
+            }
+        }
+        next
+    }
+
     /// Integrates to the end of the chunk and returns the state there.
     #[inline(always)]
     pub fn finish(mut self) -> SVector<f64, NX> {
@@ -150,7 +168,7 @@ impl<const NX: usize, E: Equations<NX>> Interleaved for Trajectory<'_, NX, E> {
         let (sample, stage) = (self.sample, self.stage);
         let point = 2 * sample + POINT[stage];
         let c = self.build_up.coefficients::<E>(point, &self.at);
-        let inputs = &self.case.rate_inputs[self.points.index(point)];
+        let inputs = &self.case.motion.rate_inputs[self.points.index(point)];
         let rates = E::rates(inputs, &self.at, &c);
         for i in 0..NX {
             self.next[i] = rates.rates[i].mul_add(self.weights_s[stage], self.next[i]);

@@ -82,8 +82,10 @@ fn shift_constant<const NX: usize, E: Equations<NX>>(
     let build_up = case.build_up(values);
     let mut error = 0.0;
     for sample in (0..case.samples()).filter(|&sample| kept[sample]) {
-        let computed = build_up.at(2 * sample).coefficients(&case.states[sample]);
-        error += case.implied[sample][coefficient] - computed[coefficient];
+        let computed = build_up
+            .at(2 * sample)
+            .coefficients(&case.motion.states[sample]);
+        error += case.motion.implied[sample][coefficient] - computed[coefficient];
     }
     values[constant] += error / count as f64;
 }
@@ -108,7 +110,13 @@ fn regress_coefficient<const NX: usize, E: Equations<NX>>(
         DMatrix::zeros(range.len(), range.len()),
         DVector::zeros(range.len()),
     );
-    for (sample, (state, implied)) in case.states.iter().zip(&case.implied).enumerate() {
+    for (sample, (state, implied)) in case
+        .motion
+        .states
+        .iter()
+        .zip(&case.motion.implied)
+        .enumerate()
+    {
         let computed = build_up.at(2 * sample).coefficients(state);
         case.regressors_at(2 * sample, state, &mut regressors);
         let error = implied[coefficient] - computed[coefficient];
@@ -260,9 +268,9 @@ fn implied_without_accelerations<const NX: usize, E: Equations<NX>>(
     case: &Case<NX, E>,
 ) -> Vec<Vec<f64>> {
     let mut series = vec![vec![]; COEFFICIENTS];
-    for (sample, state) in case.states.iter().enumerate() {
+    for (sample, state) in case.motion.states.iter().enumerate() {
         let held = case.held.at(2 * sample).coefficients(state);
-        let rest = case.implied_without_accelerations[sample];
+        let rest = case.motion.implied_without_accelerations[sample];
         for (k, series) in series.iter_mut().enumerate() {
             series.push(rest[k] - held[k]);
         }
@@ -279,8 +287,8 @@ fn add_accelerations<const NX: usize, E: Equations<NX>>(
 ) {
     for (k, series) in series.iter_mut().take(COEFFICIENTS).enumerate() {
         for (value, sample) in series.iter_mut().zip(samples.clone()) {
-            let rest = case.implied_without_accelerations[sample][k];
-            *value += case.implied[sample][k] - rest;
+            let rest = case.motion.implied_without_accelerations[sample][k];
+            *value += case.motion.implied[sample][k] - rest;
         }
     }
 }
