@@ -5,19 +5,40 @@ use super::task::Task;
 use crate::dynamics::Equations;
 use crate::output_error::{Case, Fit, Outcome, equation_error, estimation};
 
+/// Starting values of a maneuver.
+#[derive(Clone)]
+pub(super) struct StartingPoints {
+    /// With the tunnel's derivatives.
+    pub tunnel: Vec<f64>,
+    /// With the derivatives that the measured accelerations imply.
+    pub implied: Vec<f64>,
+}
+
 impl Task<'_> {
+    /// Starting values; an error where nothing is free.
+    pub(super) fn starting_points<const NX: usize, E: Equations<NX>>(
+        &self,
+        case: &Case<NX, E>,
+    ) -> Result<StartingPoints, String> {
+        if case.parameters() == 0 {
+            return Err("nothing is free to be estimated".to_owned());
+        }
+        let tunnel = self.tunnel_start(case);
+        Ok(StartingPoints {
+            implied: equation_error::start(case, &tunnel),
+            tunnel,
+        })
+    }
+
     /// Estimates, without bounds, from the configured starting values, and from the other ones where the iteration
     /// does not converge.
     pub(super) fn fit<const NX: usize, E: Equations<NX>>(
         &self,
         case: &Case<NX, E>,
+        starts: &StartingPoints,
     ) -> Result<(Fit, Start), String> {
-        if case.parameters() == 0 {
-            return Err("nothing is free to be estimated".to_owned());
-        }
         let settings = self.context.settings;
-        let tunnel = self.tunnel_start(case);
-        let implied = equation_error::start(case, &tunnel);
+        let StartingPoints { tunnel, implied } = starts.clone();
         let (first, second, other_start) = match settings.start {
             Start::EquationError => (implied, tunnel, Start::WindTunnel),
             Start::WindTunnel => (tunnel, implied, Start::EquationError),

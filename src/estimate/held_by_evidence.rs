@@ -163,7 +163,9 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
         let mut last_fitted: Option<Vec<bool>> = None;
         for round in 0..ROUNDS {
             let narrow = self.with_held(&held);
-            let (fit, _) = self.task.fit(&narrow)?;
+            let (fit, _) = self
+                .task
+                .fit(&narrow, &self.task.starting_points(&narrow)?)?;
             if fit.outcome == Outcome::NotConverged {
                 if round > 0 {
                     // Return to the last choice that could be fitted.

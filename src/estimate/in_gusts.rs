@@ -83,17 +83,18 @@ impl<'a> Task<'a> {
 
     /// Estimates a maneuver by filter error, from still or from moving air as the residuals of output
     /// error are, then from the other; `None` where neither converges or the data determine no
-    /// covariance. `wide` has the held derivatives free as well. Where rotary gusts account for the rates, both are tried: they can be taken for
+    /// covariance. `wide` has the held derivatives free as well, and `implied` are the starting values by
+    /// equation error. Where rotary gusts account for the rates, both are tried: they can be taken for
     /// the rates' own effect.
     pub(super) fn filtered<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
         &self,
         prepared: &PreparedCase<'a, NX, E>,
         wide: &Case<NX, E>,
+        implied: Vec<f64>,
         output_error: &Fit,
     ) -> Option<Filtered> {
         let case = &prepared.case;
         let resolution = self.least_deviations(&case.measurements);
-        let implied = equation_error::start(case, &self.tunnel_start(case));
         let moving = (implied, Noise::starting(resolution));
         let still = (output_error.values.clone(), Noise::slight(resolution));
         let (first, second) = if is_white(&case.measurements, output_error) {

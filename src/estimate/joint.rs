@@ -220,7 +220,7 @@ fn estimate_members<const NX: usize, E: Equations<NX>>(
 /// Prepares a maneuver and estimates it alone.
 fn member<const NX: usize, E: Equations<NX>>(task: Task) -> Result<Member<NX, E>, String> {
     let prepared = task.prepare::<NX, E>(task.class_model()?)?;
-    let (mut alone, _) = task.fit(&prepared.case)?;
+    let (mut alone, _) = task.fit(&prepared.case, &task.starting_points(&prepared.case)?)?;
     estimation::add_bounds(&prepared.case, &mut alone, &task.context.settings.iteration);
     if alone.outcome == Outcome::NotConverged {
         return Err(format!("alone: {}", alone.reason));

@@ -80,12 +80,14 @@ impl Task<'_> {
     ) -> Result<Estimated, String> {
         let prepared = self.prepare::<NX, E>(self.class_model()?)?;
         let case = &prepared.case;
-        let (mut fit, start) = self.fit(case)?;
+        let starts = self.starting_points(case)?;
+        let (mut fit, start) = self.fit(case, &starts)?;
         let with_held_free = self.with_held_free(&prepared);
         let uncertainties = self.held_uncertainties(&prepared.model);
         let second = equation_error::regression(case, &with_held_free, &uncertainties);
         if self.needs_filter(&case.measurements, &fit)
-            && let Some(filtered) = self.filtered::<NX, E, NG, G>(&prepared, &with_held_free, &fit)
+            && let Some(filtered) =
+                self.filtered::<NX, E, NG, G>(&prepared, &with_held_free, starts.implied, &fit)
         {
             return Ok(self.estimated_in_gusts(&prepared, &filtered, &second));
         }

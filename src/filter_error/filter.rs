@@ -652,3 +652,40 @@ fn patterns(used: &[[bool; OUTPUTS]]) -> (Vec<Pattern>, Vec<u8>) {
     }
     (patterns, of_sample)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::gains::{Gain, GainSlope};
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn traces_of_the_covariance_s_slopes_are_those_of_the_matrices() {
+        let wave = |n: usize, i: usize, j: usize| (0.3 + (n + 2 * i + 3 * j) as f64).sin();
+        let innovations = |n: usize| {
+            let half = Outputs::from_fn(|i, j| wave(n, i, j));
+            half + half.transpose()
+        };
+        let slope = |n: usize| GainSlope {
+            parameter: n,
+            gain: Gain::<4>::zeros(),
+            innovations: innovations(n),
+        };
+        let inverse = Outputs::from_fn(|i, j| if i == j { 2.0 } else { 0.3 });
+        let gain = PatternGain {
+            inverse,
+            slopes: (0..3).map(slope).collect(),
+            ..PatternGain::none()
+        };
+        let excess = Outputs::from_fn(|i, j| wave(7, j, i));
+        let traces = covariance_traces(&gain, &excess).to_dense();
+        for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+            let exact = (inverse * innovations(i) * inverse * innovations(j)).trace();
+            assert_relative_eq!(traces[(i, j)], exact, max_relative = 1e-12);
+        }
+        for j in 0..3 {
+            let exact = (excess * inverse * innovations(j)).trace();
+            assert_relative_eq!(traces[(3, j)], exact, max_relative = 1e-12);
+        }
+    }
+}

@@ -148,6 +148,10 @@ fn assert_gradient_matches_differences<const NX: usize, E: InGusts<NX>>() {
     }
     let response = filter.respond(&at).unwrap();
     let (gradient, information) = (response.gradient(), response.information());
+    // A pass without sensitivities takes the same steps.
+    let alone = filter.innovations(&at).unwrap();
+    assert_eq!(alone.whitened, response.whitened);
+    assert_eq!(alone.predicted, response.predicted);
     let cost = |j: usize, d: f64| {
         let mut moved = at.clone();
         moved[j] += d;

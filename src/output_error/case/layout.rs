@@ -250,3 +250,45 @@ fn columns_of(terms: &[Term], coefficient: usize) -> Vec<usize> {
         .filter(|term| term.coefficient == coefficient && term.state.is_none());
     own.map(|term| term.column).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn in_a_dense_layout_other_parameters_stand_where_no_regressor_is() {
+        let term = |coefficient, state, column| Term {
+            coefficient,
+            state,
+            column,
+        };
+        let terms = [
+            term(0, Some(0), 0),
+            term(0, None, 1),
+            term(0, None, 2),
+            term(1, Some(3), 3),
+            term(1, None, 2),
+            term(2, None, 4),
+        ];
+        for others in [3, 30] {
+            let layout = LaneLayout::dense(&terms, &[0, 3], others);
+            let mut lanes = layout.parameter_lanes.clone();
+            assert_eq!(lanes.len(), terms.len() + others);
+            lanes.sort_unstable();
+            lanes.dedup();
+            assert_eq!(lanes.len(), terms.len() + others);
+            assert!(lanes.iter().all(|lane| *lane < layout.width()));
+            for lane in &layout.parameter_lanes[terms.len()..] {
+                let group = layout.groups.iter().position(|g| g.contains(lane)).unwrap();
+                let Some(first) = layout.regressors.get(group) else {
+                    continue;
+                };
+                let place = first + lane - layout.groups[group].start;
+                assert!(layout.columns.iter().all(|(taken, _)| *taken != place));
+            }
+        }
+        // Three lanes are spare in the first group alone.
+        let few = LaneLayout::dense(&terms, &[0, 3], 3);
+        assert!(few.groups[COEFFICIENTS].is_empty());
+    }
+}
