@@ -295,13 +295,11 @@ impl<'a> Task<'a> {
             (known.bias > 0.0).then_some(known.bias)
         };
         let biases: Vec<Option<f64>> = model.biases.iter().map(|b| uncertainty(b.output)).collect();
-        match like {
-            Some(filter) => filter.with_model(aircraft, window, model, &biases),
-            None => {
-                let measurements = prepared.case.measurements.clone();
-                Filter::new(aircraft, window, measurements, model, &biases)
-            }
+        if let Some(filter) = like {
+            return filter.with_model(aircraft, window, model, &biases);
         }
+        let measurements = prepared.case.measurements.clone();
+        Filter::new(aircraft, window, measurements, model, &biases)
     }
 
     /// Standard deviations of the outputs' own noise: of the second differences of the measured

@@ -1,10 +1,6 @@
 //! Products of matrices of a few rows, whose sizes the compiler knows. The library's product packs
 //! and allocates from six rows on, which costs more than the product.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
-#![expect(
-    clippy::needless_range_loop,
-    reason = "plain indices become straight code for the vectors"
-)]
 
 use nalgebra::{ArrayStorage, SMatrix};
 

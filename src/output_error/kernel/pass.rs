@@ -300,7 +300,8 @@ impl<S: Simd, const NX: usize, K: Correction<NX>> Propagation<'_, S, NX, K> {
             }
         }
         for k in 0..self.count {
-            let (r, mut y) = self.read::<E, N>(k, lane, groups, places, &s);
+            let mut r = [[self.simd.splat_f64s(0.0); STAGES]; N];
+            let mut y = self.read::<E, N>(k, lane, groups, places, &s, &mut r);
             self.correction.correct(self.simd, k, lanes, &mut s, &mut y);
             for n in 0..N {
                 let first = k * OUTPUTS * vectors + lanes[n] / S::F64_LANES;
@@ -317,8 +318,8 @@ impl<S: Simd, const NX: usize, K: Correction<NX>> Propagation<'_, S, NX, K> {
         }
     }
 
-    /// Regressors of some groups' lanes at the stages of a step, zero for initial states, and the
-    /// sensitivities of the outputs.
+    /// Sensitivities of the outputs for some groups' lanes. `r` receives the regressors at the stages of
+    /// the step, which stay zero for initial states.
     #[inline(always)]
     fn read<E: Equations<NX>, const N: usize>(
         &self,
@@ -327,9 +328,9 @@ impl<S: Simd, const NX: usize, K: Correction<NX>> Propagation<'_, S, NX, K> {
         groups: [usize; N],
         places: [usize; N],
         s: &[[S::f64s; NX]; N],
-    ) -> ([[S::f64s; STAGES]; N], [[S::f64s; OUTPUTS]; N]) {
-        let zero = self.simd.splat_f64s(0.0);
-        let (mut r, mut y) = ([[zero; STAGES]; N], [[zero; OUTPUTS]; N]);
+        r: &mut [[S::f64s; STAGES]; N],
+    ) -> [[S::f64s; OUTPUTS]; N] {
+        let mut y = [[self.simd.splat_f64s(0.0); OUTPUTS]; N];
         for n in 0..N {
             let mut in_outputs = None;
             if groups[n] != COEFFICIENTS {
@@ -352,7 +353,7 @@ impl<S: Simd, const NX: usize, K: Correction<NX>> Propagation<'_, S, NX, K> {
             let at = self.propagators;
             y[n] = output_sensitivities::<S, NX, E>(self.simd, groups[n], at, k, &s[n], in_outputs);
         }
-        (r, y)
+        y
     }
 
     /// Regressors of a vector at the start, the middle and the end of a step.

@@ -120,8 +120,8 @@ impl<'a, const NX: usize, E: Equations<NX>> Trajectory<'a, NX, E> {
     #[inline(always)]
     pub fn state_after(&self, k: usize, x: SVector<f64, NX>) -> SVector<f64, NX> {
         let (mut at, mut next) = (x, x);
-        for stage in 0..STAGES {
-            let point = 2 * k + POINT[stage];
+        for (stage, place) in POINT.into_iter().enumerate() {
+            let point = 2 * k + place;
             let c = self.build_up.coefficients::<E>(point, &at);
             let inputs = &self.case.motion.rate_inputs[self.points.index(point)];
             let rates = E::rates(inputs, &at, &c).rates;
