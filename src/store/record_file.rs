@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use arrow::array::{Array, ArrayRef, AsArray, Float64Array, RecordBatch, UInt8Array};
+use arrow::buffer::{BooleanBuffer, NullBuffer};
 use arrow::datatypes::{DataType, Field, Float64Type, Schema, UInt8Type};
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder, RowSelection,
@@ -237,11 +238,13 @@ impl SignalWriter {
         let values = self.pending.values.get(range.clone()).unwrap_or_default();
         let marks = self.pending.marks.get(range).unwrap_or_default();
         let values: ArrayRef = Arc::new(Float64Array::from(values.to_vec()));
-        let code = |mark: &Mark| (*mark != Mark::Measured).then_some(*mark as u8);
-        let marks = if marks.iter().all(|mark| *mark == Mark::Measured) {
+        let repaired = |k: usize| marks[k] != Mark::Measured;
+        let repaired = BooleanBuffer::collect_bool(marks.len(), repaired);
+        let marks = if repaired.count_set_bits() == 0 {
             UInt8Array::new_null(marks.len())
         } else {
-            marks.iter().map(code).collect()
+            let codes: Vec<u8> = marks.iter().map(|mark| *mark as u8).collect();
+            UInt8Array::new(codes.into(), Some(NullBuffer::new(repaired)))
         };
         let marks: ArrayRef = Arc::new(marks);
         for (writer, array, nullable) in [

@@ -8,6 +8,8 @@
 
 use std::ops::Range;
 
+use pulp::Arch;
+
 use crate::ingest::sample_count::whole_steps;
 use crate::ingest::settings::Spikes;
 use crate::numerics::order_statistics::{SIGMA_PER_MAD, lower_quantile_in_place};
@@ -36,6 +38,9 @@ const LINES_NOISE: f64 = 3.0;
 /// Stride of the samples from which the noise of a spell is estimated: a quarter of thousands is
 /// enough.
 const STRIDE: usize = 4;
+
+/// Samples that are looked at together: few of them have a candidate.
+const LOOKED_AT_ONCE: usize = 64;
 
 /// Least reach of a sample's surroundings, in samples: below it the local noise has no median.
 const LEAST_REACH: usize = 4;
@@ -73,15 +78,18 @@ pub fn remove(
     let reach = whole_steps(settings.window_s, step_s).max(LEAST_REACH);
     let mut spikes = Vec::new();
     for (range, floor) in floors {
-        let from = range.start.max(1);
+        let level = settings.deviations * floor;
         let to = range.end.min(values.len().saturating_sub(1));
-        let around = values.get(from - 1..=to).unwrap_or_default();
-        for (i, three) in around.windows(3).enumerate() {
-            let off_mean = (three[1] - 0.5 * (three[0] + three[2])).abs();
-            // Also false beside a gap.
-            let is_candidate = off_mean > settings.deviations * floor;
-            if is_candidate && is_spike(values, from + i, *floor, reach, settings) {
-                spikes.push(from + i);
+        for from in (range.start.max(1)..to).step_by(LOOKED_AT_ONCE) {
+            let part = &values[from - 1..=(from + LOOKED_AT_ONCE).min(to)];
+            if !has_candidate(part, level) {
+                continue;
+            }
+            for (i, three) in part.windows(3).enumerate() {
+                if is_candidate(three, level) && is_spike(values, from + i, *floor, reach, settings)
+                {
+                    spikes.push(from + i);
+                }
             }
         }
     }
@@ -93,6 +101,20 @@ pub fn remove(
         values[k] = value;
     }
     spikes
+}
+
+/// `true` where the second of three samples is off the mean of the others by more than a level. False
+/// beside a gap.
+fn is_candidate(three: &[f64], level: f64) -> bool {
+    (three[1] - 0.5 * (three[0] + three[2])).abs() > level
+}
+
+/// `true` where some sample between the first and the last is a candidate.
+fn has_candidate(values: &[f64], level: f64) -> bool {
+    Arch::new().dispatch(|| {
+        let threes = values.windows(3);
+        threes.fold(false, |any, three| any | is_candidate(three, level))
+    })
 }
 
 /// `true` where a sample that exceeds the spell's noise is off its surroundings as only a spike is.

@@ -1,5 +1,7 @@
 //! Update rate of a channel: how many samples of the record lie between two recorded values.
 
+use pulp::Arch;
+
 /// Longest period of a slow channel, in samples of the record: a channel at 1 Hz in a record at
 /// 40 Hz.
 pub const LONGEST_PERIOD: usize = 40;
@@ -51,22 +53,17 @@ impl UpdateRate {
                 held_phase: None,
             });
         }
-        if finite == values.len() {
-            // Most channels change so often that no period fits: these need no list of changes.
-            let changed = neighbours(values)
-                .filter(|(before, value)| before.to_bits() != value.to_bits())
-                .count();
-            if changed < LEAST_CHANGES {
-                return None;
-            }
-            if !has_room(changed, values.len(), SHORTEST_PERIOD) {
-                return Some(UpdateRate::FULL);
-            }
-        } else if let Some(period) = period_between_nulls(&distances(values)) {
+        // Most channels change so often that no period fits: these need no list of changes.
+        let (pairs, changed) = pairs_and_changes(values);
+        let is_full_rate = 2 * pairs + 1 >= finite;
+        if !is_full_rate && let Some(period) = period_between_nulls(&distances(values)) {
             return Some(UpdateRate {
                 period,
                 held_phase: None,
             });
+        }
+        if changed >= LEAST_CHANGES && !has_room(changed, values.len(), SHORTEST_PERIOD) {
+            return Some(UpdateRate::FULL);
         }
         let changes = changes(values, first);
         if changes.len() < LEAST_CHANGES {
@@ -95,6 +92,18 @@ impl UpdateRate {
 /// Each value with the one after it.
 pub fn neighbours(values: &[f64]) -> impl Iterator<Item = (&f64, &f64)> {
     values.iter().zip(values.get(1..).unwrap_or_default())
+}
+
+/// Number of neighbours that are both finite, and of those that differ.
+fn pairs_and_changes(values: &[f64]) -> (usize, usize) {
+    Arch::new().dispatch(|| {
+        neighbours(values).fold((0, 0), |(pairs, changed), (before, value)| {
+            // Without branches, for the vectors.
+            let is_pair = before.is_finite() & value.is_finite();
+            let differs = is_pair & (before.to_bits() != value.to_bits());
+            (pairs + usize::from(is_pair), changed + usize::from(differs))
+        })
+    })
 }
 
 /// Histogram of the distances between finite values.
