@@ -21,10 +21,14 @@ use crate::aircraft::Aircraft;
 use crate::numerics::mean::finite_mean;
 
 /// Most rounds in which R and P are estimated anew; the fit usually settles earlier.
-const ROUNDS: usize = 6;
+const ROUNDS: usize = 8;
+
+/// Rounds with the wide prior, in which R settles before anything is decided: a flight in turbulence,
+/// whose delays are told by little, otherwise widens their priors by chance.
+const WIDE_ROUNDS: usize = 4;
 
 /// Rounds that are taken at any rate: with the wide prior, and with two estimates of P.
-const LEAST_ROUNDS: usize = 3;
+const LEAST_ROUNDS: usize = WIDE_ROUNDS + 1;
 
 /// Number of bounds from which a parameter is surely larger than ordinary, so that its prior widens.
 const SURELY: f64 = 3.0;
@@ -136,7 +140,7 @@ fn estimated(windows: &[Window]) -> [bool; PARAMETERS] {
     estimated
 }
 
-/// Fits in rounds, the first with a wide prior, and widens the prior of each parameter that is
+/// Fits in rounds, the first of them with a wide prior, and then widens the prior of each parameter that is
 /// surely larger than ordinary.
 fn reweight(state: &mut JointState) -> Option<()> {
     for round in 0..ROUNDS {
@@ -144,7 +148,7 @@ fn reweight(state: &mut JointState) -> Option<()> {
         if round >= LEAST_ROUNDS && steps == 1 {
             break;
         }
-        if round > 0 {
+        if round + 1 >= WIDE_ROUNDS {
             state.prior = reweighted_prior(state)?;
         }
     }
