@@ -57,7 +57,7 @@ where it was. The results of a run are published at once, as a night; the last n
 
 Examples:
   harvest run                                    the pipeline pipelines/harv, to the report
-  harvest import runs/*.csv --to flights/        Parquet of the archive from CSV, MATLAB or tall Parquet
+  harvest import runs/*.csv --to flights/        Parquet of the archive from CSV, MATLAB, HDF5 or tall Parquet
   harvest init my_campaign --from flights/       a draft of pipelines/my_campaign, from the recordings alone
   harvest check my_campaign                      validate pipelines/my_campaign and list what it uses
   harvest run --archive flights/ --reports out/  the same analysis on another archive
@@ -115,7 +115,7 @@ enum Command {
     /// Plan the next flight: the test cards that teach most in its minutes
     #[command(after_help = next_command::NEXT_HELP)]
     Next(next_command::NextOptions),
-    /// Write recordings of other formats (CSV, MATLAB, tall Parquet) as Parquet of the archive
+    /// Write recordings of other formats (CSV, MATLAB, HDF5, tall Parquet) as Parquet of the archive
     #[command(after_help = import_command::IMPORT_HELP)]
     Import(import_command::ImportOptions),
     /// Draft a pipeline for a recorder that harvest has not seen
