@@ -52,11 +52,11 @@ pub struct Path {
 /// Sensitivities of a window at its nodes.
 #[derive(Clone, Debug)]
 pub struct PathSensitivities {
-    /// Of what the output instruments read, with their own errors, along the parameters of a row.
+    /// Slopes of what the output instruments read, with their own errors, along the parameters of a row.
     pub rows: Vec<[Row; OUTPUTS]>,
-    /// Of the states along the initial state.
+    /// Slopes of the states along the initial state.
     pub transitions: Vec<SMatrix<f64, STATES, STATES>>,
-    /// Of the states' rates along the inputs.
+    /// Slopes of the states' rates along the inputs.
     pub by_input: Vec<SMatrix<f64, STATES, INPUTS>>,
 }
 
