@@ -234,6 +234,13 @@ fn shipped(folder: &Path, name: &str) -> Vec<u8> {
     bytes
 }
 
+fn import_shipped(folder: &Path, name: &str) -> Outcome {
+    shipped(folder, name);
+    let outcome = import(folder, name);
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    outcome
+}
+
 /// Values of both HDF5 files, for sample k.
 fn written(value: impl Fn(f64) -> f64) -> Vec<f64> {
     (0..200).map(|k| value(f64::from(k))).collect()
@@ -243,9 +250,7 @@ fn written(value: impl Fn(f64) -> f64) -> Vec<f64> {
 fn matlab_7_3_comes_back_to_the_bit() {
     // By the HDF5 library, laid out as MATLAB lays it out: a column, a matrix with names, a struct of one signal.
     let folder = tempfile::tempdir().unwrap();
-    shipped(folder.path(), "matlab_7_3.mat");
-    let outcome = import(folder.path(), "matlab_7_3.mat");
-    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let outcome = import_shipped(folder.path(), "matlab_7_3.mat");
     let slow = "`slow` is left out: 7 values";
     assert!(outcome.stdout.contains(slow), "{}", outcome.stdout);
     let recording = imported(folder.path());
@@ -268,9 +273,7 @@ fn matlab_7_3_comes_back_to_the_bit() {
 fn hdf5_of_other_programs_has_its_units_as_attributes() {
     // Compressed chunks, shuffled bytes, big-endian integers, a group.
     let folder = tempfile::tempdir().unwrap();
-    shipped(folder.path(), "recording.h5");
-    let outcome = import(folder.path(), "recording.h5");
-    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    import_shipped(folder.path(), "recording.h5");
     let recording = imported(folder.path());
     check(&recording, "time", Some("s"), &written(|k| k / 40.0));
     let q = written(|k| (37.0 * k % 101.0) / 8.0);

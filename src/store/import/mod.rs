@@ -77,8 +77,8 @@ pub fn import(source: &Path, folder: &Path) -> Result<Imported> {
     }
     let contents = match Format::of(source)? {
         Format::Csv => csv_text::import(source, &file)?,
-        Format::Matlab => matlab::import(source, &file, false)?,
-        Format::Hdf5 => matlab::import(source, &file, true)?,
+        Format::Matlab => matlab::import_level_5(source, &file)?,
+        Format::Hdf5 => matlab::import_hdf5(source, &file)?,
         Format::Parquet => tall::import(source, &file)?,
     };
     let digest = Digest::of_file(source)?;

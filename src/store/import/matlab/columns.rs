@@ -20,6 +20,19 @@ pub enum Value {
     Other(&'static str),
 }
 
+impl Value {
+    /// Text of 16-bit codes, which both kinds of file store as numbers.
+    pub fn text_of_codes(codes: &[f64]) -> Value {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "16-bit codes"
+        )]
+        let codes: Vec<u16> = codes.iter().map(|code| *code as u16).collect();
+        Value::Text(String::from_utf16_lossy(&codes))
+    }
+}
+
 /// Columns collected from the variables.
 #[derive(Debug, Default)]
 pub struct Table {

@@ -101,7 +101,7 @@ impl Reader {
             return Ok(Value::Other("empty"));
         }
         match (attribute(dataset, CLASS).as_deref(), dataset.dtype()) {
-            (Some("char"), _) => Ok(Value::Text(characters(&numbers(dataset)?))),
+            (Some("char"), _) => Ok(Value::text_of_codes(&numbers(dataset)?)),
             (Some("cell"), _) => self.cells(dataset, depth),
             (Some("struct"), _) => Ok(Value::Other("an array of structs")),
             (_, Datatype::FixedPoint { .. } | Datatype::FloatingPoint { .. }) => {
@@ -155,17 +155,6 @@ fn attribute(dataset: &Dataset, name: &str) -> Option<String> {
 )]
 fn size(size: u64) -> usize {
     size as usize
-}
-
-/// Text of 16-bit codes.
-fn characters(codes: &[f64]) -> String {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "16-bit codes"
-    )]
-    let codes: Vec<u16> = codes.iter().map(|code| *code as u16).collect();
-    String::from_utf16_lossy(&codes)
 }
 
 /// Numbers of any type, in the order of the file.

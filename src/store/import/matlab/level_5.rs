@@ -145,7 +145,7 @@ fn matrix(
             Value::Cells(cells.collect::<std::result::Result<_, String>>()?)
         }
         2 if count == 1 => structure(&mut reader, depth)?,
-        4 => Value::Text(characters(&reader.next()?, is_little)?),
+        4 => characters(&reader.next()?, is_little)?,
         6..=15 => {
             let values = numbers(&reader.next()?, is_little)?;
             if values.len() != count {
@@ -190,19 +190,12 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(&bytes[..end]).into_owned()
 }
 
-/// Text of a char array: bytes of UTF-8, or 16-bit codes.
-fn characters(element: &Element, is_little: bool) -> std::result::Result<String, String> {
+/// Text of an element: bytes of UTF-8, or 16-bit codes.
+fn characters(element: &Element, is_little: bool) -> std::result::Result<Value, String> {
     if matches!(element.kind, 1 | 2 | 16) {
-        return Ok(text(element.data));
+        return Ok(Value::Text(text(element.data)));
     }
-    let codes = numbers(element, is_little)?;
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "16-bit codes"
-    )]
-    let codes: Vec<u16> = codes.iter().map(|code| *code as u16).collect();
-    Ok(String::from_utf16_lossy(&codes))
+    Ok(Value::text_of_codes(&numbers(element, is_little)?))
 }
 
 /// Numbers of an element of any numeric type.

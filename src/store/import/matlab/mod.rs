@@ -10,24 +10,36 @@ use std::path::Path;
 use super::contents::{Contents, ImportedColumn, refused};
 use super::flight_file::{BATCH_ROWS, write};
 use crate::error::{Error, Result};
-use columns::Table;
+use columns::{Table, Value};
 
 /// Largest file: more than any flight.
 const LARGEST: u64 = 4 << 30;
 
-/// Imports a MATLAB file of level 5, or an HDF5 file.
-pub fn import(source: &Path, file: &Path, is_hdf5: bool) -> Result<Contents> {
+type Variables = std::result::Result<Vec<(String, Value)>, String>;
+
+/// Imports a MATLAB file of level 5.
+pub fn import_level_5(source: &Path, file: &Path) -> Result<Contents> {
+    let variables = level_5::variables(&bytes(source)?);
+    write_columns(source, file, variables)
+}
+
+/// Imports an HDF5 file: MATLAB 7.3, or another program's.
+pub fn import_hdf5(source: &Path, file: &Path) -> Result<Contents> {
+    let variables = hdf5::variables(bytes(source)?);
+    write_columns(source, file, variables)
+}
+
+fn bytes(source: &Path) -> Result<Vec<u8>> {
     let opened = std::fs::File::open(source).map_err(Error::io(source, "cannot open it"))?;
     let mut bytes = Vec::new();
-    opened
-        .take(LARGEST)
-        .read_to_end(&mut bytes)
-        .map_err(Error::io(source, "cannot read it"))?;
-    let variables = if is_hdf5 {
-        hdf5::variables(bytes)
-    } else {
-        level_5::variables(&bytes)
-    };
+    let mut limited = opened.take(LARGEST);
+    let read = limited.read_to_end(&mut bytes);
+    read.map_err(Error::io(source, "cannot read it"))?;
+    Ok(bytes)
+}
+
+/// Writes the columns that the variables of a file make.
+fn write_columns(source: &Path, file: &Path, variables: Variables) -> Result<Contents> {
     let variables = variables.map_err(|what| refused(source, &what))?;
     let mut table = Table::default();
     let single = variables.len() == 1;
