@@ -55,30 +55,35 @@ struct Turn {
 impl Local {
     /// Angle in the plane of symmetry from a direction given by sine and cosine.
     #[inline(always)]
-    fn alpha_from(&self, (s, c): (f64, f64)) -> Turn {
+    fn alpha_from(&self, direction: (f64, f64)) -> Turn {
         let [u, _, w] = self.velocity;
         let per_square = 1.0 / (u * u + w * w);
         let slope = |d: [f64; 3]| (u * d[2] - w * d[0]) * per_square;
-        Turn {
-            sine: w * c - u * s,
-            cosine: u * c + w * s,
-            by_alpha: slope(self.by_alpha),
-            by_beta: slope(self.by_beta),
-            by_rates: self.by_rates.map(slope),
-        }
+        self.turn((u, w), direction, slope)
     }
 
     /// Angle from the plane of symmetry, from a direction given by sine and cosine.
     #[inline(always)]
-    fn beta_from(&self, (s, c): (f64, f64)) -> Turn {
+    fn beta_from(&self, direction: (f64, f64)) -> Turn {
         let [u, v, w] = self.velocity;
         let across = (u * u + w * w).sqrt();
         let per_square = 1.0 / (across * across + v * v);
         let along = v / across;
         let slope = |d: [f64; 3]| (across * d[1] - along * (u * d[0] + w * d[2])) * per_square;
+        self.turn((across, v), direction, slope)
+    }
+
+    /// Turn of a vector in a plane from a direction, with the slope of its angle along a change of velocity.
+    #[inline(always)]
+    fn turn(
+        &self,
+        (forward, aside): (f64, f64),
+        (s, c): (f64, f64),
+        slope: impl Fn([f64; 3]) -> f64,
+    ) -> Turn {
         Turn {
-            sine: v * c - across * s,
-            cosine: across * c + v * s,
+            sine: aside * c - forward * s,
+            cosine: forward * c + aside * s,
             by_alpha: slope(self.by_alpha),
             by_beta: slope(self.by_beta),
             by_rates: self.by_rates.map(slope),

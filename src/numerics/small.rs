@@ -11,16 +11,7 @@ pub(crate) fn product<const N: usize, const M: usize, const P: usize>(
     a: &SMatrix<f64, N, M>,
     b: &SMatrix<f64, M, P>,
 ) -> SMatrix<f64, N, P> {
-    let (a, b) = (&a.data.0, &b.data.0);
-    let mut columns = [[0.0; N]; P];
-    for j in 0..P {
-        for k in 0..M {
-            for i in 0..N {
-                columns[j][i] = a[k][i].mul_add(b[j][k], columns[j][i]);
-            }
-        }
-    }
-    SMatrix::from_array_storage(ArrayStorage(columns))
+    product_with(a, |k, j| b.data.0[j][k])
 }
 
 /// a bᵀ, with fused multiplication.
@@ -30,12 +21,22 @@ pub(crate) fn product_transposed<const N: usize, const M: usize, const P: usize>
     a: &SMatrix<f64, N, M>,
     b: &SMatrix<f64, P, M>,
 ) -> SMatrix<f64, N, P> {
-    let (a, b) = (&a.data.0, &b.data.0);
+    product_with(a, |k, j| b.data.0[k][j])
+}
+
+/// Product of a with the matrix whose entry in row k and column j is `b(k, j)`.
+#[inline(always)]
+fn product_with<const N: usize, const M: usize, const P: usize>(
+    a: &SMatrix<f64, N, M>,
+    b: impl Fn(usize, usize) -> f64,
+) -> SMatrix<f64, N, P> {
+    let a = &a.data.0;
     let mut columns = [[0.0; N]; P];
     for j in 0..P {
         for k in 0..M {
+            let entry = b(k, j);
             for i in 0..N {
-                columns[j][i] = a[k][i].mul_add(b[k][j], columns[j][i]);
+                columns[j][i] = a[k][i].mul_add(entry, columns[j][i]);
             }
         }
     }
