@@ -48,24 +48,6 @@ pub struct Motion {
     pub cg: Position,
 }
 
-impl Motion {
-    /// Motion as it would be measured without angular accelerations.
-    #[inline(always)]
-    #[must_use]
-    pub fn without_angular_accelerations(&self, aircraft: &Aircraft) -> Motion {
-        let felt = |i: usize, sensor: Position| {
-            lever(i, sensor.arm(self.cg), [0.0; 3], self.accelerations).value
-        };
-        Motion {
-            accelerations: [0.0; 3],
-            force_x: self.force_x + felt(0, aircraft.sensors.ax),
-            force_y: self.force_y + felt(1, aircraft.sensors.ay),
-            force_z: self.force_z + felt(2, aircraft.sensors.an),
-            ..*self
-        }
-    }
-}
-
 /// Mass, c.g. and inertias: sample by sample, or their means over the maneuver (the paper's
 /// choice).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -352,7 +334,17 @@ impl<G: Fn(f64) -> f64> MeasuredMotion<'_, G> {
     /// Motion at one point.
     #[inline(always)]
     pub fn at(&self, point: usize) -> Motion {
-        self.signals.at(self.aircraft, &self.gravity, point)
+        let accelerations = self.signals.slopes.map(|s| s[point] * RAD);
+        let gravity = &self.gravity;
+        self.signals
+            .at(self.aircraft, gravity, point, accelerations)
+    }
+
+    /// Motion at one point as it would be measured without angular accelerations.
+    #[inline(always)]
+    pub fn without_angular_accelerations(&self, point: usize) -> Motion {
+        let gravity = &self.gravity;
+        self.signals.at(self.aircraft, gravity, point, [0.0; 3])
     }
 
     /// Motion at every point in order.
@@ -377,10 +369,16 @@ struct Signals<'a> {
 }
 
 impl Signals<'_> {
+    /// Motion at point `i` with these angular accelerations.
     #[inline(always)]
-    fn at(&self, aircraft: &Aircraft, gravity: impl Fn(f64) -> f64, i: usize) -> Motion {
+    fn at(
+        &self,
+        aircraft: &Aircraft,
+        gravity: impl Fn(f64) -> f64,
+        i: usize,
+        accelerations: [f64; 3],
+    ) -> Motion {
         let rates = self.rates.map(|s| s[i] * RAD);
-        let accelerations = self.slopes.map(|s| s[i] * RAD);
         let [x_ft, y_ft, z_ft] = self.cg.map(|s| s[i]);
         let cg = Position { x_ft, y_ft, z_ft };
         let [alpha, beta] = self.flow[i];

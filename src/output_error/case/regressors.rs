@@ -28,7 +28,7 @@ pub(crate) struct PreparedMotion<const NX: usize, E: Equations<NX>> {
     pub states: Vec<SVector<f64, NX>>,
     /// Coefficients that the motion implies at every sample.
     pub implied: Vec<[f64; COEFFICIENTS]>,
-    /// The same without the part that is proportional to the angular accelerations.
+    /// Implied coefficients without the part that is proportional to the angular accelerations.
     pub implied_without_accelerations: Vec<[f64; COEFFICIENTS]>,
 }
 
@@ -73,9 +73,9 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Preparation<'_, NX, E> {
             window,
             prepared,
         } = self;
-        let motion = window.motion(aircraft);
+        let measured = window.motion(aircraft);
         for point in 0..window.len() {
-            let motion = motion.at(point);
+            let motion = measured.at(point);
             let inputs = E::rate_inputs(aircraft, &motion);
             prepared.flow.push([motion.alpha, motion.beta]);
             if point % 2 == 0 {
@@ -84,7 +84,7 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Preparation<'_, NX, E> {
                 prepared.states.push(E::measured_state(&motion));
                 let implied = E::implied_coefficients(aircraft, &motion, &inputs);
                 prepared.implied.push(implied);
-                let rest = motion.without_angular_accelerations(aircraft);
+                let rest = measured.without_angular_accelerations(point);
                 let rest = E::implied_coefficients(aircraft, &rest, &inputs);
                 prepared.implied_without_accelerations.push(rest);
             }
