@@ -6,13 +6,14 @@ use super::evidence::Evidence;
 use super::flight_data::{FlightData, Observed};
 use super::held_values::{HeldDifferences, Posterior};
 use super::observation::Observation;
-use super::open_scales::OpenScales;
+use super::open_scales::add_open_scales;
 use super::others::Others;
 use super::posterior::{Gaussian, gaussian, information, of_differences, reweighted};
-use super::prior::Scale;
+use super::scale_prior::Scale;
 use super::scales::{centres, most_probable};
 use super::self_check::{self, Agreement};
 use super::term::{Basis, Term};
+use super::touched::Touched;
 use super::unknowns::Unknowns;
 use crate::aero::WindTunnel;
 use crate::numerics::root::EXACT;
@@ -56,12 +57,12 @@ impl CoefficientPosterior {
         let mut data = Data::new(&terms, evidence, basis);
         let mut weights = vec![1.0; evidence.len()];
         let mut noise_scales = centres(&terms);
-        let (mut scales, mut found) = data.fit(&terms, &weights, &noise_scales)?;
+        let (mut touched, mut scales, mut found) = data.fit(&terms, &weights, &noise_scales)?;
         for _ in 0..REWEIGHTINGS {
             let freedom = basis.settings.degrees_of_freedom;
             weights = reweighted(&data.flights, &weights, &found, freedom);
             noise_scales = scales;
-            (scales, found) = data.fit(&terms, &weights, &noise_scales)?;
+            (touched, scales, found) = data.fit(&terms, &weights, &noise_scales)?;
         }
         let posterior = Posterior {
             terms: &terms,
@@ -69,15 +70,8 @@ impl CoefficientPosterior {
             gaussian: &found,
         };
         let held = data.held(&posterior, &weights, evidence, basis.tunnel);
-        let sums = information(&data.flights, &weights, data.unknowns.count);
-        let differences = of_differences(&sums, &data.unknowns)?;
         let mut whole = data.posterior(terms, scales, &weights, found, evidence)?;
-        let open = OpenScales {
-            terms: &whole.terms,
-            unknowns: &whole.unknowns,
-            information: &differences,
-        };
-        open.add_to(&whole.scales, &mut whole.gaussian);
+        add_open_scales(&touched, &whole.scales, &mut whole.gaussian);
         Some(CoefficientPosterior {
             noise_scales,
             held,
@@ -160,22 +154,21 @@ impl Data {
         }
     }
 
-    /// Most probable scales, from a start, and the Gaussian that they give.
+    /// Most probable scales, from a start, and the Gaussian that they give; before them the data that the
+    /// scales are of.
     fn fit(
         &mut self,
         terms: &[Term],
         weights: &[f64],
         start: &[Scale],
-    ) -> Option<(Vec<Scale>, Gaussian)> {
+    ) -> Option<(Touched, Vec<Scale>, Gaussian)> {
         self.set_between(terms, start);
         let sums = information(&self.flights, weights, self.unknowns.count);
-        let mut scales = start.to_vec();
-        if !self.flights.is_empty() {
-            let own = of_differences(&sums, &self.unknowns)?;
-            scales = most_probable(terms, &self.unknowns, &own, start);
-        }
+        let own = of_differences(&sums, &self.unknowns)?;
+        let touched = Touched::new(terms, &self.unknowns, &own);
+        let scales = most_probable(&touched, start);
         let gaussian = gaussian(&self.unknowns.root(terms, &scales, EXACT), &sums)?;
-        Some((scales, gaussian))
+        Some((touched, scales, gaussian))
     }
 
     /// Differences of what each maneuver holds, by the flights other than its own.

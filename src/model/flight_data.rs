@@ -6,7 +6,7 @@ use std::ops::Range;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::observation::Observation;
-use super::prior::Scale;
+use super::scale_prior::Scale;
 use super::term::{Term, between_points};
 use super::unknowns::{SparseRow, Unknowns, is_of_campaign};
 use crate::output_error::error_effect::SharedError;
@@ -181,6 +181,18 @@ impl FlightData {
             }
         }
         dense
+    }
+
+    /// Aᵀ over all unknowns.
+    #[must_use]
+    pub fn columns(&self, unknowns: usize) -> DMatrix<f64> {
+        let mut columns = DMatrix::zeros(unknowns, self.rows.len());
+        for (row, mut column) in self.rows.iter().zip(columns.column_iter_mut()) {
+            for (place, value) in row {
+                column[*place] += value;
+            }
+        }
+        columns
     }
 
     /// A m and A P Aᵀ of a vector and a covariance of the unknowns.

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::evidence::Evidence;
 use super::others::Others;
 use super::posterior::Gaussian;
-use super::prior::Scale;
+use super::scale_prior::Scale;
 use super::term::{Term, between_points};
 use super::unknowns::Unknowns;
 use crate::aero::WindTunnel;

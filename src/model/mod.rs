@@ -11,11 +11,14 @@
 mod settings;
 mod evidence;
 mod grid;
+mod scale_prior;
+mod prior_covariance;
 mod prior;
 mod term;
 mod observation;
 mod unknowns;
 mod flight_data;
+mod touched;
 mod scales;
 mod posterior;
 mod open_scales;

@@ -5,10 +5,11 @@ use std::ops::Range;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::flight_data::{FlightData, Information};
-use super::prior::Scale;
+use super::scale_prior::Scale;
 use super::term::Term;
 use super::unknowns::Unknowns;
 use crate::numerics::root::{BlockRoot, EXACT};
+use crate::numerics::symmetric::square;
 use crate::numerics::triangular::{cholesky, solve_lower};
 
 /// Share of the information that rounding may hide: data a million times as sure as the prior stay
@@ -32,38 +33,59 @@ pub fn information(flights: &[FlightData], weights: &[f64], unknowns: usize) -> 
     sums
 }
 
-/// Gaussian with a prior covariance R Rᵀ: P = R (I + Rᵀ Λ R)⁻¹ Rᵀ, mean P η. `None` where the data
-/// are not finite.
+/// Posterior of the unknowns with a prior covariance R Rᵀ: P = R (I + Rᵀ Λ R)⁻¹ Rᵀ, mean P η.
+pub struct Solved<'a> {
+    root: &'a BlockRoot,
+    /// L with L Lᵀ = I + Rᵀ Λ R.
+    lower: DMatrix<f64>,
+}
+
+impl<'a> Solved<'a> {
+    /// Posterior; `None` where the data are not finite.
+    #[must_use]
+    pub fn new(root: &'a BlockRoot, information: &Information) -> Option<Solved<'a>> {
+        let mut inner = root.right(&root.left(&information.matrix));
+        for j in 0..inner.nrows() {
+            inner[(j, j)] += 1.0 + ROUNDING * inner[(j, j)];
+        }
+        let lower = cholesky(inner)?;
+        Some(Solved { root, lower })
+    }
+
+    /// L⁻¹ Rᵀ A of some columns A over the unknowns.
+    fn halves(&self, mut columns: DMatrix<f64>) -> DMatrix<f64> {
+        solve_lower(self.lower.as_view(), columns.as_view_mut());
+        columns
+    }
+
+    /// P.
+    fn covariance(&self) -> DMatrix<f64> {
+        square(&self.halves(self.root.transposed()))
+    }
+
+    /// Means and covariance of a flight's rows.
+    #[must_use]
+    pub fn image(
+        &self,
+        flight: &FlightData,
+        information: &Information,
+    ) -> (DVector<f64>, DMatrix<f64>) {
+        let columns = flight.columns(information.vector.len());
+        let halves = self.halves(self.root.left(&columns));
+        let mut seen = self.root.left_of(&information.vector);
+        self.lower.solve_lower_triangular_mut(&mut seen);
+        (halves.tr_mul(&seen), square(&halves))
+    }
+}
+
+/// Gaussian with a prior covariance R Rᵀ. `None` where the data are not finite.
 #[must_use]
 pub fn gaussian(root: &BlockRoot, information: &Information) -> Option<Gaussian> {
-    let lower = inner_root(root, information)?;
-    let mut halves = root.transposed();
-    solve_lower(lower.as_view(), halves.as_view_mut());
-    let covariance = halves.transpose() * halves;
+    let covariance = Solved::new(root, information)?.covariance();
     let mean = &covariance * &information.vector;
     mean.iter()
         .all(|v| v.is_finite())
         .then_some(Gaussian { mean, covariance })
-}
-
-/// Mean of [`gaussian`] alone.
-#[must_use]
-pub fn mean(root: &BlockRoot, information: &Information) -> Option<DVector<f64>> {
-    let lower = inner_root(root, information)?;
-    let mut seen = root.left_of(&information.vector);
-    lower.solve_lower_triangular_mut(&mut seen);
-    lower.tr_solve_lower_triangular_mut(&mut seen);
-    let mean = root.times(&seen);
-    mean.iter().all(|v| v.is_finite()).then_some(mean)
-}
-
-/// L with L Lᵀ = I + Rᵀ Λ R.
-fn inner_root(root: &BlockRoot, information: &Information) -> Option<DMatrix<f64>> {
-    let mut inner = root.right(&root.left(&information.matrix));
-    for j in 0..inner.nrows() {
-        inner[(j, j)] += 1.0 + ROUNDING * inner[(j, j)];
-    }
-    cholesky(inner)
 }
 
 /// Normal equations of the differences from the tunnel, with the other unknowns marginalised.
@@ -169,31 +191,8 @@ pub fn reweighted(
 pub fn prior(unknowns: &Unknowns, terms: &[Term], scales: &[Scale]) -> DMatrix<f64> {
     let mut whole = DMatrix::zeros(unknowns.differences, unknowns.differences);
     for ((term, scale), &start) in terms.iter().zip(scales).zip(&unknowns.starts) {
-        let own = term.prior.covariance(scale);
+        let own = term.prior.covariance.at(scale);
         whole.view_mut((start, start), own.shape()).copy_from(&own);
     }
     whole
-}
-
-#[cfg(test)]
-mod tests {
-    use approx::assert_relative_eq;
-
-    use super::*;
-    use crate::numerics::root::root;
-
-    #[test]
-    fn the_mean_alone_is_that_of_the_gaussian() {
-        let covariance =
-            DMatrix::from_fn(6, 6, |i, j| (-(i as f64 - j as f64).powi(2) / 4.0).exp());
-        let mut own = BlockRoot::default();
-        own.push(root(&covariance, EXACT));
-        let rows = DMatrix::from_fn(4, 6, |i, j| ((3 * i + 2 * j) % 5) as f64 - 2.0);
-        let data = Information {
-            matrix: rows.transpose() * &rows,
-            vector: DVector::from_fn(6, |i, _| 1.0 - 0.5 * i as f64),
-        };
-        let whole = gaussian(&own, &data).unwrap();
-        assert_relative_eq!(mean(&own, &data).unwrap(), whole.mean, epsilon = 1e-12);
-    }
 }

@@ -3,18 +3,22 @@
 //! With Λ and η the normal equations of the differences, whose other unknowns are marginalised, and C
 //! = R Rᵀ their prior covariance, the log marginal likelihood is, but for a constant,
 //!
-//! −½ log |B| + ½ ηᵀ P η,  B = I + Rᵀ Λ R,  P = R B⁻¹ Rᵀ,
+//! −½ log |B| + ½ ηᵀ P η,  B = I + Rᵀ Λ R,  P = R B⁻¹ Rᵀ.
 //!
-//! and its derivative by a scale is ½ aᵀ ∂C a − ½ tr(M ∂C) with a = η − Λ P η and M = Λ − Λ P Λ.
+//! With a = η − Λ P η, M = Λ − Λ P Λ and subscripts for derivatives by logarithms of scales, f = −log of it has
+//!
+//! f_i = ½ tr(M C_i) − ½ aᵀ C_i a,
+//! f_ij = −½ tr(M C_i M C_j) + aᵀ C_i M C_j a + ½ tr(M C_ij) − ½ aᵀ C_ij a,
+//!
+//! since M_j = −M C_j M and a_j = −M C_j a. Of data that the scales predict, a aᵀ is M in the mean, and f_ij is
+//! ½ tr(M C_i M C_j), which is never negative.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::flight_data::Information;
-use super::prior::Scale;
+use super::scale_prior::Scale;
 use super::term::Term;
-use super::unknowns::{Unknowns, root_of_differences};
-use crate::numerics::minimise::minimum;
-use crate::numerics::triangular::{cholesky, solve_lower};
+use super::touched::{Fit, Touched, TouchedTerm};
+use crate::numerics::minimise::{Local, minimum};
 
 /// Share of a term's largest variance below which the search leaves directions out: they change a
 /// difference by a thousandth of its deviation.
@@ -23,34 +27,22 @@ pub const LEAST_VARIANCE: f64 = 1e-6;
 /// Steps of the search.
 const STEPS: usize = 60;
 
-/// Gradient at which the search ends: scales are then within a hundredth of their uncertainty.
-const TOLERANCE: f64 = 0.03;
+/// Distance from the minimum at which the search ends, in standard deviations of the scales.
+const TOLERANCE: f64 = 0.01;
 
 /// Centres of the priors.
 #[must_use]
 pub fn centres(terms: &[Term]) -> Vec<Scale> {
-    terms.iter().map(|t| t.prior.centre).collect()
+    terms.iter().map(|t| t.prior.scale.centre).collect()
 }
 
 /// Most probable scales, from a start.
 #[must_use]
-pub fn most_probable(
-    terms: &[Term],
-    unknowns: &Unknowns,
-    information: &Information,
-    start: &[Scale],
-) -> Vec<Scale> {
-    let start = logarithms_of(start);
+pub fn most_probable(touched: &Touched, start: &[Scale]) -> Vec<Scale> {
     let negative = |logarithms: &DVector<f64>| {
-        negative_log_posterior(
-            terms,
-            unknowns,
-            information,
-            &scales_of(logarithms),
-            LEAST_VARIANCE,
-        )
+        negative_log_posterior(touched, &scales_of(logarithms), LEAST_VARIANCE)
     };
-    scales_of(&minimum(start, STEPS, TOLERANCE, negative))
+    scales_of(&minimum(logarithms_of(start), STEPS, TOLERANCE, negative))
 }
 
 /// Logarithms of size and length, term by term.
@@ -72,43 +64,92 @@ pub fn scales_of(logarithms: &DVector<f64>) -> Vec<Scale> {
         .collect()
 }
 
-/// −log of marginal likelihood times prior, with its gradient by the logarithms of the scales. Directions
+/// −log of marginal likelihood times prior, with its derivatives by the logarithms of the scales. Directions
 /// below `least` of a term's largest variance are left out.
 #[must_use]
-pub fn negative_log_posterior(
-    terms: &[Term],
-    unknowns: &Unknowns,
-    information: &Information,
-    scales: &[Scale],
-    least: f64,
-) -> Option<(f64, DVector<f64>)> {
-    let Information { matrix, vector } = information;
-    let root = root_of_differences(terms, scales, least);
-    let mut halves = root.left(matrix);
-    let mut inner = root.right(&halves);
-    for j in 0..inner.nrows() {
-        inner[(j, j)] += 1.0;
+pub fn negative_log_posterior(touched: &Touched, scales: &[Scale], least: f64) -> Option<Local> {
+    let fit = touched.fit(scales, least)?;
+    let both = touched.terms.iter().zip(scales);
+    let changes: Vec<Changes> = both.map(|(t, s)| Changes::new(t, s, &fit)).collect();
+    let n = 2 * changes.len();
+    let mut local = Local {
+        value: fit.value,
+        gradient: DVector::zeros(n),
+        curvature: DMatrix::zeros(n, n),
+        expected: DMatrix::zeros(n, n),
+    };
+    for (i, (own, scale)) in changes.iter().zip(scales).enumerate() {
+        for (j, other) in changes[..=i].iter().enumerate() {
+            own.add_pair(other, &fit, (2 * i, 2 * j), &mut local);
+        }
+        own.add_single(scale, 2 * i, &mut local);
     }
-    let lower = cholesky(inner)?;
-    solve_lower(lower.as_view(), halves.as_view_mut());
-    let mut seen = root.left_of(vector);
-    lower.solve_lower_triangular_mut(&mut seen);
-    let innovation = vector - halves.tr_mul(&seen);
-    let log_determinant: f64 = lower.diagonal().iter().map(|d| d.ln()).sum();
-    let mut value = log_determinant - 0.5 * seen.norm_squared();
-    let mut gradient = DVector::zeros(2 * terms.len());
-    for (i, (term, scale)) in terms.iter().zip(scales).enumerate() {
-        let (start, n) = (unknowns.starts[i], term.prior.grid.len());
-        let own = halves.columns(start, n);
-        let rest = matrix.view((start, start), (n, n)) - own.transpose() * own;
-        let innovation = innovation.rows(start, n);
-        let by = |change: &DMatrix<f64>| {
-            0.5 * rest.dot(change) - 0.5 * innovation.dot(&(change * innovation))
-        };
-        let (penalty, by_penalty) = term.prior.penalty(scale);
-        value += penalty;
-        gradient[2 * i] = 2.0 * by(&term.prior.covariance(scale)) + by_penalty[0];
-        gradient[2 * i + 1] = by(&term.prior.covariance_by_length(scale)) + by_penalty[1];
+    let Local {
+        value, curvature, ..
+    } = &local;
+    (value.is_finite() && curvature.iter().all(|c| c.is_finite())).then_some(local)
+}
+
+/// Changes of the likelihood with the size and the length of one term.
+struct Changes<'a> {
+    term: &'a TouchedTerm,
+    /// M C_i, all rows.
+    images: [DMatrix<f64>; 2],
+    /// C_i a.
+    moved: [DVector<f64>; 2],
+    /// ½ tr(M C_ij) − ½ aᵀ C_ij a of a matrix in the place of C_ij: C, and its derivatives by the length.
+    halves: [f64; 3],
+}
+
+impl<'a> Changes<'a> {
+    fn new(term: &'a TouchedTerm, scale: &Scale, fit: &Fit) -> Changes<'a> {
+        let slopes = term.covariance.slopes(scale);
+        let (start, n) = (term.start, term.len());
+        let columns = fit.information.columns(start, n);
+        let own = columns.rows(start, n);
+        let a = fit.innovation.rows(start, n);
+        let half = |c: &DMatrix<f64>| 0.5 * own.dot(c) - 0.5 * a.dot(&(c * a));
+        let halves = [&slopes.value, &slopes.by_length, &slopes.by_length_twice].map(half);
+        Changes {
+            images: [2.0 * columns * &slopes.value, columns * &slopes.by_length],
+            moved: [2.0 * &slopes.value * a, &slopes.by_length * a],
+            halves,
+            term,
+        }
     }
-    (value.is_finite()).then_some((value, gradient))
+
+    /// Adds the products of first derivatives with those of an earlier term, or of the same.
+    fn add_pair(&self, other: &Changes, fit: &Fit, (i, j): (usize, usize), local: &mut Local) {
+        let (own, before) = (self.term, other.term);
+        let at = (own.start, before.start);
+        let between = fit.information.view(at, (own.len(), before.len()));
+        for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            let image = other.images[b].rows(own.start, own.len());
+            let back = self.images[a].rows(before.start, before.len());
+            let trace = 0.5 * image.dot(&back.transpose());
+            let square = self.moved[a].dot(&(between * &other.moved[b]));
+            for place in [(i + a, j + b), (j + b, i + a)] {
+                local.expected[place] = trace;
+                local.curvature[place] = square - trace;
+            }
+        }
+    }
+
+    /// Adds the first derivatives, what follows from second ones of the covariance, and the prior.
+    fn add_single(&self, scale: &Scale, i: usize, local: &mut Local) {
+        let [value, by_length, by_length_twice] = self.halves;
+        let penalty = self.term.scale.penalty(scale);
+        local.value += penalty.value;
+        local.gradient[i] = 2.0 * value + penalty.gradient[0];
+        local.gradient[i + 1] = by_length + penalty.gradient[1];
+        let second = [4.0 * value, 2.0 * by_length, by_length_twice];
+        for (place, second) in [(0, 0), (0, 1), (1, 1)].into_iter().zip(second) {
+            local.curvature[(i + place.0, i + place.1)] += second;
+        }
+        local.curvature[(i + 1, i)] += second[1];
+        for k in 0..2 {
+            local.curvature[(i + k, i + k)] += penalty.curvature[k];
+            local.expected[(i + k, i + k)] += penalty.curvature[k];
+        }
+    }
 }

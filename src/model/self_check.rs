@@ -4,7 +4,7 @@
 use nalgebra::{Cholesky, DVector};
 
 use super::flight_data::FlightData;
-use super::posterior::{Gaussian, LeavingOut, LeftOut, gaussian, information};
+use super::posterior::{Gaussian, LeavingOut, LeftOut, Solved, information};
 use crate::numerics::root::BlockRoot;
 use crate::numerics::student::NORMAL_95;
 
@@ -67,14 +67,15 @@ pub fn maneuvers(
 ) -> Option<Agreement> {
     let others = flights.iter().map(|f| f.of_maneuvers(|m| !is_left_out(m)));
     let others: Vec<FlightData> = others.filter(|f| !f.rows.is_empty()).collect();
-    let rest = gaussian(root, &information(&others, weights, unknowns))?;
+    let sums = information(&others, weights, unknowns);
+    let rest = Solved::new(root, &sums)?;
     let mut sum = Agreement::default();
     for flight in flights {
         let own = flight.of_maneuvers(&is_left_out);
         if own.rows.is_empty() {
             continue;
         }
-        let (predicted, spread) = own.image(&rest.mean, &rest.covariance);
+        let (predicted, spread) = rest.image(&own, &sums);
         let differences: DVector<f64> = &own.differences - predicted;
         let covariance = spread + own.covariance(weights);
         let prediction = LeftOut {

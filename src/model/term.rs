@@ -8,7 +8,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::evidence::Evidence;
 use super::grid::{Grid, refined};
-use super::prior::{Prior, Scale, Table};
+use super::prior::{Prior, Table};
+use super::scale_prior::Scale;
 use super::settings::Settings;
 use crate::aero::{Buildup, Coefficient, Condition, Derivative, Regressor, WindTunnel};
 use crate::maneuver::Status;

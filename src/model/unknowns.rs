@@ -10,7 +10,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::grid::Grid;
 use super::observation::Observation;
-use super::prior::{Scale, fading};
+use super::prior_covariance::fading;
+use super::scale_prior::Scale;
 use super::term::Term;
 use crate::aero::Condition;
 use crate::numerics::root::{BlockRoot, root};
@@ -172,7 +173,7 @@ impl Unknowns {
 pub fn root_of_differences(terms: &[Term], scales: &[Scale], least: f64) -> BlockRoot {
     let mut whole = BlockRoot::default();
     for (term, scale) in terms.iter().zip(scales) {
-        whole.push(root(&term.prior.covariance(scale), least));
+        whole.push(root(&term.prior.covariance.at(scale), least));
     }
     whole
 }

@@ -1,7 +1,6 @@
-//! Minimum of a smooth function of some dozens of variables by quasi-Newton steps (BFGS; Nocedal and
-//! Wright, chapter 6).
+//! Minimum of a smooth function of some dozens of variables by Newton's steps (Nocedal and Wright, chapter 3).
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// Decrease of a step over that of the tangent, at least (Armijo).
 const LEAST_DECREASE: f64 = 1e-4;
@@ -12,71 +11,80 @@ const LONGEST: f64 = 1.0;
 /// Halvings of a step before the search ends.
 const HALVINGS: usize = 25;
 
+/// Function about a point.
+#[derive(Clone, Debug)]
+pub struct Local {
+    pub value: f64,
+    pub gradient: DVector<f64>,
+    /// Second derivatives.
+    pub curvature: DMatrix<f64>,
+    /// Positive definite matrix in their place where they are not.
+    pub expected: DMatrix<f64>,
+}
+
+impl Local {
+    /// Newton's step; `None` where neither matrix is positive definite.
+    fn step(&self) -> Option<DVector<f64>> {
+        let root = Cholesky::new(self.curvature.clone());
+        let root = root.or_else(|| Cholesky::new(self.expected.clone()))?;
+        Some(-root.solve(&self.gradient))
+    }
+}
+
 /// Minimum of a function from a start.
 ///
-/// `function` returns the value and its gradient, or `None` where it has none. The search ends at
-/// a gradient below `tolerance` in all variables, after `steps`, or where no step decreases.
+/// `function` has no value where it returns `None`. The search ends where √(sᵀ H s) of a step s falls below
+/// `tolerance`, with H the second derivatives: of a negative log density that is the distance in standard
+/// deviations. It also ends after `steps`, or where no step decreases.
 #[must_use]
 pub fn minimum(
     start: DVector<f64>,
     steps: usize,
     tolerance: f64,
-    mut function: impl FnMut(&DVector<f64>) -> Option<(f64, DVector<f64>)>,
+    mut function: impl FnMut(&DVector<f64>) -> Option<Local>,
 ) -> DVector<f64> {
-    let Some((mut value, mut gradient)) = function(&start) else {
+    let Some(mut local) = function(&start) else {
         return start;
     };
-    let n = start.len();
     let mut at = start;
-    let mut inverse = DMatrix::<f64>::identity(n, n);
-    for step in 0..steps {
-        if gradient.amax() < tolerance {
-            break;
-        }
-        let mut direction = -(&inverse * &gradient);
-        if direction.dot(&gradient) >= 0.0 {
-            inverse.fill_with_identity();
-            direction = -&gradient;
-        }
-        let longest = direction.amax();
-        if longest > LONGEST {
-            direction *= LONGEST / longest;
-        }
-        let slope = direction.dot(&gradient);
-        let mut found = None;
-        for _ in 0..HALVINGS {
-            let next = &at + &direction;
-            if let Some((lower, there)) = function(&next)
-                && lower <= value + LEAST_DECREASE * slope
-            {
-                found = Some((next, lower, there));
-                break;
-            }
-            direction *= 0.5;
-        }
-        let Some((next, lower, there)) = found else {
+    for _ in 0..steps {
+        let Some(mut step) = local.step() else {
             break;
         };
-        let (moved, turned) = (&next - &at, &there - &gradient);
-        update(&mut inverse, &moved, &turned, step == 0);
-        (at, value, gradient) = (next, lower, there);
+        let slope = step.dot(&local.gradient);
+        if slope.abs().sqrt() < tolerance {
+            break;
+        }
+        let longest = step.amax();
+        if longest > LONGEST {
+            step *= LONGEST / longest;
+        }
+        let Some((next, there)) = decreased(&at, &local, step, &mut function) else {
+            break;
+        };
+        (at, local) = (next, there);
     }
     at
 }
 
-/// Updates the inverse of the second derivatives by a step and the change of the gradient.
-fn update(inverse: &mut DMatrix<f64>, moved: &DVector<f64>, turned: &DVector<f64>, is_first: bool) {
-    let curvature = moved.dot(turned);
-    if curvature <= 1e-12 * moved.norm() * turned.norm() {
-        return;
+/// First of a step and its halvings at which the function decreases.
+fn decreased(
+    at: &DVector<f64>,
+    local: &Local,
+    mut step: DVector<f64>,
+    function: &mut impl FnMut(&DVector<f64>) -> Option<Local>,
+) -> Option<(DVector<f64>, Local)> {
+    for _ in 0..HALVINGS {
+        let next = at + &step;
+        let wanted = local.value + LEAST_DECREASE * step.dot(&local.gradient);
+        if let Some(there) = function(&next)
+            && there.value <= wanted
+        {
+            return Some((next, there));
+        }
+        step *= 0.5;
     }
-    if is_first {
-        *inverse *= curvature / turned.norm_squared();
-    }
-    let image = &*inverse * turned;
-    let factor = (1.0 + turned.dot(&image) / curvature) / curvature;
-    *inverse += factor * moved * moved.transpose()
-        - (&image * moved.transpose() + moved * image.transpose()) / curvature;
+    None
 }
 
 #[cfg(test)]
@@ -94,8 +102,14 @@ mod tests {
         // Rosenbrock.
         let valley = |x: &DVector<f64>| {
             let (a, b) = (1.0 - x[0], x[1] - x[0] * x[0]);
-            let gradient = vector([-2.0 * a - 400.0 * x[0] * b, 200.0 * b]);
-            Some((a * a + 100.0 * b * b, gradient))
+            let bend = 2.0 - 400.0 * (b - 2.0 * x[0] * x[0]);
+            let twist = -400.0 * x[0];
+            Some(Local {
+                value: a * a + 100.0 * b * b,
+                gradient: vector([-2.0 * a - 400.0 * x[0] * b, 200.0 * b]),
+                curvature: DMatrix::from_row_slice(2, 2, &[bend, twist, twist, 200.0]),
+                expected: DMatrix::identity(2, 2),
+            })
         };
         let at = minimum(vector([-1.2, 1.0]), 200, 1e-9, valley);
         assert_relative_eq!(at, vector([1.0, 1.0]), epsilon = 1e-8);
@@ -103,9 +117,30 @@ mod tests {
 
     #[test]
     fn a_step_into_nothing_is_shortened() {
-        let half_line =
-            |x: &DVector<f64>| (x[0] > 0.0).then(|| (x[0] - x[0].ln(), vector([1.0 - 1.0 / x[0]])));
-        let at = minimum(vector([0.1]), 100, 1e-10, half_line);
+        let half_line = |x: &DVector<f64>| {
+            let x = x[0];
+            (x > 0.0).then(|| Local {
+                value: x - x.ln(),
+                gradient: vector([1.0 - 1.0 / x]),
+                curvature: DMatrix::from_element(1, 1, 1.0 / (x * x)),
+                expected: DMatrix::identity(1, 1),
+            })
+        };
+        let at = minimum(vector([2.5]), 100, 1e-10, half_line);
         assert_relative_eq!(at[0], 1.0, epsilon = 1e-9);
+    }
+
+    #[test]
+    fn a_summit_is_left_by_the_expected_second_derivatives() {
+        let wave = |x: &DVector<f64>| {
+            Some(Local {
+                value: x[0].cos(),
+                gradient: vector([-x[0].sin()]),
+                curvature: DMatrix::from_element(1, 1, -x[0].cos()),
+                expected: DMatrix::identity(1, 1),
+            })
+        };
+        let at = minimum(vector([0.1]), 100, 1e-10, wave);
+        assert_relative_eq!(at[0], std::f64::consts::PI, epsilon = 1e-9);
     }
 }

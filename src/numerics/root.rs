@@ -12,23 +12,31 @@ pub const EXACT: f64 = 1e-14;
 /// there are directions left.
 #[must_use]
 pub fn root(covariance: &DMatrix<f64>, least: f64) -> DMatrix<f64> {
-    let n = covariance.nrows();
-    let mut rest = covariance.diagonal();
+    let all: Vec<usize> = (0..covariance.nrows()).collect();
+    root_of_some(covariance, &all, least)
+}
+
+/// Root of the covariance of some quantities, continued to all: of `covariance`, between all and these, and the
+/// `places` of these among all. Their rows are their own root, and all rows with them give `covariance`.
+#[must_use]
+pub fn root_of_some(covariance: &DMatrix<f64>, places: &[usize], least: f64) -> DMatrix<f64> {
+    let own = places.iter().enumerate().map(|(j, i)| covariance[(*i, j)]);
+    let mut rest = DVector::from_iterator(places.len(), own);
     let limit = least * rest.amax();
-    let mut root = DMatrix::<f64>::zeros(n, n);
+    let mut root = DMatrix::<f64>::zeros(covariance.nrows(), places.len());
     let mut rank = 0;
-    while rank < n {
+    while rank < places.len() {
         let pivot = rest.imax();
         if rest[pivot] <= limit {
             break;
         }
         let mut column = covariance.column(pivot).into_owned();
         for k in 0..rank {
-            column.axpy(-root[(pivot, k)], &root.column(k), 1.0);
+            column.axpy(-root[(places[pivot], k)], &root.column(k), 1.0);
         }
         column /= rest[pivot].sqrt();
-        for (rest, value) in rest.iter_mut().zip(column.iter()) {
-            *rest -= value * value;
+        for (rest, place) in rest.iter_mut().zip(places) {
+            *rest -= column[*place] * column[*place];
         }
         rest[pivot] = 0.0;
         root.set_column(rank, &column);
@@ -149,6 +157,18 @@ mod tests {
         let root = root(&covariance, EXACT);
         assert_eq!(root.ncols(), 1);
         assert_relative_eq!(&root * root.transpose(), covariance, epsilon = 1e-14);
+    }
+
+    #[test]
+    fn a_root_of_some_gives_their_covariance_with_all() {
+        let some = [2, 0];
+        let between = covariance().select_columns(&some);
+        let root = root_of_some(&between, &some, EXACT);
+        assert_relative_eq!(
+            &root * root.select_rows(&some).transpose(),
+            between,
+            epsilon = 1e-14
+        );
     }
 
     #[test]

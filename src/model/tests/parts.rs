@@ -8,11 +8,12 @@ use crate::aero::wind_tunnel::{self, Third};
 use crate::aero::{Coefficient, Condition, WindTunnel};
 use crate::maneuver::Maneuver;
 use crate::model::coefficient::Data;
-use crate::model::open_scales::OpenScales;
+use crate::model::open_scales::add_open_scales;
 use crate::model::posterior::{LeavingOut, gaussian, information, of_differences};
-use crate::model::prior::Scale;
+use crate::model::scale_prior::Scale;
 use crate::model::scales::{logarithms_of, most_probable, negative_log_posterior, scales_of};
 use crate::model::term::{Basis, Term};
+use crate::model::touched::Touched;
 use crate::model::unknowns::root_of_differences;
 use crate::model::{Evidence, Settings};
 use crate::numerics::random::RandomStream;
@@ -122,39 +123,84 @@ fn the_normal_equations_give_generalised_least_squares() {
     }
 }
 
-#[test]
-fn the_gradient_over_the_scales_is_that_of_differences() {
-    let flown = campaign();
-    let (terms, data) = data(&flown, &Settings::default());
-    let weights = vec![1.0; flown.len()];
+/// What the data say about the differences.
+fn touched(terms: &[Term], data: &Data) -> Touched {
+    let weights: Vec<f64> = data
+        .flights
+        .iter()
+        .flat_map(|f| &f.maneuvers)
+        .map(|_| 1.0)
+        .collect();
     let sums = information(&data.flights, &weights, data.unknowns.count);
     let own = of_differences(&sums, &data.unknowns).unwrap();
-    let value = |scales: &[Scale]| {
-        negative_log_posterior(&terms, &data.unknowns, &own, scales, EXACT).unwrap()
-    };
-    let (_, gradient) = value(&scales());
-    let step = 1e-5f64;
-    for i in 0..terms.len() {
-        let shifted = |size: f64, length: f64| {
-            let mut scales = scales();
-            scales[i].size *= size.exp();
-            scales[i].length_deg *= length.exp();
-            value(&scales).0
-        };
-        let by_size = (shifted(step, 0.0) - shifted(-step, 0.0)) / (2.0 * step);
-        let by_length = (shifted(0.0, step) - shifted(0.0, -step)) / (2.0 * step);
+    Touched::new(terms, &data.unknowns, &own)
+}
+
+#[test]
+fn derivatives_over_the_scales_are_those_of_differences() {
+    let (terms, data) = data(&campaign(), &Settings::default());
+    let touched = touched(&terms, &data);
+    assert!(touched.information.vector.len() < data.unknowns.differences);
+    let at = logarithms_of(&scales());
+    let local =
+        |at: &DVector<f64>| negative_log_posterior(&touched, &scales_of(at), EXACT).unwrap();
+    let (whole, step) = (local(&at), 1e-5);
+    for i in 0..at.len() {
+        let off = DVector::from_fn(at.len(), |k, _| if k == i { step } else { 0.0 });
+        let (above, below) = (local(&(&at + &off)), local(&(&at - &off)));
+        let slope = (above.value - below.value) / (2.0 * step);
         assert_relative_eq!(
-            gradient[2 * i],
-            by_size,
+            whole.gradient[i],
+            slope,
             epsilon = 1e-6,
             max_relative = 1e-6
         );
-        assert_relative_eq!(
-            gradient[2 * i + 1],
-            by_length,
-            epsilon = 1e-6,
-            max_relative = 1e-6
-        );
+        let slopes = (above.gradient - below.gradient) / (2.0 * step);
+        let own = whole.curvature.column(i).into_owned();
+        assert_relative_eq!(own, slopes, epsilon = 1e-6, max_relative = 1e-6);
+    }
+}
+
+#[test]
+fn expected_second_derivatives_are_the_mean_over_data_that_the_scales_predict() {
+    let (terms, data) = data(&campaign(), &exact());
+    let mut touched = touched(&terms, &data);
+    let root = touched.root(&scales(), EXACT);
+    // η = Λ f + Λ^½ e of a difference f with its prior's covariance and unit noise e.
+    let matrix = touched.information.matrix.clone();
+    let eigen = matrix.clone().symmetric_eigen();
+    let half = &eigen.eigenvectors
+        * DMatrix::from_diagonal(&eigen.eigenvalues.map(|v| v.max(0.0).sqrt()))
+        * eigen.eigenvectors.transpose();
+    let mut stream = RandomStream::new(3, "scales");
+    let mut sum = DMatrix::zeros(6, 6);
+    let (mut expected, count) = (DMatrix::zeros(6, 6), 4000);
+    for _ in 0..count {
+        let difference = root.times(&DVector::from_fn(root.rank(), |_, _| stream.normal()));
+        let noise = DVector::from_fn(matrix.nrows(), |_, _| stream.normal());
+        touched.information.vector = &matrix * difference + &half * noise;
+        let local = negative_log_posterior(&touched, &scales(), EXACT).unwrap();
+        sum += local.curvature / f64::from(count);
+        expected = local.expected;
+    }
+    let scale = expected.diagonal().map(f64::sqrt);
+    for (i, j) in (0..6).flat_map(|i| (0..6).map(move |j| (i, j))) {
+        let unit = scale[i] * scale[j];
+        assert_relative_eq!(sum[(i, j)], expected[(i, j)], epsilon = 0.1 * unit);
+    }
+}
+
+#[test]
+fn the_mean_from_what_is_touched_is_that_of_all_unknowns() {
+    let (terms, data) = data(&campaign(), &Settings::default());
+    let weights = vec![1.0; 10];
+    let sums = information(&data.flights, &weights, data.unknowns.count);
+    let whole = gaussian(&data.unknowns.root(&terms, &scales(), EXACT), &sums).unwrap();
+    let mean = touched(&terms, &data).mean(&scales(), EXACT).unwrap();
+    assert_eq!(mean.len(), data.unknowns.differences);
+    for (i, own) in mean.iter().enumerate() {
+        let unit = whole.covariance[(i, i)].sqrt();
+        assert_relative_eq!(*own, whole.mean[i], epsilon = 1e-8 * unit);
     }
 }
 
@@ -164,7 +210,6 @@ fn the_likelihood_of_the_scales_is_that_of_the_data() {
     let flown = campaign();
     let (terms, data) = data(&flown, &exact());
     let weights = vec![1.0; flown.len()];
-    let sums = information(&data.flights, &weights, data.unknowns.count);
     let others = [Scale {
         size: 0.4,
         length_deg: 25.0,
@@ -178,11 +223,14 @@ fn the_likelihood_of_the_scales_is_that_of_the_data() {
         0.5 * differences.dot(&cholesky.solve(&differences)) + roots
     };
     let own = |scales: &[Scale]| {
-        let own = of_differences(&sums, &data.unknowns).unwrap();
-        let (value, _) =
-            negative_log_posterior(&terms, &data.unknowns, &own, scales, EXACT).unwrap();
+        let value = negative_log_posterior(&touched(&terms, &data), scales, EXACT)
+            .unwrap()
+            .value;
         let both = terms.iter().zip(scales);
-        value - both.map(|(t, s)| t.prior.penalty(s).0).sum::<f64>()
+        value
+            - both
+                .map(|(t, s)| t.prior.scale.penalty(s).value)
+                .sum::<f64>()
     };
     assert_relative_eq!(
         own(&scales()) - own(&others),
@@ -208,7 +256,8 @@ fn the_spread_over_open_scales_is_the_mean_square_over_draws_of_them() {
     let weights = vec![1.0; flown.len()];
     let sums = information(&data.flights, &weights, data.unknowns.count);
     let own = of_differences(&sums, &data.unknowns).unwrap();
-    let scales = most_probable(&terms, &data.unknowns, &own, &scales());
+    let touched = touched(&terms, &data);
+    let scales = most_probable(&touched, &scales());
     let mean = |at: &DVector<f64>| {
         let root = root_of_differences(&terms, &scales_of(at), EXACT);
         gaussian(&root, &own).unwrap().mean
@@ -216,9 +265,9 @@ fn the_spread_over_open_scales_is_the_mean_square_over_draws_of_them() {
     let at = logarithms_of(&scales);
     let curvature = second_derivatives(&at, |at| {
         let scales = scales_of(at);
-        negative_log_posterior(&terms, &data.unknowns, &own, &scales, EXACT)
+        negative_log_posterior(&touched, &scales, EXACT)
             .unwrap()
-            .0
+            .value
     });
     let root = Cholesky::new(curvature).unwrap().inverse();
     let root = Cholesky::new(root).unwrap().l();
@@ -231,12 +280,7 @@ fn the_spread_over_open_scales_is_the_mean_square_over_draws_of_them() {
     }
     let mut whole = gaussian(&data.unknowns.root(&terms, &scales, EXACT), &sums).unwrap();
     let before = whole.covariance.diagonal();
-    let open = OpenScales {
-        terms: &terms,
-        unknowns: &data.unknowns,
-        information: &own,
-    };
-    open.add_to(&scales, &mut whole);
+    add_open_scales(&touched, &scales, &mut whole);
     let added = whole.covariance.diagonal() - before;
     // A quadrature of three points a direction beside a thousand draws.
     let share = added.rows(0, squares.len()).sum() / squares.sum();

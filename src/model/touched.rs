@@ -1,0 +1,139 @@
+//! Differences at the points of the grids that the data touch.
+//!
+//! The likelihood of the scales depends on no others, and the mean at all points follows from these.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::flight_data::Information;
+use super::prior_covariance::PriorCovariance;
+use super::scale_prior::{Scale, ScalePrior};
+use super::term::Term;
+use super::unknowns::Unknowns;
+use crate::numerics::root::{BlockRoot, root, root_of_some};
+use crate::numerics::symmetric::square;
+use crate::numerics::triangular::{cholesky, solve_lower};
+
+/// Differences that the data touch, term by term, with the information on them.
+#[derive(Clone, Debug)]
+pub struct Touched {
+    pub terms: Vec<TouchedTerm>,
+    pub information: Information,
+}
+
+/// One term's differences that the data touch.
+#[derive(Clone, Debug)]
+pub struct TouchedTerm {
+    /// First of them among those of all terms.
+    pub start: usize,
+    /// Prior covariance between them.
+    pub covariance: PriorCovariance,
+    /// Prior covariance between all of the term's differences and them.
+    with_all: PriorCovariance,
+    /// Points of the term's grid.
+    points: Vec<usize>,
+    pub scale: ScalePrior,
+}
+
+impl TouchedTerm {
+    /// Number of differences that the data touch.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+}
+
+impl Touched {
+    /// Selects the differences about which there is information.
+    #[must_use]
+    pub fn new(terms: &[Term], unknowns: &Unknowns, information: &Information) -> Touched {
+        let Information { matrix, vector } = information;
+        let mut places = Vec::new();
+        let mut touched = Vec::with_capacity(terms.len());
+        for (term, first) in terms.iter().zip(&unknowns.starts) {
+            let points = 0..term.prior.grid.len();
+            let (start, every): (usize, Vec<usize>) = (places.len(), points.clone().collect());
+            let is_touched = |point: &usize| matrix[(first + point, first + point)] != 0.0;
+            let own: Vec<usize> = points.filter(is_touched).collect();
+            places.extend(own.iter().map(|point| first + point));
+            touched.push(TouchedTerm {
+                start,
+                covariance: term.prior.covariance.select(&own, &own),
+                with_all: term.prior.covariance.select(&every, &own),
+                points: own,
+                scale: term.prior.scale,
+            });
+        }
+        Touched {
+            terms: touched,
+            information: Information {
+                matrix: matrix.select_rows(&places).select_columns(&places),
+                vector: vector.select_rows(&places),
+            },
+        }
+    }
+
+    /// Root of the prior covariance, without directions below `least` of a term's largest variance.
+    #[must_use]
+    pub fn root(&self, scales: &[Scale], least: f64) -> BlockRoot {
+        let mut whole = BlockRoot::default();
+        for (term, scale) in self.terms.iter().zip(scales) {
+            whole.push(root(&term.covariance.at(scale), least));
+        }
+        whole
+    }
+
+    /// Mean of all differences for some scales.
+    #[must_use]
+    pub fn mean(&self, scales: &[Scale], least: f64) -> Option<DVector<f64>> {
+        let Information { matrix, vector } = &self.information;
+        let (mut root, mut of_all) = (BlockRoot::default(), BlockRoot::default());
+        for (term, scale) in self.terms.iter().zip(scales) {
+            let with_all = root_of_some(&term.with_all.at(scale), &term.points, least);
+            root.push(with_all.select_rows(&term.points));
+            of_all.push(with_all);
+        }
+        let lower = inner_root(root.right(&root.left(matrix)))?;
+        let mut seen = root.left_of(vector);
+        lower.solve_lower_triangular_mut(&mut seen);
+        lower.tr_solve_lower_triangular_mut(&mut seen);
+        let mean = of_all.times(&seen);
+        mean.iter().all(|v| v.is_finite()).then_some(mean)
+    }
+
+    /// Posterior of the differences for some scales, as the likelihood of the scales needs it.
+    #[must_use]
+    pub fn fit(&self, scales: &[Scale], least: f64) -> Option<Fit> {
+        let Information { matrix, vector } = &self.information;
+        let root = self.root(scales, least);
+        let mut halves = root.left(matrix);
+        let lower = inner_root(root.right(&halves))?;
+        solve_lower(lower.as_view(), halves.as_view_mut());
+        let mut seen = root.left_of(vector);
+        lower.solve_lower_triangular_mut(&mut seen);
+        let log_determinant: f64 = lower.diagonal().iter().map(|d| d.ln()).sum();
+        Some(Fit {
+            value: log_determinant - 0.5 * seen.norm_squared(),
+            innovation: vector - halves.tr_mul(&seen),
+            information: matrix - square(&halves),
+        })
+    }
+}
+
+/// Likelihood of scales, and what its derivatives are made of.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// −log of the marginal likelihood, but for a constant.
+    pub value: f64,
+    /// a = η − Λ P η.
+    pub innovation: DVector<f64>,
+    /// M = Λ − Λ P Λ, the information of the innovations.
+    pub information: DMatrix<f64>,
+}
+
+/// L with L Lᵀ = I + Rᵀ Λ R, from Rᵀ Λ R.
+fn inner_root(mut inner: DMatrix<f64>) -> Option<DMatrix<f64>> {
+    for j in 0..inner.nrows() {
+        inner[(j, j)] += 1.0;
+    }
+    cholesky(inner)
+}
