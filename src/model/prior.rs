@@ -28,7 +28,7 @@ pub struct Prior {
     pub mean: Vec<f64>,
     /// Between all points of the grid.
     pub covariance: PriorCovariance,
-    /// Of size and length.
+    /// Prior of size and length.
     pub scale: ScalePrior,
 }
 

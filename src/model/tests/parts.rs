@@ -123,7 +123,7 @@ fn the_normal_equations_give_generalised_least_squares() {
     }
 }
 
-/// What the data say about the differences.
+/// Information of the data on the differences.
 fn touched(terms: &[Term], data: &Data) -> Touched {
     let weights: Vec<f64> = data
         .flights
