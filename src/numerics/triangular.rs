@@ -55,22 +55,44 @@ pub fn solve_lower(lower: DMatrixView<f64>, mut right: DMatrixViewMut<f64>) {
     );
 }
 
+/// Columns that the plain method solves side by side: one alone waits for its own divisions.
+const SIDE_BY_SIDE: usize = 4;
+
 /// [`solve_lower`] column by column.
 #[inline(always)]
 fn solve_plain(lower: DMatrixView<f64>, right: &mut DMatrixViewMut<f64>) {
-    for mut column in right.column_iter_mut() {
-        let mut rest = column.as_mut_slice();
-        for (i, lower) in lower.column_iter().enumerate() {
-            let (Some((first, below)), [diagonal, lower @ ..]) =
-                (rest.split_first_mut(), &lower.as_slice()[i..])
-            else {
-                break;
+    let mut columns = right.column_iter_mut();
+    loop {
+        let mut own: [_; SIDE_BY_SIDE] = std::array::from_fn(|_| columns.next());
+        let whole = own.each_mut().map(|c| c.as_mut().map(|c| c.as_mut_slice()));
+        match whole {
+            [Some(a), Some(b), Some(c), Some(d)] => solve_columns(lower, [a, b, c, d]),
+            rest => {
+                rest.into_iter()
+                    .flatten()
+                    .for_each(|column| solve_columns(lower, [column]));
+                return;
+            }
+        }
+    }
+}
+
+/// Solves some columns, one element of each after the other.
+#[inline(always)]
+fn solve_columns<const N: usize>(lower: DMatrixView<f64>, mut rest: [&mut [f64]; N]) {
+    for (i, lower) in lower.column_iter().enumerate() {
+        let [diagonal, lower @ ..] = &lower.as_slice()[i..] else {
+            return;
+        };
+        for column in &mut rest {
+            let Some((first, below)) = std::mem::take(column).split_first_mut() else {
+                continue;
             };
             *first /= diagonal;
             for (value, l) in below.iter_mut().zip(lower) {
                 *value -= *first * l;
             }
-            rest = below;
+            *column = below;
         }
     }
 }
