@@ -18,14 +18,17 @@ flown by a simulator with the derivatives of tonight's posterior and estimated a
 the standard deviations of the goals most in the minutes are chosen (docs/next.md).
 
   next_cards.csv, .parquet   every card: what it teaches, its minutes, its place in the flight, why it is refused
-  next_goals.csv, .parquet   standard deviation of each goal before and after the flight
+  next_goals.csv, .parquet   standard deviation of each goal before and after the flight, and its chance to be decided
   kneeboard.html, .pdf       one page for the pilot
 
-A file of goals lists derivatives with the standard deviation that is wanted of them:
+A file of goals lists derivatives with the standard deviation that is wanted of them, quantities of qualities.yaml whose level is to be \
+decided with a probability, and classes of maneuvers whose match by a simulator is:
 
   goals:
     - { derivative: NAME, alpha_deg: [10, 40], bound: 0.0002 }
     - { derivative: ANOTHER, weight: 2 }
+    - { quantity: dutch_roll_damping, alpha_deg: [10, 40], decided: 0.95 }
+    - { match: CLASS, alpha_deg: [10, 30], model: tunnel }
 
 Examples:
   harvest next --minutes 45                      by the cards of pipelines/harv, into reports/harv/next

@@ -36,6 +36,14 @@ pub fn candidates(cards: &Cards, config: &Config) -> Vec<Candidate> {
     found
 }
 
+/// Lowest and highest angle of attack of candidates.
+pub fn reach_deg<'a>(candidates: impl Iterator<Item = &'a Candidate>) -> (f64, f64) {
+    let alphas = candidates.map(|candidate| candidate.card.alpha_deg);
+    alphas.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), alpha| {
+        (low.min(alpha), high.max(alpha))
+    })
+}
+
 /// Test points with the flight whose altitude and mass they have: the candidates as written, or those
 /// of all flights.
 fn test_points(cards: &Cards) -> Vec<(&FlightCard, &TestPoint)> {

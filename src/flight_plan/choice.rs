@@ -1,8 +1,9 @@
 //! Choice of the cards of a flight: what they teach against the minutes they take.
 //!
 //! The state of knowledge is one Gaussian a coefficient. A card observes some of its rows with noise;
-//! its effect on the covariance does not depend on what it will read. With v the variance of an aim and
-//! w the standard deviation that is wanted of it, flying a set of cards is worth
+//! its effect on the covariance does not depend on what it will read. An aim may have a part in several
+//! coefficients, which are independent: its variance v is the sum of its parts'. With w the standard
+//! deviation that is wanted of it, flying a set of cards is worth
 //!
 //! Σ weight · ½ (ln max(v before, w²) − ln max(v after, w²))
 //!
@@ -28,10 +29,10 @@ const LEAST_IMPROVEMENT: f64 = 1e-4;
 const MOST_ROUNDS: usize = 20;
 
 /// Quantity of which a standard deviation is wanted.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Aim {
-    /// Row of the covariance.
-    pub row: usize,
+    /// Subject, and row of its covariance, of each part.
+    pub parts: Vec<(usize, usize)>,
     pub weight: f64,
     /// Wanted standard deviation; zero where each reduction counts.
     pub wanted: f64,
@@ -45,7 +46,6 @@ pub struct Subject {
     pub covariance: DMatrix<f64>,
     /// In the order of the cards; `None` for a card that observes nothing of it.
     pub cards: Vec<Option<PlannedRows>>,
-    pub aims: Vec<Aim>,
 }
 
 /// Price of a card.
@@ -70,6 +70,7 @@ pub struct Budget {
 #[derive(Clone, Debug)]
 pub struct CardChoice {
     pub subjects: Vec<Subject>,
+    pub aims: Vec<Aim>,
     pub prices: Vec<Price>,
     pub budget: Budget,
 }
@@ -91,6 +92,13 @@ pub struct CardSet<'a> {
 }
 
 impl CardChoice {
+    /// Variance of an aim before the flight.
+    fn variance(&self, aim: &Aim) -> f64 {
+        let parts = aim.parts.iter();
+        let of_part = |(s, row): &(usize, usize)| self.subjects[*s].covariance[(*row, *row)];
+        parts.map(of_part).sum()
+    }
+
     /// The set that is worth most, as far as exchanges find it.
     #[must_use]
     pub fn choose(&self) -> CardSet<'_> {
@@ -168,44 +176,47 @@ impl<'a> CardSet<'a> {
     /// Worth of the set, nats.
     #[must_use]
     pub fn worth(&self) -> f64 {
-        let both = self.choice.subjects.iter().zip(&self.covariances);
-        both.map(|(subject, covariance)| {
-            let aims = subject.aims.iter();
-            aims.map(|aim| {
-                let variance = |of: &DMatrix<f64>| of[(aim.row, aim.row)];
-                aim.worth(variance(&subject.covariance), variance(covariance))
-            })
-            .sum::<f64>()
-        })
-        .sum()
+        let aims = self.choice.aims.iter();
+        aims.map(|aim| aim.worth(self.choice.variance(aim), self.variance(aim)))
+            .sum()
     }
 
     /// Worth that a further card adds, nats.
     #[must_use]
     pub fn gain(&self, card: usize) -> f64 {
         let both = self.choice.subjects.iter().zip(&self.covariances);
-        both.map(|(subject, covariance)| {
-            let Some((rows, sum)) = predicted(subject, covariance, card) else {
-                return 0.0;
-            };
-            let mut halves = covariance.rows_range(rows.rows.clone()).into_owned();
-            solve_lower(sum.l_dirty().as_view(), halves.as_view_mut());
-            let aims = subject.aims.iter();
-            aims.map(|aim| {
-                let before = covariance[(aim.row, aim.row)];
-                aim.worth(before, before - halves.column(aim.row).norm_squared())
+        let halves: Vec<Option<DMatrix<f64>>> = both
+            .map(|(subject, covariance)| {
+                let (rows, sum) = predicted(subject, covariance, card)?;
+                let mut halves = covariance.rows_range(rows.rows.clone()).into_owned();
+                solve_lower(sum.l_dirty().as_view(), halves.as_view_mut());
+                Some(halves)
             })
-            .sum::<f64>()
+            .collect();
+        let reduction = |(subject, row): &(usize, usize)| {
+            let halves = halves[*subject].as_ref();
+            halves.map_or(0.0, |halves| halves.column(*row).norm_squared())
+        };
+        let aims = self.choice.aims.iter();
+        aims.map(|aim| {
+            let before = self.variance(aim);
+            let reduction: f64 = aim.parts.iter().map(reduction).sum();
+            aim.worth(before, before - reduction)
         })
         .sum()
     }
 
+    fn variance(&self, aim: &Aim) -> f64 {
+        let parts = aim.parts.iter();
+        parts
+            .map(|(s, row)| self.covariances[*s][(*row, *row)])
+            .sum()
+    }
+
     /// Standard deviation of an aim.
     #[must_use]
-    pub fn deviation(&self, subject: usize, aim: &Aim) -> f64 {
-        self.covariances[subject][(aim.row, aim.row)]
-            .max(0.0)
-            .sqrt()
+    pub fn deviation(&self, aim: &Aim) -> f64 {
+        self.variance(aim).max(0.0).sqrt()
     }
 
     /// Minutes of the set: its cards, and the way from the lowest angle of attack to the highest.

@@ -1,6 +1,9 @@
-//! Goals: derivatives with the bound that is wanted of them, as written in YAML.
+//! Goals as written in YAML: derivatives with the bound that is wanted of them, levels and matches to be
+//! decided.
 
 use serde::{Deserialize, Serialize};
+
+use crate::tables::{Airframe, ModelSource, Quantity};
 
 /// A file of goals.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -9,22 +12,51 @@ pub struct Goals {
     pub goals: Vec<Goal>,
 }
 
-/// A derivative over a range of angles of attack. Default: over all that the cards reach.
+/// A goal over a range of angles of attack. Default: over all that the cards reach. It has one of
+/// `derivative`, `quantity` and `match`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Goal {
     /// Derivative or sum of the posterior.
-    pub derivative: String,
+    #[serde(default)]
+    pub derivative: Option<String>,
+    /// Quantity of a mode whose level is to be decided.
+    #[serde(default)]
+    pub quantity: Option<Quantity>,
+    /// Airframe of the quantity; bare unless given.
+    #[serde(default)]
+    pub airframe: Option<Airframe>,
+    /// Class of the maneuvers whose proof of match is to be decided.
+    #[serde(default, rename = "match")]
+    pub class: Option<String>,
+    /// Simulator of the match; the first of the proof of match unless given.
+    #[serde(default)]
+    pub model: Option<ModelSource>,
     /// Lowest and highest angle of attack.
     #[serde(default)]
     pub alpha_deg: Option<(f64, f64)>,
     /// Wanted standard deviation, in the derivative's unit; without it each reduction counts.
     #[serde(default)]
     pub bound: Option<f64>,
+    /// Probability that decides a level or a match.
+    #[serde(default)]
+    pub decided: Option<f64>,
     /// Weight beside other goals.
     #[serde(default = "one")]
     pub weight: f64,
 }
+
+/// Subject of a goal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum GoalSubject<'a> {
+    Derivative(&'a str),
+    Level(Airframe, Quantity),
+    /// Class, and simulator unless it is the first.
+    Match(&'a str, Option<ModelSource>),
+}
+
+/// Probability that decides unless given.
+const DECIDED: f64 = 0.95;
 
 fn one() -> f64 {
     1.0
@@ -35,19 +67,65 @@ impl Goal {
     #[must_use]
     pub fn of(derivative: &str) -> Goal {
         Goal {
-            derivative: derivative.to_owned(),
+            derivative: Some(derivative.to_owned()),
+            quantity: None,
+            airframe: None,
+            class: None,
+            model: None,
             alpha_deg: None,
             bound: None,
+            decided: None,
             weight: one(),
         }
+    }
+
+    /// Name by which messages point at the goal.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        let quantity = self.quantity.map(Quantity::name);
+        let name = self.derivative.as_deref().or(quantity);
+        name.or(self.class.as_deref()).unwrap_or("goals")
+    }
+
+    /// Subject of the goal; `None` unless it has one alone.
+    #[must_use]
+    pub fn subject(&self) -> Option<GoalSubject<'_>> {
+        match (&self.derivative, self.quantity, &self.class) {
+            (Some(name), None, None) => Some(GoalSubject::Derivative(name)),
+            (None, Some(quantity), None) => {
+                let airframe = self.airframe.unwrap_or(Airframe::Bare);
+                Some(GoalSubject::Level(airframe, quantity))
+            }
+            (None, None, Some(class)) => Some(GoalSubject::Match(class, self.model)),
+            _ => None,
+        }
+    }
+
+    /// Probability that decides.
+    #[must_use]
+    pub fn deciding_share(&self) -> f64 {
+        self.decided.unwrap_or(DECIDED)
     }
 
     /// Mistake in the goal; `None` without one.
     #[must_use]
     pub fn mistake(&self) -> Option<&'static str> {
         let is_positive = |value: f64| value > 0.0 && value.is_finite();
-        if self.bound.is_some_and(|bound| !is_positive(bound)) {
+        let is_of_derivative = self.derivative.is_some();
+        if self.subject().is_none() {
+            Some("a goal has one of `derivative`, `quantity` and `match`")
+        } else if self.bound.is_some_and(|bound| !is_positive(bound)) {
             Some("`bound` must be a positive standard deviation")
+        } else if !is_of_derivative && self.bound.is_some() {
+            Some("`bound` is of a derivative; a level or a match has `decided`, a probability")
+        } else if is_of_derivative && self.decided.is_some() {
+            Some("`decided` is of a level or a match; a derivative has `bound`")
+        } else if self.decided.is_some_and(|p| !(p > 0.5 && p < 1.0)) {
+            Some("`decided` must be a probability over 0.5 and below 1")
+        } else if self.airframe.is_some() && self.quantity.is_none() {
+            Some("`airframe` is of a `quantity`")
+        } else if self.model.is_some() && self.class.is_none() {
+            Some("`model` is of a `match`")
         } else if !is_positive(self.weight) {
             Some("`weight` must be positive")
         } else if self

@@ -11,9 +11,9 @@ use crate::config::Config;
 use crate::lab::campaign::{FlightLimits, NextFlight};
 use crate::numerics::order_statistics::median;
 use crate::report::{angle, count, fixed, symbol, unit, well_formed};
-use crate::tables::{NextCardRow, NextGoalRow};
+use crate::tables::{GoalKind, NextCardRow, NextGoalRow, Quantity};
 
-/// Most goals on the sheet: the derivatives that gain most.
+/// Most goals on the sheet: those that gain most.
 const MOST_GOALS: usize = 14;
 
 /// Most refused cards on the sheet; the table has all.
@@ -61,10 +61,11 @@ struct Taught {
     rest: String,
 }
 
-/// Line of a derivative.
+/// Line of a goal.
 #[derive(Debug, Serialize)]
 struct GoalLine {
     symbol: String,
+    of: String,
     unit: String,
     range: String,
     before: String,
@@ -140,10 +141,10 @@ fn card_line(config: &Config, row: &NextCardRow, place: usize, at: f64) -> CardL
     let reach =
         |value: Option<f64>, decimals| value.map_or_else(String::new, |v| fixed(v, decimals));
     let teaches = row.teaches.split("; ").filter_map(|part| {
-        let (derivative, rest) = part.split_once(' ')?;
+        let (goal, rest) = part.split_once(" at ")?;
         Some(Taught {
-            symbol: symbol(derivative),
-            rest: rest.to_owned(),
+            symbol: goal_symbol(goal),
+            rest: format!("at {rest}"),
         })
     });
     CardLine {
@@ -168,24 +169,28 @@ fn card_line(config: &Config, row: &NextCardRow, place: usize, at: f64) -> CardL
     }
 }
 
-/// Lines of the derivatives that gain most, and the number of the others.
+/// Goals of one line: kind, name and airframe.
+type GoalKey<'a> = (GoalKind, &'a str, &'a str);
+
+/// Lines of the goals that gain most, and the number of the others.
 fn goal_lines(rows: &[NextGoalRow]) -> (Vec<GoalLine>, usize) {
-    let mut by_derivative: BTreeMap<&str, Vec<&NextGoalRow>> = BTreeMap::new();
+    let mut by_goal: BTreeMap<GoalKey, Vec<&NextGoalRow>> = BTreeMap::new();
     for row in rows {
-        by_derivative.entry(&row.derivative).or_default().push(row);
+        let key = (row.kind, row.goal.as_str(), row.of.as_str());
+        by_goal.entry(key).or_default().push(row);
     }
     let gain = |own: &[&NextGoalRow]| median(own.iter().map(|r| (r.before / r.after).ln()));
-    let mut all: Vec<(&str, Vec<&NextGoalRow>)> = by_derivative.into_iter().collect();
+    let mut all: Vec<(GoalKey, Vec<&NextGoalRow>)> = by_goal.into_iter().collect();
     all.sort_by(|(_, a), (_, b)| gain(b).unwrap_or(0.0).total_cmp(&gain(a).unwrap_or(0.0)));
     let further = all.len().saturating_sub(MOST_GOALS);
     let lines = all.into_iter().take(MOST_GOALS);
     (
-        lines.map(|(name, own)| goal_line(name, &own)).collect(),
+        lines.map(|(key, own)| goal_line(key, &own)).collect(),
         further,
     )
 }
 
-fn goal_line(derivative: &str, rows: &[&NextGoalRow]) -> GoalLine {
+fn goal_line((kind, goal, of): GoalKey, rows: &[&NextGoalRow]) -> GoalLine {
     let alphas = || rows.iter().map(|row| row.alpha_deg);
     let before = median(rows.iter().map(|row| row.before));
     let after = median(rows.iter().map(|row| row.after));
@@ -193,11 +198,9 @@ fn goal_line(derivative: &str, rows: &[&NextGoalRow]) -> GoalLine {
         rows.iter()
             .map(|row| 100.0 * (1.0 - row.after / row.before)),
     );
-    let wanted = rows.iter().filter(|row| row.wanted.is_some()).count();
-    let is_reached = |row: &&&NextGoalRow| row.wanted.is_some_and(|wanted| row.after <= wanted);
-    let reached = rows.iter().filter(is_reached).count();
     GoalLine {
-        symbol: symbol(derivative),
+        symbol: goal_symbol(goal),
+        of: of.to_owned(),
         unit: unit(
             &rows
                 .first()
@@ -211,12 +214,44 @@ fn goal_line(derivative: &str, rows: &[&NextGoalRow]) -> GoalLine {
         before: deviation(before),
         after: deviation(after),
         fall_pct: fall.map_or_else(String::new, |fall| fixed(fall, 0)),
-        reached: if wanted > 0 {
-            format!("{reached} of {}", count(wanted, "angle"))
-        } else {
-            String::new()
+        reached: match kind {
+            GoalKind::Derivative => bounds_reached(rows),
+            GoalKind::Level | GoalKind::Match => decisions(kind, rows),
         },
     }
+}
+
+/// Name of a goal: symbol of a derivative, words of a quantity, class of a match.
+fn goal_symbol(goal: &str) -> String {
+    match Quantity::from_word(goal) {
+        Some(quantity) => symbol(&quantity.name().replace('_', " ")),
+        None => symbol(goal),
+    }
+}
+
+/// Number of angles of attack at which a wanted bound is reached; empty without one.
+fn bounds_reached(rows: &[&NextGoalRow]) -> String {
+    let wanted = || rows.iter().filter_map(|row| Some((row.after, row.wanted?)));
+    let reached = wanted().filter(|(after, wanted)| after <= wanted).count();
+    match wanted().count() {
+        0 => String::new(),
+        all => format!("{reached} of {}", count(all, "angle")),
+    }
+}
+
+/// Expected number of angles of attack, or of maneuvers, at which a goal is decided after the flight.
+fn decisions(kind: GoalKind, rows: &[&NextGoalRow]) -> String {
+    let what = if kind == GoalKind::Match {
+        "maneuver"
+    } else {
+        "angle"
+    };
+    let after = rows.iter().filter_map(|row| row.decided_pct);
+    format!(
+        "decided: {} of {}",
+        fixed(0.01 * after.sum::<f64>(), 1),
+        count(rows.len(), what)
+    )
 }
 
 /// Standard deviation with two digits.

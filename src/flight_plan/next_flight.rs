@@ -5,22 +5,24 @@ use std::time::Duration;
 
 use rayon::prelude::*;
 
-use super::candidate::{Candidate, candidates};
+use super::candidate::{Candidate, candidates, reach_deg};
 use super::choice::Budget;
 use super::experience::CampaignHistory;
-use super::goals::{Goal, Goals};
+use super::goal_file;
+use super::goal_points::{GoalBasis, Matches};
+use super::goals::{Goal, GoalSubject};
 use super::kneeboard;
 use super::plan::{Plan, Rehearsal, Tonight, plan};
 use super::rehearsal::{self, RehearsalBasis};
-use crate::config::{Config, Source};
-use crate::error::{Error, Problem, Result, did_you_mean};
+use crate::config::Config;
+use crate::error::{Error, Problem, Result};
 use crate::lab::campaign::TestCards;
 use crate::lineage::Stage;
-use crate::model::Model;
 use crate::night::{campaign_lineage, shelf_of_stage};
 use crate::pdf;
-use crate::pipeline::{Campaign, Conductor, Progress, evidence};
+use crate::pipeline::{Campaign, Conductor, Progress, decisive_differences, evidence, flown_means};
 use crate::proof_of_match::of_posterior;
+use crate::qualities::{self, FlownConditions};
 use crate::store::{atomic, files, table};
 
 /// Published files of the page.
@@ -63,7 +65,25 @@ pub fn plan_next_flight(
     let cards = read_cards(config, request.cards)?;
     let conductor = Conductor::open(config, wait, progress)?;
     let campaign = conductor.campaign(Stage::Model)?;
-    let goals = read_goals(request.goals, &campaign.model)?;
+    let goals = goal_file::read(request.goals, config, &campaign.model)?;
+    let specification = config.qualities.as_ref();
+    let qualities = specification.map(|specification| qualities::Basis {
+        model: &campaign.model,
+        aircraft: &config.aircraft,
+        buildup: &config.buildup,
+        tunnel: &config.tunnel,
+        specification,
+    });
+    let conditions = FlownConditions::new(&flown_means(&campaign), &config.tunnel);
+    let qualities = qualities.as_ref().map(|basis| (basis, &conditions));
+    let matches = decisive_matches(&conductor, &campaign, &goals)?;
+    let reached = GoalBasis {
+        model: &campaign.model,
+        qualities,
+        matches: &matches,
+        reach_deg: reach_deg(candidates(&cards.cards, config).iter()),
+    };
+    goal_file::check_reached(request.goals, &goals, &reached)?;
     let rehearsals = rehearse(config, &cards, &campaign, progress)?;
     let flown = evidence(&campaign);
     let tonight = Tonight {
@@ -78,6 +98,8 @@ pub fn plan_next_flight(
         buildup: &config.buildup,
         tunnel: &config.tunnel,
         settings: &config.model,
+        qualities,
+        matches: &matches,
     };
     let next = &cards.cards.next;
     let budget = Budget {
@@ -122,28 +144,22 @@ fn read_cards(config: &Config, file: &Path) -> Result<TestCards> {
     Ok(cards)
 }
 
-/// Reads the goals; without a file each quantity of the posterior is one.
-fn read_goals(file: Option<&Path>, model: &Model) -> Result<Vec<Goal>> {
-    let Some(file) = file else {
-        return Ok(model.quantities().map(Goal::of).collect());
-    };
-    let source = Source::read(file.to_owned())?;
-    let goals: Goals = source.parse()?;
-    if goals.goals.is_empty() {
-        return Err(source.error("goals", "`goals` lists no goal"));
+/// Finds what decides the matches among the goals.
+fn decisive_matches(conductor: &Conductor, campaign: &Campaign, goals: &[Goal]) -> Result<Matches> {
+    let specification = conductor.runner.config.proof_of_match.as_ref();
+    let first = specification.and_then(|own| own.models.first());
+    let mut matches = Matches::new();
+    for (place, goal) in goals.iter().enumerate() {
+        let Some(GoalSubject::Match(class, model)) = goal.subject() else {
+            continue;
+        };
+        let Some(model) = model.or(first.copied()) else {
+            continue;
+        };
+        let found = decisive_differences(&conductor.runner, campaign, (class, model))?;
+        matches.insert(place, (model, found));
     }
-    for goal in &goals.goals {
-        let name = &goal.derivative;
-        if model.breakpoints_deg(name).is_none() {
-            let near = did_you_mean(name, model.quantities());
-            let what = format!("the posterior has no derivative `{name}`{near}");
-            return Err(source.error(name, what));
-        }
-        if let Some(mistake) = goal.mistake() {
-            return Err(source.error(name, format!("{name}: {mistake}")));
-        }
-    }
-    Ok(goals.goals)
+    Ok(matches)
 }
 
 /// Rehearses the candidates, in their order.

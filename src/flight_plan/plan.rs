@@ -1,13 +1,15 @@
 //! Plan of the next flight: candidates and goals to a choice, and the choice to the rows of the tables.
 
-use super::candidate::Candidate;
+use super::candidate::{Candidate, reach_deg};
 use super::choice::{Aim, Budget, CardChoice, CardSet, Price, Subject};
 use super::experience::{CampaignHistory, noise_factors, with_noise};
+use super::goal_points::{GoalBasis, GoalPoint, Matches, Target};
 use super::goals::Goal;
 use super::rehearsal::Rehearsed;
 use crate::aero::{Buildup, Condition, WindTunnel};
 use crate::estimate::Covariance;
 use crate::model::{self, Evidence, Model, Outlook, Point};
+use crate::qualities::{self, FlownConditions};
 use crate::tables::{NextCardRow, NextGoalRow};
 
 /// Number of goals that a card's row names.
@@ -22,6 +24,9 @@ pub struct Tonight<'a> {
     pub buildup: &'a Buildup,
     pub tunnel: &'a WindTunnel,
     pub settings: &'a model::Settings,
+    /// Flying qualities whose levels may be goals, with the flown conditions.
+    pub qualities: Option<(&'a qualities::Basis<'a>, &'a FlownConditions)>,
+    pub matches: &'a Matches,
 }
 
 /// A candidate with its rehearsal, or the reason why it is refused.
@@ -29,15 +34,6 @@ pub type Rehearsal = (Candidate, Result<Rehearsed, String>);
 
 /// A candidate that is not refused.
 type Kept<'a> = (&'a Candidate, &'a Rehearsed);
-
-/// A goal at one angle of attack.
-#[derive(Clone, Debug, PartialEq)]
-struct GoalPoint {
-    point: Point,
-    unit: &'static str,
-    weight: f64,
-    wanted: Option<f64>,
-}
 
 /// Rows of the next flight.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -66,8 +62,10 @@ pub fn plan(tonight: &Tonight, rehearsals: &[Rehearsal], goals: &[Goal], budget:
         .filter_map(|(candidate, result)| Some((candidate, result.as_ref().ok()?)))
         .collect();
     let points = goal_points(tonight, &kept, goals);
+    let outlooks = outlooks(tonight, &kept, &points);
     let choice = CardChoice {
-        subjects: subjects(tonight, &kept, &points),
+        aims: aims(&outlooks, &points),
+        subjects: subjects(tonight, &kept, outlooks),
         prices: kept.iter().map(|(candidate, _)| price(candidate)).collect(),
         budget,
     };
@@ -101,34 +99,15 @@ fn price(candidate: &Candidate) -> Price {
     }
 }
 
-/// Goals at each of their angles of attack. The weight of a goal is shared by its angles, so that the
-/// worth of a plan is the goals' weighted mean.
+/// Goals at each of their angles of attack.
 fn goal_points(tonight: &Tonight, kept: &[Kept], goals: &[Goal]) -> Vec<GoalPoint> {
-    let alphas = || kept.iter().map(|(c, _)| c.card.alpha_deg);
-    let lowest = alphas().fold(f64::INFINITY, f64::min);
-    let highest = alphas().fold(f64::NEG_INFINITY, f64::max);
-    let all: f64 = goals.iter().map(|goal| goal.weight).sum();
-    let mut points = Vec::new();
-    for goal in goals {
-        let Some((unit, breakpoints)) = tonight.model.breakpoints_deg(&goal.derivative) else {
-            continue;
-        };
-        let alphas = goal.alphas_deg(breakpoints, (lowest, highest));
-        let weight = goal.weight / all / alphas.len() as f64;
-        let of_goal = alphas.into_iter().filter_map(|alpha_deg| {
-            Some(GoalPoint {
-                point: Point {
-                    derivative: goal.derivative.clone(),
-                    condition: condition(tonight, kept, alpha_deg)?,
-                },
-                unit,
-                weight,
-                wanted: goal.bound,
-            })
-        });
-        points.extend(of_goal);
-    }
-    points
+    let basis = GoalBasis {
+        model: tonight.model,
+        qualities: tonight.qualities,
+        matches: tonight.matches,
+        reach_deg: reach_deg(kept.iter().map(|(candidate, _)| *candidate)),
+    };
+    basis.points(goals, &|alpha_deg| condition(tonight, kept, alpha_deg))
 }
 
 /// Flight condition at an angle of attack: that of the nearest card; `None` without cards.
@@ -144,8 +123,9 @@ fn condition(tonight: &Tonight, kept: &[Kept], alpha_deg: f64) -> Option<Conditi
     })
 }
 
-/// Observations of each coefficient by the cards, with the noise of the campaign's maneuvers.
-fn subjects(tonight: &Tonight, kept: &[Kept], points: &[GoalPoint]) -> Vec<Subject> {
+/// Outlook of each coefficient on the cards, with the noise of the campaign's maneuvers, and on the
+/// goals.
+fn outlooks(tonight: &Tonight, kept: &[Kept], points: &[GoalPoint]) -> Vec<Outlook> {
     let covariances = covariances(tonight, kept);
     let planned = kept.iter().zip(&covariances);
     let planned: Vec<Evidence> = planned
@@ -159,23 +139,61 @@ fn subjects(tonight: &Tonight, kept: &[Kept], points: &[GoalPoint]) -> Vec<Subje
         })
         .collect();
     let asked: Vec<Point> = points.iter().map(|p| p.point.clone()).collect();
-    let outlooks = tonight.model.outlook(
+    tonight.model.outlook(
         (tonight.evidence, &planned),
         &asked,
         (tonight.buildup, tonight.tunnel),
         tonight.settings,
-    );
-    let shares: Vec<f64> = kept
-        .iter()
-        .map(|(candidate, _)| {
-            let experience = tonight.history.of(&candidate.card.class);
-            experience.usable * experience.weight
+    )
+}
+
+/// Aims of the goals: each has a part in every coefficient whose outlook has a row of it.
+fn aims(outlooks: &[Outlook], points: &[GoalPoint]) -> Vec<Aim> {
+    let mut parts: Vec<Vec<(usize, usize)>> = vec![vec![]; points.len()];
+    for (subject, outlook) in outlooks.iter().enumerate() {
+        for (point, row) in &outlook.points {
+            parts[*point].push((subject, *row));
+        }
+    }
+    let all = points.iter().zip(parts).enumerate();
+    let known = all.filter(|(_, (_, parts))| !parts.is_empty());
+    known
+        .map(|(point, (goal, parts))| {
+            let variances = parts
+                .iter()
+                .map(|(s, row)| outlooks[*s].covariance[(*row, *row)]);
+            let before = variances.sum::<f64>().max(0.0).sqrt();
+            Aim {
+                parts,
+                weight: goal.weight,
+                wanted: goal.target.wanted(before),
+                point,
+            }
         })
-        .collect();
-    let subjects = outlooks.into_iter();
-    subjects
-        .map(|outlook| subject(outlook, points, &shares))
         .collect()
+}
+
+/// Knowledge of each coefficient. A card that is usable, and weighs, by a share has that share of its
+/// information: its noise is so much larger.
+fn subjects(tonight: &Tonight, kept: &[Kept], outlooks: Vec<Outlook>) -> Vec<Subject> {
+    let share = |(candidate, _): &Kept| {
+        let experience = tonight.history.of(&candidate.card.class);
+        experience.usable * experience.weight
+    };
+    let shares: Vec<f64> = kept.iter().map(share).collect();
+    let subject = |outlook: Outlook| {
+        let mut cards = outlook.planned;
+        for (card, share) in cards.iter_mut().zip(&shares) {
+            if let Some(card) = card {
+                card.noise /= *share;
+            }
+        }
+        Subject {
+            covariance: outlook.covariance,
+            cards,
+        }
+    };
+    outlooks.into_iter().map(subject).collect()
 }
 
 /// Covariance of each card, with the noise of the campaign's maneuvers of its class.
@@ -191,28 +209,6 @@ fn covariances(tonight: &Tonight, kept: &[Kept]) -> Vec<Option<Covariance>> {
         Some(with_noise(covariance, factor.copied().unwrap_or(1.0)))
     });
     own.collect()
-}
-
-/// Knowledge of a coefficient. A card that is usable, and weighs, by a share has that share of its
-/// information: its noise is so much larger.
-fn subject(outlook: Outlook, points: &[GoalPoint], shares: &[f64]) -> Subject {
-    let mut cards = outlook.planned;
-    for (card, share) in cards.iter_mut().zip(shares) {
-        if let Some(card) = card {
-            card.noise /= *share;
-        }
-    }
-    let aim = |(point, row): &(usize, usize)| Aim {
-        row: *row,
-        weight: points[*point].weight,
-        wanted: points[*point].wanted.unwrap_or(0.0),
-        point: *point,
-    };
-    Subject {
-        aims: outlook.points.iter().map(aim).collect(),
-        covariance: outlook.covariance,
-        cards,
-    }
 }
 
 /// Choice as rows of the tables.
@@ -295,12 +291,11 @@ impl Rows<'_> {
         let mut after = nothing.clone();
         after.fly(card);
         let mut gains: Vec<(f64, &GoalPoint, f64, f64)> = self
-            .aims()
-            .map(|(subject, aim)| {
-                let (before, after) = (
-                    nothing.deviation(subject, aim),
-                    after.deviation(subject, aim),
-                );
+            .choice
+            .aims
+            .iter()
+            .map(|aim| {
+                let (before, after) = (nothing.deviation(aim), after.deviation(aim));
                 let worth = aim.worth(before * before, after * after);
                 (worth, &self.points[aim.point], before, after)
             })
@@ -310,45 +305,57 @@ impl Rows<'_> {
         let mut named: Vec<&str> = Vec::new();
         let mut parts = Vec::new();
         for (_, goal, before, after) in gains {
-            let Point {
-                derivative,
-                condition,
-            } = &goal.point;
-            if named.len() < NAMED_GOALS && !named.contains(&derivative.as_str()) {
-                named.push(derivative);
-                let alpha_deg = condition.alpha_deg;
+            let name = goal.name.as_str();
+            if named.len() < NAMED_GOALS && !named.contains(&name) {
+                named.push(name);
+                let alpha_deg = goal.point.condition.alpha_deg;
                 parts.push(format!(
-                    "{derivative} at {alpha_deg}°: {before:.2e} to {after:.2e}"
+                    "{name} at {alpha_deg}°: {before:.2e} to {after:.2e}"
                 ));
             }
         }
         parts.join("; ")
     }
 
-    fn aims(&self) -> impl Iterator<Item = (usize, &Aim)> {
-        let subjects = self.choice.subjects.iter().enumerate();
-        subjects.flat_map(|(i, subject)| subject.aims.iter().map(move |aim| (i, aim)))
-    }
-
     /// Goals in the order of the goals' file, or of the posterior.
     fn goals(&self) -> Vec<NextGoalRow> {
         let nothing = CardSet::nothing(self.choice);
-        let mut rows: Vec<(usize, NextGoalRow)> = self
-            .aims()
-            .map(|(subject, aim)| {
-                let goal = &self.points[aim.point];
-                let row = NextGoalRow {
-                    derivative: goal.point.derivative.clone(),
-                    unit: goal.unit.to_owned(),
-                    alpha_deg: goal.point.condition.alpha_deg,
-                    before: nothing.deviation(subject, aim),
-                    after: self.flown.deviation(subject, aim),
-                    wanted: goal.wanted,
-                };
-                (aim.point, row)
-            })
-            .collect();
-        rows.sort_by_key(|(point, _)| *point);
-        rows.into_iter().map(|(_, row)| row).collect()
+        let row = |aim: &Aim| {
+            let deviations = (nothing.deviation(aim), self.flown.deviation(aim));
+            goal_row(&self.points[aim.point], aim.wanted, deviations)
+        };
+        self.choice.aims.iter().map(row).collect()
+    }
+}
+
+/// Row of a goal with its standard deviations before and after the flight.
+fn goal_row(goal: &GoalPoint, wanted: f64, (before, after): (f64, f64)) -> NextGoalRow {
+    let decision = match &goal.target {
+        Target::Bound(_) => None,
+        Target::Decision(decision) => Some(decision),
+    };
+    let interval = decision.map(|own| own.most_probable(before));
+    let limit = |limit: fn((f64, f64)) -> f64| {
+        let (sides, _) = interval?;
+        Some(limit(sides)).filter(|value| value.is_finite())
+    };
+    NextGoalRow {
+        kind: goal.kind,
+        goal: goal.name.clone(),
+        of: goal.of.to_owned(),
+        decided_by: goal.decided_by.clone(),
+        unit: goal.unit.to_owned(),
+        alpha_deg: goal.point.condition.alpha_deg,
+        before,
+        after,
+        wanted: match &goal.target {
+            Target::Bound(bound) => *bound,
+            Target::Decision(_) => (wanted > 0.0 && wanted < before).then_some(wanted),
+        },
+        value: decision.map(|own| own.mean),
+        lower_limit: limit(|sides| sides.0),
+        upper_limit: limit(|sides| sides.1),
+        probability_pct: interval.map(|(_, probability)| 100.0 * probability),
+        decided_pct: decision.map(|own| 100.0 * own.decided(before, after)),
     }
 }

@@ -76,9 +76,10 @@ impl CoefficientPosterior {
         let mut tunnel = Vec::new();
         let mut rows: Vec<SparseRow> = Vec::new();
         for (term, start) in self.terms.iter().zip(&self.unknowns.starts) {
-            let value = Some(term.prior.grid.shares(condition));
-            for (shares, is_mach_slope) in [(value, false), (mach_shares(term, condition), true)] {
-                let Some(shares) = shares else { continue };
+            for is_mach_slope in [false, true] {
+                let Some(shares) = local_shares(term, condition, is_mach_slope) else {
+                    continue;
+                };
                 values.push(LocalValue {
                     coefficient,
                     derivative: term.derivative.clone(),
@@ -107,18 +108,25 @@ impl CoefficientPosterior {
     }
 }
 
-/// Weights of the grid's points in the slope along Mach number; `None` for a table without Mach.
-fn mach_shares(term: &Term, condition: &Condition) -> Option<SparseRow> {
-    let at = |mach: f64| {
-        let condition = Condition { mach, ..*condition };
-        term.prior.grid.shares(&condition)
-    };
-    if term.prior.grid.machs.is_empty() {
+/// Weights of the grid's points in the value of a term, or in its slope along Mach number; `None` for
+/// the slope of a table without Mach.
+pub fn local_shares(term: &Term, condition: &Condition, is_mach_slope: bool) -> Option<SparseRow> {
+    let grid = &term.prior.grid;
+    if !is_mach_slope {
+        return Some(grid.shares(condition));
+    }
+    if grid.machs.is_empty() {
         return None;
     }
     let per_mach = 0.5 / MACH_STEP;
-    let above = at(condition.mach + MACH_STEP).into_iter();
-    let below = at(condition.mach - MACH_STEP).into_iter();
+    let at = |step: f64| {
+        grid.shares(&Condition {
+            mach: condition.mach + step,
+            ..*condition
+        })
+    };
+    let above = at(MACH_STEP).into_iter();
+    let below = at(-MACH_STEP).into_iter();
     let above = above.map(|(node, share)| (node, share * per_mach));
     let below = below.map(|(node, share)| (node, -share * per_mach));
     Some(above.chain(below).collect())

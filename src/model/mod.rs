@@ -49,7 +49,7 @@ pub use draws::CorrelatedDerivatives;
 pub use evidence::Evidence;
 pub use lift_and_drag::Flown;
 pub use local::{LocalKind, LocalPosterior, LocalValue};
-pub use outlook::{Outlook, PlannedRows, Point};
+pub use outlook::{Outlook, PlannedRows, Point, PointQuantity};
 pub use settings::Settings;
 
 /// Computes the posterior of every derivative. The order of the evidence within a flight, and of the

@@ -17,6 +17,7 @@ use nalgebra::{DMatrix, DVector};
 use super::campaign_model::Model;
 use super::coefficient::{CoefficientPosterior, Data};
 use super::evidence::{Evidence, in_order};
+use super::local::{LocalValue, local_shares};
 use super::observation::Observation;
 use super::posterior::{gaussian, information};
 use super::settings::Settings;
@@ -26,11 +27,21 @@ use crate::aero::{Buildup, Condition, WindTunnel};
 use crate::numerics::root::EXACT;
 use crate::output_error::error_effect::SharedError;
 
-/// A derivative, or sum of derivatives, at a flight condition.
+/// Quantity at a flight condition.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
-    pub derivative: String,
+    pub quantity: PointQuantity,
     pub condition: Condition,
+}
+
+/// Quantity whose variance is asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PointQuantity {
+    /// A derivative, or sum of derivatives, as published.
+    Published(String),
+    /// Linear combination of the values of [`Model::at`]. Its variance is the sum of its variances in
+    /// each coefficient.
+    Combination(Vec<(LocalValue, f64)>),
 }
 
 /// Rows of a planned maneuver's estimates, with the covariance of what no other maneuver shares.
@@ -48,7 +59,7 @@ pub struct Outlook {
     /// In the order of the planned maneuvers; `None` for one that estimates nothing of the
     /// coefficient.
     pub planned: Vec<Option<PlannedRows>>,
-    /// Place among the points asked for, and row, of each point of the coefficient.
+    /// Place among the points asked for, and row, of each point that the coefficient has a part in.
     pub points: Vec<(usize, usize)>,
 }
 
@@ -167,24 +178,57 @@ impl CoefficientPosterior {
         &observation.noise + between_points(&self.terms, &self.noise_scales, design, at)
     }
 
-    /// Row of a point over the unknowns: of a term, or of the constant of a sum; `None` for a
-    /// derivative of another coefficient.
+    /// Row of a point over the unknowns; `None` for one that the coefficient has no part in.
     fn row(&self, point: &Point, unknowns: &Unknowns) -> Option<SparseRow> {
+        match &point.quantity {
+            PointQuantity::Published(name) => self.published_row(name, &point.condition, unknowns),
+            PointQuantity::Combination(values) => {
+                self.combined_row(values, &point.condition, unknowns)
+            }
+        }
+    }
+
+    /// Row of a term, or of the constant of a sum; `None` for a derivative of another coefficient.
+    fn published_row(
+        &self,
+        name: &str,
+        condition: &Condition,
+        unknowns: &Unknowns,
+    ) -> Option<SparseRow> {
         let of_term = |place: usize, weight: f64| {
-            let shares = self.terms[place].prior.grid.shares(&point.condition);
+            let shares = self.terms[place].prior.grid.shares(condition);
             let start = unknowns.starts[place];
             let weighted = shares.into_iter();
             weighted.map(move |(node, share)| (start + node, weight * share))
         };
         let place = |is: &dyn Fn(&Term) -> bool| self.terms.iter().position(is);
-        if let Some(term) = place(&|t| t.prior.name == point.derivative) {
+        if let Some(term) = place(&|t| t.prior.name == name) {
             return Some(of_term(term, 1.0).collect());
         }
-        let term = place(&|t| t.derivative == point.derivative)?;
+        let term = place(&|t| t.derivative == name)?;
         let slope = self.terms[term].slope.as_ref()?;
         let slope = place(&|t| t.derivative == *slope)?;
-        let of_slope = of_term(slope, -point.condition.alpha_deg);
+        let of_slope = of_term(slope, -condition.alpha_deg);
         Some(of_term(term, 1.0).chain(of_slope).collect())
+    }
+
+    /// Row of the coefficient's part in a combination; `None` without one.
+    fn combined_row(
+        &self,
+        values: &[(LocalValue, f64)],
+        condition: &Condition,
+        unknowns: &Unknowns,
+    ) -> Option<SparseRow> {
+        let mut row = SparseRow::new();
+        for (value, weight) in values {
+            let mut terms = self.terms.iter().zip(&unknowns.starts);
+            let own = terms.find(|(term, _)| term.derivative == value.derivative);
+            let Some((term, start)) = own else { continue };
+            let shares = local_shares(term, condition, value.is_mach_slope).unwrap_or_default();
+            let shares = shares.into_iter();
+            row.extend(shares.map(|(node, share)| (start + node, weight * share)));
+        }
+        (!row.is_empty()).then_some(row)
     }
 }
 

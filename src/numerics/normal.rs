@@ -1,12 +1,26 @@
 //! The standard normal distribution.
 
-use statrs::function::erf::erf;
+use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
+
+use statrs::function::erf::{erf, erf_inv};
 
 /// Probability that a normal deviate with a mean and standard deviation lies within ± a width.
 #[must_use]
 pub fn within(width: f64, mean: f64, deviation: f64) -> f64 {
-    let scale = std::f64::consts::FRAC_1_SQRT_2 / deviation;
+    let scale = FRAC_1_SQRT_2 / deviation;
     0.5 * (erf(scale * (width - mean)) + erf(scale * (width + mean)))
+}
+
+/// Probability that a standard normal deviate is below a value.
+#[must_use]
+pub fn below(value: f64) -> f64 {
+    0.5 * (1.0 + erf(FRAC_1_SQRT_2 * value))
+}
+
+/// Value below which a standard normal deviate is with a probability.
+#[must_use]
+pub fn quantile(probability: f64) -> f64 {
+    SQRT_2 * erf_inv(2.0 * probability - 1.0)
 }
 
 #[cfg(test)]
@@ -22,6 +36,10 @@ mod tests {
             (3.0, 0.997_300_204),
         ] {
             assert_relative_eq!(within(2.0 * width, 0.0, 2.0), expected, max_relative = 1e-7);
+        }
+        for (value, expected) in [(0.0, 0.5), (1.644_854, 0.95), (-2.326_348, 0.01)] {
+            assert_relative_eq!(below(value), expected, epsilon = 1e-7);
+            assert_relative_eq!(quantile(expected), value, epsilon = 1e-5);
         }
         // A mean on the limit leaves half, a mean beyond it by a deviation 15.9 %.
         assert_relative_eq!(within(5.0, 5.0, 0.1), 0.5, max_relative = 1e-9);

@@ -18,7 +18,9 @@ use crate::error::Result;
 use crate::flight::Correction;
 use crate::maneuver::{Maneuver, Means};
 use crate::model::Model;
-use crate::proof_of_match::{self, Basis, Flown, Matched, OwnEstimates, Specification};
+use crate::proof_of_match::{
+    self, Basis, DecisiveDifference, Flown, Matched, OwnEstimates, Specification,
+};
 use crate::store::{ArtefactName, Fingerprint, Kind};
 use crate::surfaces::DelayCorrection;
 use crate::tables::{EstimateRow, ModelSource, Outcome};
@@ -108,12 +110,7 @@ pub fn fly_again(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
     };
     let tunnel = runner.config.tunnel.clamped();
     let posterior = proof_of_match::of_posterior(&campaign.model.rows.posterior, &tunnel);
-    let database = |model: &ModelSource| match model {
-        ModelSource::Posterior => posterior.clone(),
-        ModelSource::Trend => of_trends(runner.config, campaign, &tunnel),
-        ModelSource::Tunnel => tunnel.clone(),
-        ModelSource::Database => runner.config.match_database.clamped(),
-    };
+    let database = |model: &ModelSource| database(runner, campaign, (&posterior, &tunnel), *model);
     let models = specification.models.iter();
     let models: Vec<(ModelSource, WindTunnel)> = models.map(|m| (*m, database(m))).collect();
     let derivatives = Fingerprint::of("models", 1)
@@ -155,6 +152,74 @@ pub fn fly_again(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
     let brought = brought?.into_iter().flatten().flatten();
     campaign.matched = brought.map(|brought| brought.artefact).collect();
     Ok(())
+}
+
+/// Finds what decides the proof of match of the flown maneuvers of a class, when a model predicts them:
+/// the differences of those that can be flown again, in the order of the flights.
+///
+/// # Errors
+/// A record that cannot be read.
+pub fn decisive_differences(
+    runner: &StepRunner,
+    campaign: &Campaign,
+    (class, model): (&str, ModelSource),
+) -> Result<Vec<DecisiveDifference>> {
+    let Some(specification) = &runner.config.proof_of_match else {
+        return Ok(vec![]);
+    };
+    let tunnel = runner.config.tunnel.clamped();
+    let posterior = proof_of_match::of_posterior(&campaign.model.rows.posterior, &tunnel);
+    let models = [(
+        model,
+        database(runner, campaign, (&posterior, &tunnel), model),
+    )];
+    let basis = Basis {
+        aircraft: &runner.config.aircraft,
+        buildup: &runner.config.buildup,
+        models: &models,
+        posterior: &posterior,
+        tunnel: &tunnel,
+        specification,
+    };
+    let of_flight = |flight: &Flight| {
+        let record = LazyRecord::new(flight, &runner.store, &campaign.delays);
+        let own = campaign
+            .maneuvers
+            .iter()
+            .filter(|m| m.flight_id == flight.id() && m.class == class && !m.is_rejected());
+        let mut found = Vec::new();
+        for maneuver in own {
+            let record = record.part(maneuver)?;
+            let local = campaign
+                .model
+                .at(maneuver.axis, &maneuver.condition(&tunnel));
+            let flown = Flown {
+                record: &record,
+                maneuver,
+                local: Some(&local),
+                own: None,
+            };
+            found.extend(proof_of_match::decisive_difference(&basis, &flown));
+        }
+        Ok(found)
+    };
+    let found: Result<Vec<Vec<_>>> = campaign.flights.par_iter().map(of_flight).collect();
+    Ok(found?.into_iter().flatten().collect())
+}
+
+/// Derivatives of a model.
+fn database(
+    runner: &StepRunner,
+    campaign: &Campaign,
+    (posterior, tunnel): (&WindTunnel, &WindTunnel),
+    model: ModelSource,
+) -> WindTunnel {
+    match model {
+        ModelSource::Posterior => posterior.clone(),
+        ModelSource::Trend => of_trends(runner.config, campaign, tunnel),
+        ModelSource::Tunnel => tunnel.clone(),
+        ModelSource::Database => runner.config.match_database.clamped(),
+    }
 }
 
 /// Means and estimates of a maneuver that converged.

@@ -15,11 +15,7 @@ pub fn judge_qualities(config: &Config, campaign: &mut Campaign) {
     let Some(specification) = &config.qualities else {
         return;
     };
-    let maneuvers = campaign.maneuvers.iter().zip(&campaign.means);
-    let flown: Vec<(&Maneuver, &Means)> = maneuvers
-        .filter(|(maneuver, _)| !maneuver.is_rejected())
-        .filter_map(|(maneuver, means)| Some((maneuver, means.as_ref()?)))
-        .collect();
+    let flown = flown_means(campaign);
     let basis = Basis {
         model: &campaign.model,
         aircraft: &config.aircraft,
@@ -35,4 +31,13 @@ pub fn judge_qualities(config: &Config, campaign: &mut Campaign) {
         campaign.problems.push(problem);
     }
     campaign.qualities = found;
+}
+
+/// Maneuvers in whose conditions flying qualities are judged, with their means.
+pub fn flown_means(campaign: &Campaign) -> Vec<(&Maneuver, &Means)> {
+    let maneuvers = campaign.maneuvers.iter().zip(&campaign.means);
+    maneuvers
+        .filter(|(maneuver, _)| !maneuver.is_rejected())
+        .filter_map(|(maneuver, means)| Some((maneuver, means.as_ref()?)))
+        .collect()
 }

@@ -3,13 +3,14 @@
 use serde::{Deserialize, Serialize};
 
 use super::aerodynamics::Aerodynamics;
+use super::decisive_difference::{DecisiveDifference, LinearOutputs};
 use super::derivative_table::DerivativeTable;
 use super::dutch_roll::{LateralModes, OwnEstimates};
 use super::free_run::{FreeRun, Simulation};
 use super::judgement::{self, Finding, Simulated};
 use super::outputs::place;
 use super::recording::Recording;
-use super::repeat_flight::{self, Effects, Probabilities};
+use super::repeat_flight::{self, Effects, MovedRuns, Probabilities};
 use super::specification::{Specification, Test};
 use super::start::{self, MatchedStart};
 use crate::aero::{Axis, Buildup, WindTunnel};
@@ -77,34 +78,18 @@ impl Matched {
 /// Flies a maneuver again with each model.
 #[must_use]
 pub fn fly_again(basis: &Basis, flown: &Flown) -> Matched {
-    let Flown {
-        record,
-        maneuver,
-        local,
-        own,
-    } = *flown;
-    let specification = basis.specification;
-    let tests: Vec<&Test> = specification
-        .tests
-        .iter()
-        .filter(|test| test.judges(maneuver.axis, &maneuver.class))
-        .collect();
-    if tests.is_empty() {
-        return not_flown(basis, maneuver, "no test judges its class");
+    match Flight::new(basis, flown) {
+        Ok(flight) => flight.matched(),
+        Err(reason) => not_flown(basis, flown.maneuver, &reason),
     }
-    let aircraft = (basis.aircraft, basis.buildup);
-    match Recording::new(record, maneuver, aircraft, specification.trim_s) {
-        Ok(recording) => Flight {
-            basis,
-            maneuver,
-            local,
-            modes: dutch_roll(basis, maneuver, own),
-            tests,
-            recording,
-        }
-        .matched(),
-        Err(reason) => not_flown(basis, maneuver, &reason),
-    }
+}
+
+/// Finds the difference that decides whether a repeat flight passes, when the first model predicts it.
+///
+/// # Errors
+/// The reason why there is none.
+pub fn decisive_difference(basis: &Basis, flown: &Flown) -> Result<DecisiveDifference, String> {
+    Flight::new(basis, flown)?.decisive_difference()
 }
 
 /// Dutch roll of a lateral maneuver by its own estimates.
@@ -164,7 +149,70 @@ struct Flight<'a> {
     recording: Recording,
 }
 
-impl Flight<'_> {
+impl<'a> Flight<'a> {
+    /// A maneuver that can be flown again.
+    ///
+    /// # Errors
+    /// The reason why it cannot.
+    fn new(basis: &'a Basis, flown: &Flown<'a>) -> Result<Flight<'a>, String> {
+        let Flown {
+            record,
+            maneuver,
+            local,
+            own,
+        } = *flown;
+        let specification = basis.specification;
+        let tests: Vec<&Test> = specification
+            .tests
+            .iter()
+            .filter(|test| test.judges(maneuver.axis, &maneuver.class))
+            .collect();
+        if tests.is_empty() {
+            return Err("no test judges its class".to_owned());
+        }
+        let aircraft = (basis.aircraft, basis.buildup);
+        Ok(Flight {
+            basis,
+            maneuver,
+            local,
+            modes: dutch_roll(basis, maneuver, own),
+            tests,
+            recording: Recording::new(record, maneuver, aircraft, specification.trim_s)?,
+        })
+    }
+
+    /// Difference that decides whether a repeat flight passes, when the first model predicts it.
+    fn decisive_difference(&self) -> Result<DecisiveDifference, String> {
+        let basis = self.basis;
+        let (model, database) = basis.models.first().ok_or("no model is given")?;
+        let local = self.local.ok_or("the posterior has nothing of its axis")?;
+        let posterior = self.trimmed(basis.posterior);
+        let start = &posterior.start;
+        let runs = MovedRuns::new(&posterior.simulation, &start.start, basis.buildup);
+        let axis = (basis.buildup, self.maneuver.axis);
+        let linear =
+            LinearOutputs::new((runs, start), local, axis).ok_or("its start is not determined")?;
+        let follows_mean = *model == ModelSource::Posterior;
+        let own = (!follows_mean).then(|| self.trimmed(database));
+        let Trimmed { simulation, start } = own.as_ref().unwrap_or(&posterior);
+        let run = simulation.fly(&start.start, self.recording.samples, linear.stride);
+        let judged = judgement::judged(&self.tests, false);
+        let decisive = linear
+            .decisive(&self.recording, &run, local, &judged)
+            .ok_or("its simulation departs, or no tolerance is of a time history")?;
+        let named = decisive.slopes.iter();
+        let named = named.map(|(value, slope)| (local.values[*value].clone(), *slope));
+        Ok(DecisiveDifference {
+            maneuver_id: self.maneuver.maneuver_id.clone(),
+            condition: self.maneuver.condition(basis.tunnel),
+            quantity: decisive.quantity,
+            mean: decisive.mean,
+            slopes: named.collect(),
+            rest: decisive.rest,
+            follows_mean,
+        })
+    }
+
     fn matched(&self) -> Matched {
         let posterior = self.trimmed(self.basis.posterior);
         let effects = self.effects(&posterior);

@@ -4,7 +4,8 @@
 //! [`recording`] is the maneuver as recorded: inputs and outputs. [`derivative_table`] and
 //! [`aerodynamics`] are the model that flies it, [`free_run`] the flight, and [`start`] its initial
 //! state and trim. [`specification`] has the tolerances, which are the analyst's data; [`judgement`]
-//! compares, and [`dutch_roll`] adds the modes of the flight's own estimates; [`repeat_flight`] adds the probability that a repeat flight passes.
+//! compares, and [`dutch_roll`] adds the modes of the flight's own estimates; [`repeat_flight`] adds the probability that a repeat flight passes,
+//! and [`mod@decisive_difference`] what decides it, as a linear function of the derivatives.
 
 mod specification;
 mod outputs;
@@ -17,12 +18,14 @@ mod deviations;
 mod dutch_roll;
 mod judgement;
 mod repeat_flight;
+mod decisive_difference;
 mod maneuver;
 mod models;
 #[cfg(test)]
 mod tests;
 
+pub use decisive_difference::DecisiveDifference;
 pub use dutch_roll::OwnEstimates;
-pub use maneuver::{Basis, Flown, Matched, fly_again, not_flown};
+pub use maneuver::{Basis, Flown, Matched, decisive_difference, fly_again, not_flown};
 pub use models::{of_posterior, of_trends};
 pub use specification::{Specification, Test, Tolerance};

@@ -46,7 +46,7 @@ pub struct Effects {
 }
 
 /// History of each output. A draw sums hundreds of them, sample after sample.
-type Histories = [Vec<f64>; COUNT];
+pub type Histories = [Vec<f64>; COUNT];
 
 /// Probabilities of one model: of each tolerance in the order of the tests, and of all requirements.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,6 +65,70 @@ impl Probabilities {
     }
 }
 
+/// Free runs about that of the posterior's mean.
+#[derive(Debug)]
+pub struct MovedRuns<'a> {
+    simulation: &'a Simulation<'a>,
+    start: &'a Start,
+    buildup: &'a Buildup,
+    pub stride: usize,
+    pub mean: FreeRun,
+}
+
+impl<'a> MovedRuns<'a> {
+    #[must_use]
+    pub fn new(
+        simulation: &'a Simulation<'a>,
+        start: &'a Start,
+        buildup: &'a Buildup,
+    ) -> MovedRuns<'a> {
+        let recording = simulation.recording;
+        let stride = if 2.0 * recording.step_s <= LONGEST_STEP_S {
+            2
+        } else {
+            1
+        };
+        MovedRuns {
+            simulation,
+            start,
+            buildup,
+            stride,
+            mean: simulation.fly(start, recording.samples, stride),
+        }
+    }
+
+    /// Effect of a deviation of the derivatives, by place in the build-up.
+    #[must_use]
+    pub fn effect(&self, deviation: &[(usize, f64)]) -> Histories {
+        let mut raised = self.simulation.clone();
+        for (derivative, by) in deviation {
+            let regressor = &self.buildup.derivatives[*derivative].regressor;
+            raised.aerodynamics.table.raise(*derivative, regressor, *by);
+        }
+        self.difference(&raised, self.start)
+    }
+
+    /// Effect of another start.
+    fn effect_of_start(&self, moved: &Start) -> Histories {
+        self.difference(self.simulation, moved)
+    }
+
+    /// Effects of the independent errors of a matched start.
+    pub fn effects_of_start(
+        &self,
+        covariance: &DMatrix<f64>,
+        axis: Axis,
+    ) -> impl Iterator<Item = Histories> {
+        let moved = moved_starts(self.start, covariance, axis).into_iter();
+        moved.map(|moved| self.effect_of_start(&moved))
+    }
+
+    fn difference(&self, simulation: &Simulation, start: &Start) -> Histories {
+        let samples = self.simulation.recording.samples;
+        difference(&simulation.fly(start, samples, self.stride), &self.mean)
+    }
+}
+
 /// Flies the effects of a posterior's deviations and of the start's errors; `None` where the start is
 /// not determined or nothing is known of the axis.
 #[must_use]
@@ -74,40 +138,23 @@ pub fn effects(
     posterior: &LocalPosterior,
     (buildup, axis): (&Buildup, Axis),
 ) -> Option<Effects> {
-    let recording = simulation.recording;
     let covariance = start.covariance.as_ref()?;
-    let stride = if 2.0 * recording.step_s <= LONGEST_STEP_S {
-        2
-    } else {
-        1
-    };
-    let fly =
-        |simulation: &Simulation, start: &Start| simulation.fly(start, recording.samples, stride);
-    let mean = fly(simulation, &start.start);
-    let mut effects = Vec::new();
+    let runs = MovedRuns::new(simulation, &start.start, buildup);
     let deviations = deviations(posterior, buildup)?;
-    for deviation in &deviations {
-        let mut raised = simulation.clone();
-        for (derivative, by) in deviation {
-            let regressor = &buildup.derivatives[*derivative].regressor;
-            raised.aerodynamics.table.raise(*derivative, regressor, *by);
-        }
-        effects.push(difference(&fly(&raised, &start.start), &mean));
-    }
-    for moved in moved_starts(&start.start, covariance, axis) {
-        effects.push(difference(&fly(simulation, &moved), &mean));
-    }
+    let of_derivatives = deviations.iter().map(|deviation| runs.effect(deviation));
+    let effects = of_derivatives.chain(runs.effects_of_start(covariance, axis));
     Some(Effects {
-        stride,
-        mean: mean.outputs,
-        effects,
+        effects: effects.collect(),
+        stride: runs.stride,
+        mean: runs.mean.outputs,
         deviations,
         table: simulation.aerodynamics.table.clone(),
     })
 }
 
-/// Independent deviations of the derivatives; `None` where the posterior has none of the axis.
-fn deviations(posterior: &LocalPosterior, buildup: &Buildup) -> Option<Vec<Vec<(usize, f64)>>> {
+/// Places of the derivatives that move a simulation, among the values of a posterior and in the build-up.
+#[must_use]
+pub fn moving(posterior: &LocalPosterior, buildup: &Buildup) -> Vec<(usize, usize)> {
     let index = |value: &LocalValue| {
         let is_slope = value.kind == LocalKind::Derivative && !value.is_mach_slope;
         let mut derivatives = buildup.derivatives.iter();
@@ -115,7 +162,12 @@ fn deviations(posterior: &LocalPosterior, buildup: &Buildup) -> Option<Vec<Vec<(
         (buildup.derivatives[index].regressor != Regressor::Constant).then_some(index)
     };
     let values = posterior.values.iter().enumerate();
-    let known: Vec<(usize, usize)> = values.filter_map(|(i, v)| Some((i, index(v)?))).collect();
+    values.filter_map(|(i, v)| Some((i, index(v)?))).collect()
+}
+
+/// Independent deviations of the derivatives; `None` where the posterior has none of the axis.
+fn deviations(posterior: &LocalPosterior, buildup: &Buildup) -> Option<Vec<Vec<(usize, f64)>>> {
+    let known = moving(posterior, buildup);
     if known.is_empty() {
         return None;
     }

@@ -153,25 +153,8 @@ impl Analysis {
     #[must_use]
     pub fn of(basis: &Basis, airframe: Airframe, trim: &Trim) -> Option<Analysis> {
         let specification = basis.specification;
-        let fixed = BTreeMap::new();
-        let flight = Flight {
-            aircraft: basis.aircraft,
-            buildup: basis.buildup,
-            trim,
-            controls: Controls {
-                feedback: match airframe {
-                    Airframe::Bare => &fixed,
-                    Airframe::Augmented => &specification.feedback,
-                },
-                pitch: &specification.pitch_control,
-            },
-        };
         let of_axis = |axis: Axis| {
-            let posterior = basis.model.at(axis, &trim.condition);
-            let linear = match axis {
-                Axis::Longitudinal => flight.longitudinal(&posterior),
-                Axis::Lateral => flight.lateral(&posterior),
-            };
+            let (linear, posterior) = linearised(basis, airframe, trim, axis);
             AxisAnalysis::of(axis, &linear, &posterior, specification.draws)
         };
         let axes = [Axis::Longitudinal, Axis::Lateral].map(of_axis);
@@ -186,6 +169,36 @@ impl Analysis {
             roots: axes.iter().flat_map(|a| place.root_rows(a)).collect(),
         })
     }
+}
+
+/// Linear equations of an axis of an airframe in steady flight, with the posterior there.
+#[must_use]
+pub fn linearised(
+    basis: &Basis,
+    airframe: Airframe,
+    trim: &Trim,
+    axis: Axis,
+) -> (LinearModel, LocalPosterior) {
+    let specification = basis.specification;
+    let fixed = BTreeMap::new();
+    let flight = Flight {
+        aircraft: basis.aircraft,
+        buildup: basis.buildup,
+        trim,
+        controls: Controls {
+            feedback: match airframe {
+                Airframe::Bare => &fixed,
+                Airframe::Augmented => &specification.feedback,
+            },
+            pitch: &specification.pitch_control,
+        },
+    };
+    let posterior = basis.model.at(axis, &trim.condition);
+    let linear = match axis {
+        Axis::Longitudinal => flight.longitudinal(&posterior),
+        Axis::Lateral => flight.lateral(&posterior),
+    };
+    (linear, posterior)
 }
 
 /// Airframe and steady flight that rows are about.

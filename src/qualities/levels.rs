@@ -19,7 +19,9 @@ pub fn level(specification: &Specification, requirement: &Requirement, values: &
     levels.into_iter().find(is_met).unwrap_or(Level::Worse)
 }
 
-fn meets(limit: &Limit, level: Level, values: &Values) -> bool {
+/// `true` where values are within the limit of a level.
+#[must_use]
+pub fn meets(limit: &Limit, level: Level, values: &Values) -> bool {
     let Some(value) = value_of(values, limit.quantity) else {
         return true;
     };
@@ -37,7 +39,9 @@ fn meets(limit: &Limit, level: Level, values: &Values) -> bool {
         && range.max.is_none_or(|max| value <= max)
 }
 
-fn value_of(values: &Values, quantity: Quantity) -> Option<f64> {
+/// Value of a quantity; `None` where the mode does not exist.
+#[must_use]
+pub fn value_of(values: &Values, quantity: Quantity) -> Option<f64> {
     let found = values.iter().find(|(other, _)| *other == quantity);
     found.map(|(_, value)| *value)
 }

@@ -5,7 +5,8 @@
 //! equations that are estimated, linearised about it; its matrix is linear in the derivatives.
 //! [`modes`] are its roots with their slopes along each derivative, and [`quantities`] what a
 //! specification judges. [`specification`] has the limits, which are the analyst's data; [`analysis`]
-//! adds the standard deviations and the probabilities of the levels.
+//! adds the standard deviations and the probabilities of the levels. [`judged_quantity`] is one quantity
+//! as a linear function of the derivatives, from which plans of the next flight follow.
 
 mod specification;
 mod basis;
@@ -17,16 +18,19 @@ mod modes;
 mod quantities;
 mod levels;
 mod analysis;
+mod judged_quantity;
 #[cfg(test)]
 mod tests;
 
 use rayon::prelude::*;
 
 use crate::maneuver::{Maneuver, Means};
+use crate::model::Model;
 use crate::tables::{LevelRow, QualityRow, RootRow};
 use analysis::Analysis;
 
 pub use basis::Basis;
+pub use judged_quantity::judged_quantity;
 pub use linear::{Controls, Flight, LinearModel};
 pub use quantities::Differentiation;
 pub use specification::{Range, Specification};
@@ -55,15 +59,7 @@ pub struct Qualities {
 #[must_use]
 pub fn qualities(basis: &Basis, flown: &[(&Maneuver, &Means)]) -> Qualities {
     let conditions = FlownConditions::new(flown, basis.tunnel);
-    let mut alphas: Vec<f64> = basis
-        .model
-        .rows
-        .posterior
-        .iter()
-        .map(|row| row.alpha_deg)
-        .collect();
-    alphas.sort_by(f64::total_cmp);
-    alphas.dedup_by(|a, b| (*a - *b).abs() < 1e-6);
+    let alphas = angles_deg(basis.model);
     let analyses: Vec<Analysis> = basis
         .specification
         .airframes()
@@ -83,4 +79,14 @@ pub fn qualities(basis: &Basis, flown: &[(&Maneuver, &Means)]) -> Qualities {
         found.roots.extend(analysis.roots);
     }
     found
+}
+
+/// Ascending angles of attack of a posterior.
+#[must_use]
+pub fn angles_deg(model: &Model) -> Vec<f64> {
+    let rows = model.rows.posterior.iter();
+    let mut alphas: Vec<f64> = rows.map(|row| row.alpha_deg).collect();
+    alphas.sort_by(f64::total_cmp);
+    alphas.dedup_by(|a, b| (*a - *b).abs() < 1e-6);
+    alphas
 }

@@ -128,12 +128,18 @@ impl Specification {
 }
 
 impl Specification {
+    /// Limits of a quantity that apply to the class and category.
+    pub fn limits_of(&self, quantity: Quantity) -> impl Iterator<Item = &Limit> {
+        let limits = self.requirements.iter().flat_map(|r| self.limits(r));
+        limits.filter(move |limit| limit.quantity == quantity)
+    }
+
     /// Range of a quantity that a level allows, over all its limits without their rises.
     #[must_use]
     pub fn range_of(&self, quantity: Quantity, level: Level) -> Range {
-        let limits = self.requirements.iter().flat_map(|r| self.limits(r));
-        let of_quantity = limits.filter(|limit| limit.quantity == quantity);
-        let ranges = of_quantity.filter_map(|limit| limit.range(level));
+        let ranges = self
+            .limits_of(quantity)
+            .filter_map(|limit| limit.range(level));
         ranges.fold(Range::default(), |all, range| Range {
             min: all.min.into_iter().chain(range.min).reduce(f64::max),
             max: all.max.into_iter().chain(range.max).reduce(f64::min),

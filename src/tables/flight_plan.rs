@@ -1,6 +1,18 @@
 //! Tables of the next flight: the cards with what they teach, and the goals before and after.
 
-use crate::schema::table;
+use crate::schema::{table, words};
+
+words! {
+    /// Kind of a goal.
+    pub enum GoalKind {
+        /// A derivative's standard deviation is to fall.
+        Derivative = "derivative",
+        /// The level of a mode's quantity is to be decided.
+        Level = "level",
+        /// The proof of match of a flown maneuver is to be decided.
+        Match = "match",
+    }
+}
 
 table! {
     /// Cards that the next flight may fly, with what each teaches and the minutes it takes.
@@ -53,11 +65,18 @@ table! {
 table! {
     /// Goals of the next flight, with their standard deviations before and after it.
     ///
-    /// Without a file of goals all derivatives of the posterior are goals.
+    /// Without a file of goals all derivatives of the posterior are goals. The columns from `value` are of
+    /// goals that are to be decided: a flight moves the mean by chance, so it decides with a probability.
     pub struct NextGoalRow in "next_goals" per "goal and angle of attack" {
-        /// Derivative or sum.
-        pub derivative: String,
-        /// Unit of the derivative.
+        /// Kind of the goal.
+        pub kind: GoalKind,
+        /// Derivative or sum; quantity of the mode; class of the maneuver.
+        pub goal: String,
+        /// Airframe of a level; simulator of a match; empty for a derivative.
+        pub of: String,
+        /// Maneuver and quantity that decide a match; empty for other goals.
+        pub decided_by: String,
+        /// Unit of the goal; a match is in tolerances.
         pub unit: String,
         /// Angle of attack.
         pub alpha_deg: f64 ["deg"],
@@ -65,7 +84,18 @@ table! {
         pub before: f64,
         /// Expected standard deviation after the flight, in the column `unit`.
         pub after: f64,
-        /// Wanted standard deviation, in the column `unit`; empty where each reduction counts.
+        /// Wanted standard deviation, in the column `unit`; empty where each reduction counts, or none
+        /// does: where the goal is decided already, or no flight can decide it.
         pub wanted: Option<f64>,
+        /// Mean by the posterior of tonight, in the column `unit`.
+        pub value: Option<f64>,
+        /// Lower limit of the most probable interval, in the column `unit`; empty without one.
+        pub lower_limit: Option<f64>,
+        /// Upper limit of the most probable interval, in the column `unit`; empty without one.
+        pub upper_limit: Option<f64>,
+        /// Probability of that interval by the posterior of tonight.
+        pub probability_pct: Option<f64> ["%"],
+        /// Probability that the goal is decided after the flight.
+        pub decided_pct: Option<f64> ["%"],
     }
 }

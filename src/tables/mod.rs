@@ -29,7 +29,7 @@ pub use estimates::{
     Outcome, Participation, StartingValues,
 };
 pub use export::{DrawRow, ExportRow};
-pub use flight_plan::{NextCardRow, NextGoalRow};
+pub use flight_plan::{GoalKind, NextCardRow, NextGoalRow};
 pub use flights::{
     ALL_FLIGHTS, ChannelRow, ChannelVerdict, CheckRow, CheckVerdict, CommonErrorVerdict, EventRow,
     EventVerdict, FlightRow, InstrumentError, InstrumentRow, InstrumentTrend, InstrumentTrendRow,

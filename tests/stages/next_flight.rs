@@ -75,7 +75,7 @@ fn the_cards_of_the_next_flight_are_chosen_priced_and_limited() {
     // Before: the deviations of the published posterior.
     let posterior = &demo().tables["posterior"];
     let same = |goal: &Row, row: &&Row| {
-        row["derivative"] == goal["derivative"] && row["alpha_deg"] == goal["alpha_deg"]
+        row["derivative"] == goal["goal"] && row["alpha_deg"] == goal["alpha_deg"]
     };
     for goal in &goals {
         let own = posterior.iter().find(|row| same(goal, row)).unwrap();
@@ -122,10 +122,7 @@ fn goals_decide_what_is_flown() {
         "{planned:?}"
     );
     let asked = rows(&campaign, "next_goals");
-    assert!(
-        asked.iter().all(|row| row["derivative"] == "Cm_de"),
-        "{asked:?}"
-    );
+    assert!(asked.iter().all(|row| row["goal"] == "Cm_de"), "{asked:?}");
     // A bound that tonight's posterior has already needs no flight.
     plan(
         "goals: [{ derivative: Cm_de, alpha_deg: [10, 20], bound: 1 }]",
@@ -147,10 +144,101 @@ fn goals_decide_what_is_flown() {
             "did you mean `bound`?",
         ),
         ("goals: []", "lists no goal"),
+        (
+            "goals: [{ derivative: Cm_de, quantity: phugoid_damping }]",
+            "one of `derivative`, `quantity` and `match`",
+        ),
+        (
+            "goals: [{ quantity: phi_beta }]",
+            "has no limit of `phi_beta`",
+        ),
+        ("goals: [{ quantity: phugoid_dampin }]", "phugoid_damping"),
+        (
+            "goals: [{ quantity: phugoid_damping, airframe: augmented }]",
+            "needs the feedback of qualities.yaml",
+        ),
+        (
+            "goals: [{ quantity: phugoid_damping, decided: 95 }]",
+            "`decided` must be a probability",
+        ),
+        (
+            "goals: [{ quantity: phugoid_damping, alpha_deg: [1, 2] }]",
+            "was not flown",
+        ),
+        ("goals: [{ match: OLATT }]", "did you mean `OLAT`?"),
+        (
+            "goals: [{ match: OLAT, model: trend }]",
+            "trends are no model of a plan",
+        ),
+        (
+            "goals: [{ match: OLAT, alpha_deg: [1, 2] }]",
+            "no flown maneuver of class `OLAT`",
+        ),
     ] {
         let outcome = plan(wrong, 1);
         assert!(outcome.stderr.contains(said), "{wrong}: {outcome:?}");
     }
+}
+
+/// Number in a cell that has one.
+fn known(row: &Row, column: &str) -> f64 {
+    assert!(!row[column].is_empty(), "{column}: {row:?}");
+    number(row, column)
+}
+
+#[test]
+fn levels_and_matches_are_goals() {
+    let campaign = Campaign::on("data/demo/flights");
+    demo().fill_store(&campaign);
+    let (file, goals) = (cards(&campaign), campaign.path("goals.yaml"));
+    let text = "goals:
+  - { quantity: dutch_roll_damping, decided: 0.9 }
+  - { match: OLAT, alpha_deg: [5, 35], model: tunnel }
+  - { match: OLAT, alpha_deg: [5, 35], model: posterior }
+";
+    fs::write(&goals, text).unwrap();
+    let outcome = run(next(&campaign, &file).arg("--goal").arg(&goals));
+    assert_eq!(outcome.code, Some(0), "{outcome:?}");
+    let asked = rows(&campaign, "next_goals");
+    let of = |kind: &str| -> Vec<&Row> { asked.iter().filter(|r| r["kind"] == kind).collect() };
+    // Before: the deviations and values of the published flying qualities.
+    let qualities = &demo().tables["qualities"];
+    assert!(!of("level").is_empty(), "{asked:?}");
+    for goal in of("level") {
+        let own = qualities.iter().find(|row| {
+            row["quantity"] == "dutch_roll_damping"
+                && row["airframe"] == goal["of"]
+                && row["alpha_deg"] == goal["alpha_deg"]
+        });
+        let own = own.unwrap();
+        let (before, value) = (known(goal, "before"), known(goal, "value"));
+        approx::assert_relative_eq!(value, number(own, "value"), max_relative = 1e-9);
+        if own["basis"] == "slopes" {
+            let published = number(own, "standard_deviation");
+            approx::assert_relative_eq!(before, published, max_relative = 1e-6);
+        }
+    }
+    let matches = of("match");
+    for model in ["tunnel", "posterior"] {
+        let own: Vec<&&Row> = matches.iter().filter(|row| row["of"] == model).collect();
+        assert_eq!(own.len(), 3, "{matches:?}");
+        for row in own {
+            assert!(known(row, "before") > 0.0 && !row["decided_by"].is_empty());
+        }
+    }
+    for row in &asked {
+        let (before, after) = (number(row, "before"), number(row, "after"));
+        assert!(after <= before * (1.0 + 1e-9), "{row:?}");
+        for column in ["probability_pct", "decided_pct"] {
+            assert!((0.0..=100.0).contains(&known(row, column)), "{row:?}");
+        }
+    }
+    let page = fs::read_to_string(campaign.path("reports/next/kneeboard.html")).unwrap();
+    assert!(
+        page.contains("dutch roll damping, bare") && page.contains("OLAT, tunnel"),
+        "{page}"
+    );
+    assert!(page.contains("of 3 maneuvers"), "{page}");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! The promise of a plan: the bounds that it predicts are those after its cards were flown, estimated and
 //! fused.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -131,6 +132,8 @@ impl World {
             buildup: &config.buildup,
             tunnel: &config.tunnel,
             settings: &config.model,
+            qualities: None,
+            matches: &BTreeMap::new(),
         };
         let goals: Vec<Goal> = model.quantities().map(Goal::of).collect();
         plan(&tonight, &rehearsals, &goals, budget)
@@ -167,7 +170,7 @@ impl World {
 fn deviation(model: &Model, goal: &NextGoalRow) -> f64 {
     let mut rows = model.rows.posterior.iter();
     let is_there = |row: &&PosteriorRow| {
-        row.derivative == goal.derivative && (row.alpha_deg - goal.alpha_deg).abs() < 1e-6
+        row.derivative == goal.goal && (row.alpha_deg - goal.alpha_deg).abs() < 1e-6
     };
     rows.find(is_there).unwrap().standard_deviation
 }

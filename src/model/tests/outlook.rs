@@ -1,11 +1,11 @@
 //! Outlook on planned maneuvers: the covariance that it leads to is the one after they were flown.
 
 use approx::assert_relative_eq;
-use nalgebra::{Cholesky, DMatrix};
+use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::fixture::{Flown, at, buildup, diagonal, exact, posterior, tunnel};
-use crate::aero::Condition;
-use crate::model::{Evidence, Model, Outlook, Point, Settings};
+use crate::aero::{Axis, Condition};
+use crate::model::{Evidence, Model, Outlook, Point, PointQuantity, Settings};
 use crate::output_error::error_effect::SharedError;
 
 /// A maneuver that estimates slope and damping and holds nothing, with a bias of its flight, whose
@@ -28,7 +28,7 @@ fn settings() -> Settings {
 
 fn points() -> Vec<Point> {
     let point = |derivative: &str, alpha_deg| Point {
-        derivative: derivative.into(),
+        quantity: PointQuantity::Published(derivative.into()),
         condition: Condition {
             alpha_deg,
             mach: 0.3,
@@ -44,12 +44,16 @@ fn points() -> Vec<Point> {
 }
 
 fn outlook(model: &Model, flown: &[Flown], planned: &[Flown]) -> Outlook {
+    outlook_on(&points(), model, flown, planned)
+}
+
+fn outlook_on(points: &[Point], model: &Model, flown: &[Flown], planned: &[Flown]) -> Outlook {
     let flown: Vec<Evidence> = flown.iter().map(Flown::evidence).collect();
     let planned: Vec<Evidence> = planned.iter().map(Flown::evidence).collect();
     let (buildup, tunnel) = (buildup(), tunnel(None));
     let basis = (&buildup, &tunnel);
     model
-        .outlook((&flown, &planned), &points(), basis, &settings())
+        .outlook((&flown, &planned), points, basis, &settings())
         .remove(0)
 }
 
@@ -70,6 +74,29 @@ fn without_new_maneuvers_it_is_the_posterior() {
         let (_, deviation) = at(&model, name, alpha_deg);
         assert_relative_eq!(own[(i, i)].sqrt(), deviation, max_relative = 1e-9);
     }
+}
+
+#[test]
+fn a_combination_has_the_variance_of_the_local_posterior() {
+    let flown = [maneuver("m1", "f1", 10.0), maneuver("m2", "f2", 25.0)];
+    let model = posterior(&flown, &tunnel(None), &settings());
+    let condition = Condition {
+        alpha_deg: 17.0,
+        mach: 0.3,
+        third: None,
+    };
+    let local = model.at(Axis::Longitudinal, &condition);
+    let weights = DVector::from_fn(local.values.len(), |i, _| 0.5 - i as f64);
+    let values = local.values.iter().cloned();
+    let point = Point {
+        quantity: PointQuantity::Combination(values.zip(weights.iter().copied()).collect()),
+        condition,
+    };
+    let outlook = outlook_on(&[point], &model, &flown, &[]);
+    let own = of_points(&outlook, &outlook.covariance);
+    let expected = (&local.covariance * &weights).dot(&weights);
+    assert!(local.values.len() > 1);
+    assert_relative_eq!(own[(0, 0)], expected, max_relative = 1e-9);
 }
 
 #[test]

@@ -21,7 +21,7 @@ use crate::tables::MatchVerdict;
 const REPEATS: u32 = 40;
 
 /// Posterior about the truth: independent errors in per cent of the derivatives of the axis.
-fn posterior(flown: &FlownManeuver, error_pct: f64) -> LocalPosterior {
+pub fn posterior(flown: &FlownManeuver, error_pct: f64) -> LocalPosterior {
     let buildup = &shipped().config.buildup;
     let is_known = |d: &&Derivative| d.regressor != Regressor::Constant;
     let derivatives = buildup.derivatives_of(flown.maneuver.axis).filter(is_known);
@@ -48,7 +48,7 @@ fn posterior(flown: &FlownManeuver, error_pct: f64) -> LocalPosterior {
 }
 
 /// Database of an aircraft drawn from a posterior.
-fn drawn(
+pub fn drawn(
     flown: &FlownManeuver,
     posterior: &LocalPosterior,
     stream: &mut RandomStream,

@@ -2,6 +2,7 @@
 
 mod boeing_747;
 mod fixture;
+mod judged_quantity;
 mod levels;
 mod linear;
 mod probabilities;

@@ -1,0 +1,118 @@
+//! Quantity of a mode as a linear function of the derivatives, with the limits between its levels.
+
+use std::collections::BTreeMap;
+
+use super::analysis::linearised;
+use super::basis::Basis;
+use super::levels::{meets, value_of};
+use super::linear::LinearModel;
+use super::quantities::Differentiation;
+use super::specification::{Limit, Specification};
+use super::trim::FlownConditions;
+use crate::aero::{Axis, Condition};
+use crate::model::{LocalPosterior, LocalValue};
+use crate::tables::{Airframe, Level, Quantity};
+
+/// Quantity of a mode at an angle of attack, about the mean of the posterior.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JudgedQuantity {
+    pub condition: Condition,
+    pub value: f64,
+    /// Slopes along the values of the posterior.
+    pub slopes: Vec<(LocalValue, f64)>,
+    /// Ascending values at which its level changes. One that rises with another quantity is that at the
+    /// other's mean.
+    pub limits: Vec<f64>,
+}
+
+/// Quantity of an airframe in the steady flight of an angle of attack; `None` where it was not flown,
+/// the mode does not exist or the quantity is not finite.
+#[must_use]
+pub fn judged_quantity(
+    basis: &Basis,
+    conditions: &FlownConditions,
+    (airframe, quantity): (Airframe, Quantity),
+    alpha_deg: f64,
+) -> Option<JudgedQuantity> {
+    let trim = conditions.trim(alpha_deg, basis.aircraft)?;
+    [Axis::Longitudinal, Axis::Lateral]
+        .into_iter()
+        .find_map(|axis| {
+            let (linear, posterior) = linearised(basis, airframe, &trim, axis);
+            let (value, slopes, limits) =
+                at_mean(axis, &linear, &posterior, (basis.specification, quantity))?;
+            Some(JudgedQuantity {
+                condition: trim.condition,
+                value,
+                slopes,
+                limits,
+            })
+        })
+}
+
+/// Value, slopes and limits of a quantity.
+type AtMean = (f64, Vec<(LocalValue, f64)>, Vec<f64>);
+
+/// Quantity at the mean of a posterior; `None` where it does not exist or is not finite.
+pub fn at_mean(
+    axis: Axis,
+    linear: &LinearModel,
+    posterior: &LocalPosterior,
+    (specification, quantity): (&Specification, Quantity),
+) -> Option<AtMean> {
+    let found = linear.quantities(axis, &posterior.mean, Differentiation::Slopes)?;
+    let quantities = found.quantities.iter();
+    let means: Vec<(Quantity, f64)> = quantities.map(|(q, dual)| (*q, dual.value)).collect();
+    let (_, dual) = found.quantities.into_iter().find(|(q, _)| *q == quantity)?;
+    let is_finite = dual.value.is_finite()
+        && dual.slopes.len() == posterior.values.len()
+        && dual.slopes.iter().all(|slope| slope.is_finite());
+    is_finite.then(|| {
+        let slopes = posterior.values.iter().cloned().zip(dual.slopes);
+        let limits = level_changes(specification, quantity, &means);
+        (dual.value, slopes.collect(), limits)
+    })
+}
+
+/// Ascending values of a quantity at which its level changes, with the other quantities at their means.
+fn level_changes(
+    specification: &Specification,
+    quantity: Quantity,
+    means: &[(Quantity, f64)],
+) -> Vec<f64> {
+    let limits: Vec<&Limit> = specification.limits_of(quantity).collect();
+    let mut ends: Vec<f64> = limits.iter().flat_map(|limit| ends(limit, means)).collect();
+    ends.sort_by(f64::total_cmp);
+    ends.dedup();
+    let level = |value: f64| {
+        let mut values: BTreeMap<Quantity, f64> = means.iter().copied().collect();
+        values.insert(quantity, value);
+        let values: Vec<(Quantity, f64)> = values.into_iter().collect();
+        let levels = [Level::One, Level::Two, Level::Three];
+        let mut met = levels.into_iter();
+        met.find(|level| limits.iter().all(|limit| meets(limit, *level, &values)))
+            .unwrap_or(Level::Worse)
+    };
+    // A value in each interval between the ends, and beyond both.
+    let mut inside: Vec<f64> = ends.windows(2).map(|w| 0.5 * (w[0] + w[1])).collect();
+    inside.insert(0, ends.first().map_or(0.0, |first| first - 1.0));
+    inside.extend(ends.last().map(|last| last + 1.0));
+    let changes = ends.iter().zip(inside.windows(2));
+    let changes = changes.filter(|(_, sides)| level(sides[0]) != level(sides[1]));
+    changes.map(|(end, _)| *end).collect()
+}
+
+/// Ends of the ranges of a limit.
+fn ends(limit: &Limit, means: &[(Quantity, f64)]) -> Vec<f64> {
+    let of_level = |level: Level| {
+        let range = limit.range(level).unwrap_or_default();
+        let rise = limit.raised.and_then(|raised| {
+            let by = value_of(means, raised.by)?;
+            Some(raised.rise(level, by))
+        });
+        let min = range.min.map(|min| min + rise.unwrap_or(0.0));
+        [min, range.max]
+    };
+    let levels = [Level::One, Level::Two, Level::Three].into_iter();
+    levels.flat_map(of_level).flatten().collect()
+}
