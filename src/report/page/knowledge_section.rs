@@ -130,7 +130,7 @@ fn chart(rows: &[(&PosteriorRow, f64)], axes: &[AxisMedians]) -> Option<QualityC
     let (low, high) = extent(rows.iter().map(|(row, _)| row.alpha_deg))?;
     let (_, most) = extent(rows.iter().map(|(_, left)| *left))?;
     let caption = "Standard deviation of each derivative over that before flight, and the medians of both \
-                   axes. Where it is 100 %, flights have taught nothing.";
+                   axes. At 100 % or more flights have taught nothing.";
     let marks = rows.iter().map(|(row, left)| ChartPoint {
         at: (row.alpha_deg, *left),
         label: String::new(),
