@@ -30,13 +30,12 @@ fn product_with<const N: usize, const M: usize, const P: usize>(
     a: &SMatrix<f64, N, M>,
     b: impl Fn(usize, usize) -> f64,
 ) -> SMatrix<f64, N, P> {
-    let a = &a.data.0;
     let mut columns = [[0.0; N]; P];
-    for j in 0..P {
-        for k in 0..M {
+    for (j, column) in columns.iter_mut().enumerate() {
+        for (k, a) in a.data.0.iter().enumerate() {
             let entry = b(k, j);
-            for i in 0..N {
-                columns[j][i] = a[k][i].mul_add(entry, columns[j][i]);
+            for (sum, a) in column.iter_mut().zip(a) {
+                *sum = a.mul_add(entry, *sum);
             }
         }
     }

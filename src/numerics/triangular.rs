@@ -3,7 +3,7 @@
 
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
-use nalgebra::{Cholesky, DMatrix, DMatrixView, DMatrixViewMut};
+use nalgebra::{Cholesky, DMatrix, DMatrixView, DMatrixViewMut, Matrix};
 use pulp::Arch;
 
 /// Size up to which the plain methods are as fast.
@@ -64,7 +64,7 @@ fn solve_plain(lower: DMatrixView<f64>, right: &mut DMatrixViewMut<f64>) {
     let mut columns = right.column_iter_mut();
     loop {
         let mut own: [_; SIDE_BY_SIDE] = std::array::from_fn(|_| columns.next());
-        let whole = own.each_mut().map(|c| c.as_mut().map(|c| c.as_mut_slice()));
+        let whole = own.each_mut().map(|c| c.as_mut().map(Matrix::as_mut_slice));
         match whole {
             [Some(a), Some(b), Some(c), Some(d)] => solve_columns(lower, [a, b, c, d]),
             rest => {
