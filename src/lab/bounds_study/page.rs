@@ -181,7 +181,7 @@ fn starts_table(starts: &[StartRow]) -> String {
         return String::new();
     }
     let mut text = String::from(
-        "\n## Other starting values\n\nShare of the records whose iteration reaches the same minimum as from the true \
+        "\n## Other starting values\n\nShare of the records whose iteration by output error reaches the same minimum as from the true \
          values (no derivative differs by more than a tenth of its bound): unaided, and with the program's second \
          start from the equation-error solution.\n\n\
          | starting values | records | reached unaided | reached |\n|---|---|---|---|\n",

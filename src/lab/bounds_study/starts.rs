@@ -1,12 +1,13 @@
-//! Dependence of the minimum on the starting values: each record is estimated from the true values,
-//! from twice and half of them, and from ineffective surfaces.
+//! Dependence of the minimum on the starting values: each record is estimated by output error from the true
+//! values, from twice and half of them, and from ineffective surfaces. Filter error does not start from
+//! tabulated values.
 
 use rayon::prelude::*;
 
 use super::recordings::{StudyManeuver, true_tables};
 use crate::aero::{Buildup, WindTunnel};
 use crate::error::Problem;
-use crate::estimate::{Estimated, Start};
+use crate::estimate::{Estimated, Method, Start};
 use crate::lab::simulator::{FlownManeuver, TrueDerivative};
 use crate::numerics::random::derived_seed;
 use crate::output_error::Outcome;
@@ -62,6 +63,7 @@ pub fn starts(
     let flown = maneuver.flown(seed)?;
     let mut maneuver = maneuver.clone();
     maneuver.settings.start = Start::WindTunnel;
+    maneuver.settings.method = Method::OutputError;
     let row = |values: StartVariant| {
         let start = start_tables(values, &flown.truth, buildup);
         let reached = reached(&maneuver, &flown, &start, realisations, seed);
