@@ -246,7 +246,7 @@ fn fit<'a, const NX: usize, E: Equations<NX>>(
     let (weights, resolution) = (task.weights()?, task.resolution());
     let own: Vec<Vec<f64>> = parts.iter().map(|p| p.alone.values.clone()).collect();
     let from = |shared: &[f64]| {
-        let start = joint.assemble(shared, &own);
+        let start = joint.parameters().assemble(shared, &own);
         estimation::estimate(
             &joint,
             start,
@@ -256,7 +256,7 @@ fn fit<'a, const NX: usize, E: Equations<NX>>(
             &settings.iteration,
         )
     };
-    let mut fit = from(&starting_values(parts, joint.shared()));
+    let mut fit = from(&starting_values(parts, joint.parameters().shared()));
     if fit.outcome != Outcome::Converged {
         // From the derivatives of the maneuver that fits best alone.
         let cost = |p: &&Member<NX, E>| p.alone.final_cost.unwrap_or(f64::INFINITY);
@@ -264,6 +264,7 @@ fn fit<'a, const NX: usize, E: Equations<NX>>(
         let other = best.map(|p| {
             from(
                 &joint
+                    .parameters()
                     .shared()
                     .iter()
                     .map(|&j| p.alone.values[j])
@@ -342,6 +343,7 @@ fn add_held_uncertainty<'a, const NX: usize, E: Equations<NX>>(
         .collect();
     let own = |i: usize| {
         joint
+            .parameters()
             .places(i)
             .iter()
             .filter_map(|&p| fit.values.get(p))
@@ -356,7 +358,7 @@ fn add_held_uncertainty<'a, const NX: usize, E: Equations<NX>>(
             case: &part.prepared.case,
             wide,
             values: values_by_name(&part.prepared.model, &part.prepared.case.names, &own(i)),
-            places: joint.places(i).to_vec(),
+            places: joint.parameters().places(i).to_vec(),
         })
         .collect();
     consider::consider_together(
@@ -381,7 +383,7 @@ fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
     let mut together: Vec<DVector<f64>> = vec![];
     let mut errors = vec![];
     for (i, part) in parts.iter().enumerate() {
-        let places = joint.places(i);
+        let places = joint.parameters().places(i);
         let own: Vec<f64> = places.iter().map(|&p| fit.values[p]).collect();
         errors = part.task.misreadings(&part.prepared.window);
         let Ok(shifts) = part

@@ -15,6 +15,8 @@ mod diagnostics;
 mod held_by_evidence;
 mod second_opinion;
 mod alpha_slopes;
+mod whiteness;
+mod filter_group;
 mod in_gusts;
 mod doubt;
 mod flown_means;

@@ -5,11 +5,12 @@ use nalgebra::DMatrix;
 use super::context::Context;
 use super::doubt::Explanation;
 use super::estimated::{Covariance, Estimated};
-use super::in_gusts::{Filtered, is_white};
+use super::in_gusts::Filtered;
 use super::prepared_case::PreparedCase;
 use super::second_opinion::add_second_opinion;
 use super::settings::Hold;
 use super::task::{Task, values_by_name};
+use super::whiteness::is_white;
 use crate::aero::Axis;
 use crate::dynamics::{
     Equations, InGusts, Lateral, LateralInGusts, Longitudinal, LongitudinalInGusts,

@@ -10,9 +10,9 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 
 use super::filter::{Filter, Response};
+use super::joint_filter::JointFilter;
 use super::scoring::Scored;
 use super::slopes::{SlopeEffect, SlopeInformation};
-use crate::aero::Derivative;
 use crate::dynamics::{InGusts, OUTPUTS};
 use crate::numerics::matrix::AlignedMatrix;
 use crate::numerics::symmetric;
@@ -20,8 +20,9 @@ use crate::numerics::symmetric;
 use crate::output_error::bounds::block_series::BlockSeries;
 use crate::output_error::bounds::coloured;
 use crate::output_error::likelihood::information::Identification;
+use crate::output_error::sharing::{SharedParameters, add_matrix, add_vector};
 
-/// Covariances of a filter's own parameters: derivatives, biases and initial states.
+/// Covariances of the own parameters of filters: derivatives, biases and initial states.
 #[derive(Clone, Debug)]
 pub struct Bounds {
     pub covariance: DMatrix<f64>,
@@ -36,14 +37,14 @@ pub struct Bounds {
 /// Condition number and parameters of the least determined direction, where the data determine no
 /// covariance.
 pub fn bounds<const NX: usize, E: InGusts<NX>>(
-    filter: &Filter<NX, E>,
+    filter: &JointFilter<NX, E>,
     scored: &Scored,
     max_condition_number: f64,
 ) -> Result<Bounds, (Option<f64>, Vec<usize>)> {
     let free: Vec<usize> = (0..filter.parameters())
         .filter(|j| scored.free[*j])
         .collect();
-    let information = scored.response.information();
+    let information = filter.information(&scored.response);
     let of_free = DMatrix::from_fn(free.len(), free.len(), |i, j| {
         information[(free[i], free[j])]
     });
@@ -115,14 +116,23 @@ impl Bounds {
     #[must_use]
     pub fn corrected<const NX: usize, E: InGusts<NX>>(
         &self,
-        filter: &Filter<NX, E>,
+        filter: &JointFilter<NX, E>,
         scored: &Scored,
     ) -> DMatrix<f64> {
         let response = &scored.response;
         let aligned = AlignedMatrix::from_symmetric(&self.inverse);
-        let innovations = coloured::covariance(&aligned, &filter.series(response)).widened();
         let n = self.inverse.nrows();
-        let others = response.other_information().view((0, 0), (n, n));
+        let own = filter.own();
+        let members = filter.filters().iter().zip(&response.members).enumerate();
+        let series = members.flat_map(|(i, (filter, response))| {
+            let places = own.places(i);
+            let series = filter.series(response).into_iter();
+            series.map(|series| series.widened(places, n))
+        });
+        let series: Vec<BlockSeries> = series.collect();
+        let innovations = coloured::covariance(&aligned, &series).widened();
+        let others = filter.other_information(response);
+        let others = others.view((0, 0), (n, n));
         let corrected = innovations + &self.inverse * others * &self.inverse;
         symmetric::raise_variances(corrected, &self.covariance)
     }
@@ -177,6 +187,47 @@ impl WidePass {
         })
     }
 
+    /// Joins the passes of maneuvers whose own parameters have these places. Held derivatives and
+    /// slopes of one name are common to the maneuvers.
+    #[must_use]
+    pub fn joined(members: &[WidePass], own: &SharedParameters) -> Self {
+        let mut names: Vec<String> = vec![];
+        let mut all_places = Vec::with_capacity(members.len());
+        for (i, member) in members.iter().enumerate() {
+            let mut places = Vec::with_capacity(member.names.len());
+            for name in member.joint_names(own, i) {
+                let known = names.iter().position(|n| n == name);
+                places.push(known.unwrap_or(names.len()));
+                if known.is_none() {
+                    names.push(name.clone());
+                }
+            }
+            all_places.push(places);
+        }
+        let n = names.len();
+        let (mut information, mut gradient) = (DMatrix::zeros(n, n), DVector::zeros(n));
+        for (member, places) in members.iter().zip(&all_places) {
+            add_matrix(places, &member.information, &mut information);
+            add_vector(places, &member.gradient, &mut gradient);
+        }
+        WidePass {
+            own: own.names().to_vec(),
+            names,
+            information,
+            gradient,
+        }
+    }
+
+    /// Names of the parameters among those of all maneuvers.
+    fn joint_names<'n>(&'n self, own: &'n SharedParameters, member: usize) -> Vec<&'n String> {
+        let places = own.places(member);
+        let joint = |name: &'n String| {
+            let place = self.own.iter().position(|n| n == name);
+            place.map_or(name, |j| &own.names()[places[j]])
+        };
+        self.names.iter().map(joint).collect()
+    }
+
     fn place(&self, name: &str) -> Option<usize> {
         self.names.iter().position(|n| n == name)
     }
@@ -204,10 +255,10 @@ impl WidePass {
     pub fn slope_effect(
         &self,
         bounds: &Bounds,
-        slopes: &[Derivative],
+        slopes: &[String],
         values: &[f64],
     ) -> Option<SlopeEffect> {
-        let places: Vec<usize> = slopes.iter().filter_map(|d| self.place(&d.name)).collect();
+        let places: Vec<usize> = slopes.iter().filter_map(|name| self.place(name)).collect();
         if places.len() != values.len() || places.is_empty() {
             return None;
         }

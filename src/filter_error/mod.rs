@@ -23,6 +23,7 @@
 //! | `gains` | gain and covariance of the innovations for each pattern of missing outputs |
 //! | `pass` | one pass: innovations and their sensitivities, in the kernel of output error |
 //! | [`filter`] | a maneuver prepared: cost, gradient and information |
+//! | [`joint_filter`] | several maneuvers that share derivatives, or one |
 //! | [`scoring`] | the iteration |
 //! | [`bounds`] | covariance of the estimates, and the effects of held values and calibration |
 //! | [`slopes`] | slopes of the derivatives over α, and their effect on the estimates |
@@ -30,6 +31,7 @@
 pub mod bounds;
 pub mod filter;
 mod gains;
+pub mod joint_filter;
 mod linearised;
 pub mod noise;
 mod pass;

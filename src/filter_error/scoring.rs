@@ -6,9 +6,8 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::filter::{Filter, Response};
-use super::noise::NoiseParameter;
-use crate::dynamics::{InGusts, OUTPUTS};
+use super::joint_filter::{JointFilter, JointResponse};
+use crate::dynamics::InGusts;
 use crate::numerics::symmetric::{scale, scaled};
 use crate::settings::settings;
 
@@ -50,19 +49,18 @@ pub struct Scored {
     pub parameters: Vec<f64>,
     /// Parameters that are not fixed at a floor.
     pub free: Vec<bool>,
-    pub response: Response,
+    pub response: JointResponse,
 }
 
-/// Minimises the cost from a start; `None` where the filter diverges there. `resolution` is the least
-/// standard deviation of each output's noise.
+/// Minimises the cost from a start; `None` where a filter diverges there. `floors` are the least
+/// values of the parameters.
 #[must_use]
 pub fn minimise<const NX: usize, E: InGusts<NX>>(
-    filter: &Filter<NX, E>,
+    filter: &JointFilter<NX, E>,
     start: Vec<f64>,
-    resolution: &[f64; OUTPUTS],
+    floors: &[f64],
     settings: &Settings,
 ) -> Option<Scored> {
-    let floors = floors(filter, resolution);
     let response = filter.respond(&start).ok()?;
     let mut scored = Scored {
         converged: false,
@@ -75,8 +73,7 @@ pub fn minimise<const NX: usize, E: InGusts<NX>>(
     };
     let (mut damping, mut slow_steps) = (0.0, 0);
     while scored.iterations < settings.max_iterations {
-        scored.free = free(filter, &scored, &floors);
-        let (gradient, information) = scored.free_system();
+        let (gradient, information) = scored.free_system(filter, floors);
         let Some(full) = step(&information, &gradient, 0.0) else {
             "the information matrix is singular".clone_into(&mut scored.reason);
             break;
@@ -91,7 +88,7 @@ pub fn minimise<const NX: usize, E: InGusts<NX>>(
         }
         scored.iterations += 1;
         let before = scored.response.cost;
-        if !scored.lower(filter, &floors, &gradient, &information, &mut damping) {
+        if !scored.lower(filter, floors, &gradient, &information, &mut damping) {
             "no step lowers the cost".clone_into(&mut scored.reason);
             break;
         }
@@ -102,10 +99,18 @@ pub fn minimise<const NX: usize, E: InGusts<NX>>(
 }
 
 impl Scored {
-    /// Gradient and information of the free parameters; the others have a unit diagonal.
-    fn free_system(&self) -> (DVector<f64>, DMatrix<f64>) {
-        let (mut gradient, mut information) =
-            (self.response.gradient(), self.response.information());
+    /// Fixes the parameters at their floors; returns gradient and information of the free parameters; the
+    /// others have a unit diagonal.
+    fn free_system<const NX: usize, E: InGusts<NX>>(
+        &mut self,
+        filter: &JointFilter<NX, E>,
+        floors: &[f64],
+    ) -> (DVector<f64>, DMatrix<f64>) {
+        let mut gradient = filter.gradient(&self.response);
+        let mut information = filter.information(&self.response);
+        let at_floor = |j: usize| self.parameters[j] <= floors[j] && gradient[j] <= 0.0;
+        self.free = (0..floors.len()).map(|j| !at_floor(j)).collect();
+        filter.fix_without_effect(&mut self.free);
         for j in (0..self.free.len()).filter(|j| !self.free[*j]) {
             gradient[j] = 0.0;
             information.row_mut(j).fill(0.0);
@@ -118,7 +123,7 @@ impl Scored {
     /// Tries steps of growing damping until one lowers the cost.
     fn lower<const NX: usize, E: InGusts<NX>>(
         &mut self,
-        filter: &Filter<NX, E>,
+        filter: &JointFilter<NX, E>,
         floors: &[f64],
         gradient: &DVector<f64>,
         information: &DMatrix<f64>,
@@ -128,7 +133,7 @@ impl Scored {
         while *damping < MOST_DAMPING {
             if let Some(step) = step(information, gradient, *damping) {
                 let next = moved(&self.parameters, &step, floors, filter.first_noise());
-                let lowers = |response: &Response| response.cost < self.response.cost;
+                let lowers = |response: &JointResponse| response.cost < self.response.cost;
                 // A step after one that failed may fail as well: its cost alone is cheap.
                 let may_lower = !failed || filter.innovations(&next).is_ok_and(|r| lowers(&r));
                 if may_lower
@@ -163,51 +168,6 @@ fn next_damping(damping: f64, kept: f64) -> f64 {
 fn own_gain(step: &DVector<f64>, information: &DMatrix<f64>, own: usize) -> f64 {
     let step = step.rows(0, own);
     0.5 * (information.view((0, 0), (own, own)) * step).dot(&step)
-}
-
-/// Least value of each parameter.
-fn floors<const NX: usize, E: InGusts<NX>>(
-    filter: &Filter<NX, E>,
-    resolution: &[f64; OUTPUTS],
-) -> Vec<f64> {
-    let own = vec![f64::NEG_INFINITY; filter.first_noise()];
-    let noise = filter.noise_parameters().iter();
-    let noise = noise.map(|parameter| parameter.floor(resolution));
-    own.into_iter().chain(noise).collect()
-}
-
-/// Parameters that are not fixed at a floor.
-fn free<const NX: usize, E: InGusts<NX>>(
-    filter: &Filter<NX, E>,
-    scored: &Scored,
-    floors: &[f64],
-) -> Vec<bool> {
-    let gradient = scored.response.gradient();
-    let at_floor = |j: usize| scored.parameters[j] <= floors[j] && gradient[j] <= 0.0;
-    let mut free: Vec<bool> = (0..floors.len()).map(|j| !at_floor(j)).collect();
-    let first = filter.first_noise();
-    let kinds = filter.noise_parameters();
-    let is_fixed = |free: &[bool], kind: NoiseParameter| {
-        let place = kinds.iter().position(|k| *k == kind);
-        place.is_some_and(|n| !free[first + n])
-    };
-    let gusts = 0..E::FELT_RATES.len();
-    let all_fixed = gusts
-        .clone()
-        .all(|g| is_fixed(&free, NoiseParameter::Gust(g)));
-    for (n, kind) in kinds.iter().enumerate() {
-        let without_effect = match *kind {
-            NoiseParameter::Corner => all_fixed,
-            NoiseParameter::Correlation(g) => {
-                is_fixed(&free, NoiseParameter::Gust(g)) || is_fixed(&free, NoiseParameter::Angle)
-            }
-            _ => false,
-        };
-        if without_effect {
-            free[first + n] = false;
-        }
-    }
-    free
 }
 
 /// Parameters after a step; noise changes by a factor at most, and stays above its floor.

@@ -7,14 +7,16 @@ use nalgebra::SVector;
 
 use super::bounds::bounds;
 use super::filter::Filter;
+use super::joint_filter::JointFilter;
 use super::noise::{Noise, NoiseParameter};
-use super::scoring::{self, minimise};
+use super::scoring::{self, Scored, minimise};
 use crate::aero::{Axis, Bias, Derivative};
 use crate::dynamics::tests::aircraft;
 use crate::dynamics::{
     Equations, InGusts, Lateral, LateralInGusts, Longitudinal, LongitudinalInGusts, OUTPUTS,
 };
 use crate::numerics::runge_kutta::{self, POINT};
+use crate::output_error::sharing::SharedParameters;
 use crate::output_error::tests::{
     Noise as Draws, SAMPLES, biases, nothing_measured, truth, window, with_products,
 };
@@ -324,6 +326,17 @@ fn innovations_at_the_truth_are_white_with_the_computed_covariance() {
     assert_innovations_are_white::<6, LateralInGusts>();
 }
 
+/// Minimum from a start.
+fn scored_from<const NX: usize, E: InGusts<NX>>(
+    filter: &JointFilter<NX, E>,
+    start: Vec<f64>,
+) -> Scored {
+    let floors = filter.floors(&vec![[1e-6; OUTPUTS]; filter.filters().len()]);
+    let scored = minimise(filter, start, &floors, &scoring::Settings::default()).unwrap();
+    assert!(scored.converged, "{}", scored.reason);
+    scored
+}
+
 /// Estimates simulated maneuvers in gusts: the bounds must be the scatter of the estimates.
 fn assert_estimates_scatter_as_bounded<const NX: usize, E: InGusts<NX>>() {
     const FLIGHTS: usize = 24;
@@ -334,12 +347,11 @@ fn assert_estimates_scatter_as_bounded<const NX: usize, E: InGusts<NX>>() {
         simulated.fly(&light(), &mut draws);
         let start = Noise::starting(light().outputs);
         let start = simulated.filter.with_noise(&simulated.own, &start);
-        let floors = [1e-6; OUTPUTS];
-        let settings = scoring::Settings::default();
-        let scored = minimise(&simulated.filter, start, &floors, &settings).unwrap();
-        assert!(scored.converged, "{}", scored.reason);
-        let bounds = bounds(&simulated.filter, &scored, 1e10).unwrap();
-        let covariance = bounds.corrected(&simulated.filter, &scored);
+        let own = SharedParameters::of_one(simulated.filter.names());
+        let filter = JointFilter::new(std::slice::from_ref(&simulated.filter), &own);
+        let scored = scored_from(&filter, start);
+        let bounds = bounds(&filter, &scored, 1e10).unwrap();
+        let covariance = bounds.corrected(&filter, &scored);
         for j in 0..simulated.filter.case.derivatives() {
             let z = (scored.parameters[j] - simulated.own[j]) / covariance[(j, j)].sqrt();
             square += z * z;
@@ -380,14 +392,9 @@ fn in_still_air_the_process_noise_is_fixed_at_its_floor() {
     let start = simulated
         .filter
         .with_noise(&simulated.own, &Noise::starting(light().outputs));
-    let scored = minimise(
-        &simulated.filter,
-        start,
-        &[1e-6; OUTPUTS],
-        &scoring::Settings::default(),
-    )
-    .unwrap();
-    assert!(scored.converged, "{}", scored.reason);
+    let own = SharedParameters::of_one(simulated.filter.names());
+    let filter = JointFilter::new(std::slice::from_ref(&simulated.filter), &own);
+    let scored = scored_from(&filter, start);
     let noise = simulated.filter.noise(&scored.parameters);
     assert!(noise.angle < 0.004 * RAD, "{} deg", noise.angle / RAD);
 }

@@ -30,7 +30,7 @@ pub use kernel::response::{Detail, Response, Sensitivities};
 pub use likelihood::definition::Likelihood;
 pub use likelihood::joint::Joint;
 pub use likelihood::outcome::{Fit, Outcome};
-pub use likelihood::{cost, equation_error, error_effect, mean, newton_raphson, theil};
+pub use likelihood::{cost, equation_error, error_effect, mean, newton_raphson, sharing, theil};
 
 #[cfg(test)]
 pub(crate) mod tests;

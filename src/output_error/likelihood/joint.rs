@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::cost::{self, Sums};
 use super::definition::Likelihood;
+use super::sharing::{SharedParameters, add_matrix, add_vector, values_at};
 use crate::dynamics::{Equations, OUTPUTS};
 use crate::output_error::case::Case;
 use crate::output_error::kernel::pass::Diverged;
@@ -19,9 +20,7 @@ use crate::output_error::kernel::response::{Detail, Response};
 #[derive(Debug)]
 pub struct Joint<'a, const NX: usize, E: Equations<NX>> {
     pub(crate) members: Vec<Member<'a, NX, E>>,
-    /// Places of the shared derivatives among a member's parameters.
-    shared: Vec<usize>,
-    names: Vec<String>,
+    parameters: SharedParameters,
 }
 
 /// One of the maneuvers.
@@ -36,16 +35,12 @@ pub(crate) struct Member<'a, const NX: usize, E: Equations<NX>> {
 impl<const NX: usize, E: Equations<NX>> Member<'_, NX, E> {
     /// The member's parameters among the joint ones.
     pub fn parameters(&self, joint: &[f64]) -> Vec<f64> {
-        self.places.iter().map(|&place| joint[place]).collect()
+        values_at(&self.places, joint)
     }
 
     /// Adds the member's matrix to the joint one.
     pub fn add(&self, matrix: &DMatrix<f64>, sum: &mut DMatrix<f64>) {
-        for (j, &column) in self.places.iter().enumerate() {
-            for (i, &row) in self.places.iter().enumerate() {
-                sum[(row, column)] += matrix[(i, j)];
-            }
-        }
+        add_matrix(&self.places, matrix, sum);
     }
 }
 
@@ -59,81 +54,26 @@ impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
         cases: impl IntoIterator<Item = (&'a str, &'a Case<NX, E>)>,
         is_own: impl Fn(&str) -> bool,
     ) -> Result<Self, String> {
-        let mut joint = Joint {
-            members: Vec::new(),
-            shared: Vec::new(),
-            names: Vec::new(),
-        };
-        for (label, case) in cases {
-            let derivatives = &case.names[..case.derivatives()];
-            match joint.members.first().map(|first| first.case) {
-                None => joint.share(derivatives, &is_own),
-                Some(first) if *derivatives == first.names[..first.derivatives()] => {}
-                Some(_) => {
-                    return Err(format!(
-                        "{label} has other free derivatives than the maneuvers it is joined with"
-                    ));
-                }
-            }
-            let places = joint.place_parameters(label, &case.names);
-            joint.members.push(Member {
-                label,
-                case,
-                places,
-            });
-        }
-        Ok(joint)
+        let cases: Vec<(&str, &Case<NX, E>)> = cases.into_iter().collect();
+        let named = cases
+            .iter()
+            .map(|(label, case)| (*label, case.names.as_slice(), case.derivatives()));
+        let parameters = SharedParameters::new(named, is_own)?;
+        let members = cases.iter().enumerate().map(|(i, (label, case))| Member {
+            label,
+            case,
+            places: parameters.places(i).to_vec(),
+        });
+        Ok(Joint {
+            members: members.collect(),
+            parameters,
+        })
     }
 
-    /// Sets the shared derivatives: those of the first maneuver that no maneuver keeps to itself.
-    fn share(&mut self, derivatives: &[String], is_own: impl Fn(&str) -> bool) {
-        for (j, name) in derivatives.iter().enumerate() {
-            if !is_own(name) {
-                self.shared.push(j);
-                self.names.push(name.clone());
-            }
-        }
-    }
-
-    /// Places of a maneuver's parameters; its own are appended to the joint ones.
-    fn place_parameters(&mut self, label: &str, names: &[String]) -> Vec<usize> {
-        let mut places = Vec::with_capacity(names.len());
-        for (j, name) in names.iter().enumerate() {
-            if let Some(place) = self.shared.iter().position(|&s| s == j) {
-                places.push(place);
-            } else {
-                places.push(self.names.len());
-                self.names.push(format!("{name} of {label}"));
-            }
-        }
-        places
-    }
-
-    /// Places of the shared derivatives among a member's parameters.
+    /// Parameters with their places.
     #[must_use]
-    pub fn shared(&self) -> &[usize] {
-        &self.shared
-    }
-
-    /// Place of each parameter of a member among the joint ones.
-    #[must_use]
-    pub fn places(&self, member: usize) -> &[usize] {
-        self.members.get(member).map_or(&[], |m| &m.places)
-    }
-
-    /// Joint parameters from the shared derivatives and each member's full set, of which its own
-    /// part is used.
-    #[must_use]
-    pub fn assemble(&self, shared: &[f64], members: &[Vec<f64>]) -> Vec<f64> {
-        let mut joint = shared.to_vec();
-        for values in members {
-            let own = values
-                .iter()
-                .enumerate()
-                .filter(|(j, _)| !self.shared.contains(j));
-            joint.extend(own.map(|(_, v)| *v));
-        }
-        joint
+    pub fn parameters(&self) -> &SharedParameters {
+        &self.parameters
     }
 
     /// Cost J (1.2) of each member alone, at a joint response.
@@ -169,7 +109,7 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
     type Response = Vec<Response>;
 
     fn names(&self) -> &[String] {
-        &self.names
+        self.parameters.names()
     }
 
     fn response(&self) -> Vec<Response> {
@@ -194,7 +134,7 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
     }
 
     fn sums(&self, response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> Sums {
-        let n = self.names.len();
+        let n = self.names().len();
         let mut sums = Sums {
             weighted_square: 0.0,
             gradient: DVector::zeros(n),
@@ -205,9 +145,7 @@ impl<const NX: usize, E: Equations<NX>> Likelihood for Joint<'_, NX, E> {
             let own = cost::sums(response, weights);
             sums.weighted_square += own.weighted_square;
             sums.count += own.count;
-            for (g, &place) in own.gradient.iter().zip(&member.places) {
-                sums.gradient[place] += g;
-            }
+            add_vector(&member.places, &own.gradient, &mut sums.gradient);
             member.add(&own.information, &mut sums.information);
         }
         sums

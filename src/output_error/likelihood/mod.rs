@@ -11,5 +11,6 @@ pub mod joint;
 pub mod mean;
 pub mod newton_raphson;
 pub mod outcome;
+pub mod sharing;
 pub mod theil;
 mod whittle;

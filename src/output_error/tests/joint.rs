@@ -61,7 +61,7 @@ fn two_copies_of_a_maneuver_divide_its_bounds_by_the_root_of_two() {
     let alone = fit_of(&case, parameters.clone());
     let joint = Joint::new([("a", &case), ("b", &case)], |_| false).unwrap();
     let shared = case.derivatives();
-    let start = joint.assemble(
+    let start = joint.parameters().assemble(
         &parameters[..shared],
         &[parameters.clone(), parameters.clone()],
     );
@@ -99,7 +99,9 @@ fn the_joint_gradient_matches_finite_differences() {
         measured_case(4, [0.05, -0.03]),
     );
     let joint = Joint::new([("a", &a), ("b", &b)], |_| false).unwrap();
-    let mut at = joint.assemble(&at_a[..a.derivatives()], &[at_a.clone(), at_b]);
+    let mut at = joint
+        .parameters()
+        .assemble(&at_a[..a.derivatives()], &[at_a.clone(), at_b]);
     for (j, value) in at.iter_mut().enumerate() {
         *value *= if j % 2 == 0 { 1.01 } else { 0.99 };
     }
@@ -133,7 +135,9 @@ fn the_joint_gradient_matches_finite_differences() {
 fn shared_derivatives_and_own_biases_are_recovered_within_their_bounds() {
     let ((a, at_a), (b, at_b)) = (measured_case(5, [0.0, 0.0]), measured_case(6, [0.3, -0.05]));
     let joint = Joint::new([("a", &a), ("b", &b)], |_| false).unwrap();
-    let truth = joint.assemble(&at_a[..a.derivatives()], &[at_a.clone(), at_b]);
+    let truth = joint
+        .parameters()
+        .assemble(&at_a[..a.derivatives()], &[at_a.clone(), at_b]);
     let start = truth.iter().map(|v| 1.1 * v).collect();
     let fit = fit_of(&joint, start);
     let covariance = fit.covariance.unwrap();
@@ -185,7 +189,7 @@ fn the_error_of_a_held_value_does_not_average_out() {
     let joint = Joint::new([("a", &case), ("b", &case)], |_| false).unwrap();
     let mut both = fit_of(
         &joint,
-        joint.assemble(
+        joint.parameters().assemble(
             &start[..case.derivatives()],
             &[start.clone(), start.clone()],
         ),
@@ -194,7 +198,7 @@ fn the_error_of_a_held_value_does_not_average_out() {
         case: &case,
         wide: &wide,
         values: values.clone(),
-        places: joint.places(i).to_vec(),
+        places: joint.parameters().places(i).to_vec(),
     });
     consider::consider_together(&considered, &uncertainties, &mut both);
     let (one, two) = (
@@ -223,8 +227,13 @@ fn a_derivative_of_each_maneuver_s_own_is_estimated_for_each() {
     measure(&mut b, &at_b, &mut Noise(6), 0.0);
     let joint = Joint::new([("a", &a), ("b", &b)], |name| name.ends_with("_0")).unwrap();
     assert!(!joint.names().contains(&"Cm_0".to_owned()));
-    let shared: Vec<f64> = joint.shared().iter().map(|&j| at_a[j]).collect();
-    let truth = joint.assemble(&shared, &[at_a, at_b]);
+    let shared: Vec<f64> = joint
+        .parameters()
+        .shared()
+        .iter()
+        .map(|&j| at_a[j])
+        .collect();
+    let truth = joint.parameters().assemble(&shared, &[at_a, at_b]);
     let fit = fit_of(&joint, truth.iter().map(|v| 1.02 * v).collect());
     let covariance = fit.covariance.unwrap();
     for (j, name) in joint.names().iter().enumerate() {

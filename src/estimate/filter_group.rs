@@ -1,0 +1,578 @@
+//! Maneuvers that filter error estimates together, or one alone: the fit, the slopes over α of the
+//! derivatives, and what held values and calibration add to its bounds.
+
+use std::cmp::Ordering;
+use std::marker::PhantomData;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::alpha_slopes::AlphaSlopes;
+use super::calibration_effect::NOT_COUNTED;
+use super::prepared_case::{PreparedCase, all_free};
+use super::task::{Task, values_by_name};
+use super::whiteness::sample_noise;
+use crate::dynamics::{Equations, InGusts, OUTPUTS};
+use crate::filter_error::bounds::{self, Bounds, WidePass};
+use crate::filter_error::filter::Filter;
+use crate::filter_error::joint_filter::JointFilter;
+use crate::filter_error::noise::Noise;
+use crate::filter_error::scoring::{Scored, minimise};
+use crate::filter_error::slopes::SlopeEffect;
+use crate::output_error::calibration_errors::Misreading;
+use crate::output_error::error_effect::{ErrorEffect, SharedError, covariance_of};
+use crate::output_error::sharing::{SharedParameters, add_vector};
+use crate::output_error::{
+    Case, Diverged, Fit, Measurements, Model, Outcome, Response, equation_error,
+};
+
+/// Change by slopes over α, in bounds, up to which they are not held in a second fit.
+const SMALL_CHANGE: f64 = 0.3;
+
+/// Steps to the slopes over α: the effect on the estimates is linear but for products of slopes and
+/// noise.
+const SLOPE_STEPS: usize = 3;
+
+/// Shares of a step to the slopes that are tried.
+const STEP_SHARES: [f64; 3] = [1.0, 0.5, 0.25];
+
+/// Rise of the cost by a step to the slopes that the slopes' prior may outweigh.
+const ALLOWED_RISE: f64 = 1.0;
+
+/// Least output noise as a share of the noise seen in the samples.
+const LEAST_SHARE: f64 = 0.5;
+
+/// Maneuver of a group.
+pub(super) struct GroupMember<'g, 'a, const NX: usize, E: Equations<NX>> {
+    pub task: Task<'a>,
+    pub prepared: &'g PreparedCase<'a, NX, E>,
+    /// Slopes over α that act in the maneuver.
+    pub slopes: AlphaSlopes,
+    /// Standard deviations of the outputs' own noise.
+    pub deviations: [f64; OUTPUTS],
+}
+
+impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
+    /// `wide` has the held derivatives free as well.
+    pub fn new(task: &Task<'a>, prepared: &'g PreparedCase<'a, NX, E>, wide: &Case<NX, E>) -> Self {
+        GroupMember {
+            task: *task,
+            prepared,
+            slopes: task.alpha_slopes(&prepared.window, wide),
+            deviations: task.least_deviations(&prepared.case.measurements),
+        }
+    }
+
+    /// The maneuver's model with the slopes held.
+    fn held<'s>(&'s self, sweep: &Sweep) -> Model<'s> {
+        let model: &Model<'s> = &self.prepared.model;
+        if sweep.is_constant() {
+            model.clone()
+        } else {
+            self.slopes.held_in(model, &sweep.values_of(&self.slopes))
+        }
+    }
+
+    /// The maneuver in the window of its slopes.
+    fn case_with(&self, model: &Model) -> Case<NX, E> {
+        let aircraft = self.task.context.aircraft;
+        self.prepared
+            .case
+            .with_model(aircraft, &self.slopes.window, model)
+    }
+
+    /// Filter of a model in the window of the slopes; `like` is another one of the maneuver.
+    pub fn filter<const NG: usize, G: InGusts<NG>>(
+        &self,
+        model: &Model,
+        like: Option<&Filter<NG, G>>,
+    ) -> Filter<NG, G> {
+        let (aircraft, window) = (self.task.context.aircraft, &self.slopes.window);
+        let calibration = &self.task.context.settings.calibration;
+        let uncertainty = |output: crate::aero::Output| {
+            let known = calibration.get(output.signal())?;
+            (known.bias > 0.0).then_some(known.bias)
+        };
+        let biases: Vec<Option<f64>> = model.biases.iter().map(|b| uncertainty(b.output)).collect();
+        if let Some(filter) = like {
+            return filter.with_model(aircraft, window, model, &biases);
+        }
+        let measurements = self.prepared.case.measurements.clone();
+        Filter::new(aircraft, window, measurements, model, &biases)
+    }
+
+    /// Pass at a fit with the held derivatives and the slopes free as well.
+    fn wide_pass<const NG: usize, G: InGusts<NG>>(
+        &self,
+        sweep: &Sweep,
+        filter: &Filter<NG, G>,
+        parameters: &[f64],
+    ) -> Option<WidePass> {
+        let model = self.held(sweep);
+        let all = all_free(&model);
+        let all = if sweep.is_constant() {
+            self.slopes.added_to(&all)
+        } else {
+            all
+        };
+        let wide = self.filter(&all, Some(filter));
+        let own = &parameters[..filter.first_noise()];
+        let values = values_by_name(&model, filter.names(), own);
+        WidePass::of(filter, parameters, &wide, &values)
+    }
+
+    /// Changes of the gradient by calibration errors.
+    fn gradient_shifts<const NG: usize, G: InGusts<NG>>(
+        &self,
+        errors: &[Misreading],
+        sweep: &Sweep,
+        filter: &Filter<NG, G>,
+        parameters: &[f64],
+    ) -> Result<Vec<DVector<f64>>, Diverged> {
+        let model = self.held(sweep);
+        let window = &self.slopes.window;
+        let cases = errors.iter().map(|error| {
+            let misread_window = error.of_window(window);
+            let measured = misread(&self.prepared.case, error);
+            let windows = [window, &misread_window];
+            filter.as_recorded(self.task.context.aircraft, windows, measured, &model)
+        });
+        filter.gradient_shifts(parameters, cases)
+    }
+
+    /// Starting values by equation error with the slopes held.
+    fn implied(&self, sweep: &Sweep) -> Vec<f64> {
+        let case = self.case_with(&self.held(sweep));
+        equation_error::start(&case, &self.task.tunnel_start(&self.prepared.case))
+    }
+
+    /// Equation error with the slopes over α that a fit holds; `None` without any.
+    pub fn second_opinion_on(&self, sweep: &Sweep) -> Option<equation_error::Regression> {
+        let model = self.held(sweep);
+        let uncertainties = self.task.held_uncertainties(&self.prepared.model);
+        let regression = |wide: &Case<NX, E>| {
+            equation_error::regression(&self.case_with(&model), wide, &uncertainties)
+        };
+        (!sweep.is_constant()).then(|| regression(&self.case_with(&all_free(&model))))
+    }
+}
+
+impl Task<'_> {
+    /// Standard deviations of the outputs' own noise: of the second differences of the measured
+    /// values, and at least the configured resolution.
+    pub(super) fn least_deviations(&self, measurements: &Measurements) -> [f64; OUTPUTS] {
+        let resolution = self.resolution();
+        std::array::from_fn(|o| sample_noise(measurements, o).max(resolution[o]))
+    }
+}
+
+/// Maneuvers that filter error estimates together.
+pub(super) struct Group<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
+{
+    /// The maneuver, or the group as a whole.
+    pub task: Task<'a>,
+    pub members: Vec<GroupMember<'g, 'a, NX, E>>,
+    pub parameters: SharedParameters,
+    equations: PhantomData<G>,
+}
+
+impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
+    Group<'g, 'a, NX, E, NG, G>
+{
+    pub fn new(
+        task: &Task<'a>,
+        members: Vec<GroupMember<'g, 'a, NX, E>>,
+        parameters: SharedParameters,
+    ) -> Self {
+        Group {
+            task: *task,
+            members,
+            parameters,
+            equations: PhantomData,
+        }
+    }
+
+    /// A maneuver by itself.
+    pub fn of_one(task: &Task<'a>, member: GroupMember<'g, 'a, NX, E>) -> Self {
+        let parameters = SharedParameters::of_one(&member.prepared.case.names);
+        Group::new(task, vec![member], parameters)
+    }
+
+    /// Derivatives that do not change over α.
+    pub fn constant(&self) -> Sweep {
+        Sweep::constant(self.members.iter().map(|member| &member.slopes))
+    }
+
+    /// Filters with the slopes held; `like` are others of the maneuvers.
+    pub fn filters(&self, sweep: &Sweep, like: Option<&[Filter<NG, G>]>) -> Vec<Filter<NG, G>> {
+        let members = self.members.iter().enumerate();
+        let filter = |(i, member): (usize, &GroupMember<'g, 'a, NX, E>)| {
+            member.filter(&member.held(sweep), like.and_then(|like| like.get(i)))
+        };
+        members.map(filter).collect()
+    }
+
+    /// Minimum of the cost from a start; `None` where the iteration does not converge.
+    pub fn minimum(&self, filters: &[Filter<NG, G>], start: &FilterStart) -> Option<Minimum> {
+        let settings = self.task.context.settings;
+        let joint = JointFilter::new(filters, &self.parameters);
+        let least = |member: &GroupMember<NX, E>| member.deviations.map(|d| LEAST_SHARE * d);
+        let resolutions: Vec<_> = self.members.iter().map(least).collect();
+        let floors = joint.floors(&resolutions);
+        let from = joint.with_noise(&start.own, &start.noise);
+        let scored = minimise(&joint, from, &floors, &settings.filter)?;
+        if !scored.converged {
+            return None;
+        }
+        let limit = settings.iteration.max_condition_number;
+        let bounds = bounds::bounds(&joint, &scored, limit).ok()?;
+        Some(Minimum { scored, bounds })
+    }
+
+    /// A fit with what is left of the slopes' effect on it.
+    pub fn swept(
+        &self,
+        sweep: Sweep,
+        filters: Vec<Filter<NG, G>>,
+        found: Minimum,
+    ) -> Option<Swept<NG, G>> {
+        let pass = self.wide_pass(&sweep, &filters, &found)?;
+        let effect = sweep.effect(&pass, &found.bounds);
+        Some(Swept {
+            sweep,
+            filters,
+            found,
+            pass,
+            effect,
+        })
+    }
+
+    /// Pass at a fit with the held derivatives and the slopes free as well.
+    fn wide_pass(
+        &self,
+        sweep: &Sweep,
+        filters: &[Filter<NG, G>],
+        found: &Minimum,
+    ) -> Option<WidePass> {
+        let joint = JointFilter::new(filters, &self.parameters);
+        let mut passes = Vec::with_capacity(self.members.len());
+        for (i, (member, filter)) in self.members.iter().zip(filters).enumerate() {
+            let parameters = joint.parameters_of(i, &found.scored.parameters);
+            passes.push(member.wide_pass(sweep, filter, &parameters)?);
+        }
+        Some(WidePass::joined(&passes, &self.parameters))
+    }
+
+    /// Fits the filters again with the slopes held, as long as they move the estimates. A step that
+    /// the likelihood does not bear out is halved; slopes of which no step holds are uncertainty alone.
+    pub fn with_slopes(&self, start: Swept<NG, G>) -> Swept<NG, G> {
+        let mut swept = start;
+        for _ in 0..SLOPE_STEPS {
+            let Some(effect) = swept.moving_effect() else {
+                return swept;
+            };
+            let next = STEP_SHARES
+                .iter()
+                .find_map(|share| self.step_to_slopes(&swept, effect, *share));
+            match next {
+                Some(next) => swept = next,
+                None => break,
+            }
+        }
+        if let Some(effect) = &mut swept.effect
+            && swept
+                .found
+                .bounds
+                .are_exceeded_by(&effect.change, SMALL_CHANGE)
+        {
+            effect.become_uncertainty();
+        }
+        swept
+    }
+
+    /// Fit with the slopes a share of the way to those found; `None` where its cost rises.
+    fn step_to_slopes(
+        &self,
+        swept: &Swept<NG, G>,
+        effect: &SlopeEffect,
+        share: f64,
+    ) -> Option<Swept<NG, G>> {
+        let sweep = swept.sweep.towards(&effect.slopes, share);
+        let near = FilterStart {
+            own: self.moved(swept, &effect.change, share),
+            noise: self.noise(swept),
+        };
+        let filters = self.filters(&sweep, Some(&swept.filters));
+        let starts = std::iter::once(near).chain(self.implied(&sweep));
+        let found = starts.filter_map(|start| self.minimum(&filters, &start));
+        let found = found.min_by(Minimum::by_cost)?;
+        (found.cost() < swept.found.cost() + ALLOWED_RISE)
+            .then(|| self.swept(sweep, filters, found))?
+    }
+
+    /// Start by equation error with the slopes held, for a maneuver by itself. Joined maneuvers start
+    /// from their own fits.
+    fn implied(&self, sweep: &Sweep) -> Option<FilterStart> {
+        let [member] = &self.members[..] else {
+            return None;
+        };
+        Some(FilterStart {
+            own: member.implied(sweep),
+            noise: vec![Noise::starting(member.deviations)],
+        })
+    }
+
+    /// Derivatives, biases and initial states of a fit, moved by a share of a change.
+    fn moved(&self, swept: &Swept<NG, G>, change: &DVector<f64>, share: f64) -> Vec<f64> {
+        let both = self.own(swept).iter().zip(change.iter());
+        both.map(|(own, change)| own + share * change).collect()
+    }
+
+    /// Derivatives, biases and initial states of a fit.
+    fn own<'s>(&self, swept: &'s Swept<NG, G>) -> &'s [f64] {
+        &swept.parameters()[..self.parameters.names().len()]
+    }
+
+    pub fn joint<'s>(&'s self, swept: &'s Swept<NG, G>) -> JointFilter<'s, NG, G> {
+        JointFilter::new(&swept.filters, &self.parameters)
+    }
+
+    /// Noise of each maneuver.
+    pub fn noise(&self, swept: &Swept<NG, G>) -> Vec<Noise> {
+        self.joint(swept).noise(swept.parameters())
+    }
+
+    /// Information of derivatives, biases and initial states.
+    pub fn information(&self, swept: &Swept<NG, G>) -> DMatrix<f64> {
+        let n = self.parameters.names().len();
+        let all = self.joint(swept).information(&swept.found.scored.response);
+        all.view((0, 0), (n, n)).into_owned()
+    }
+
+    /// Outputs of a maneuver along the air's angle; `None` where they diverge.
+    pub fn outputs_along_air(
+        &self,
+        member: usize,
+        swept: &Swept<NG, G>,
+    ) -> Option<Vec<[f64; OUTPUTS]>> {
+        let parameters = self.joint(swept).parameters_of(member, swept.parameters());
+        swept.filters[member].outputs_along_air(&parameters).ok()
+    }
+
+    /// Fit in the form of output error: the noise's parameters are left out, and the outputs are the
+    /// predicted ones. The weights are those of the first maneuver.
+    pub fn fit(&self, swept: &Swept<NG, G>) -> Fit<Vec<Response>> {
+        let Minimum { scored, bounds } = &swept.found;
+        let noise = self.noise(swept);
+        let responses = scored.response.members.iter();
+        let mut fit = Fit {
+            outcome: Outcome::Converged,
+            reason: scored.reason.clone(),
+            iterations: scored.iterations,
+            initial_cost: Some(scored.initial_cost),
+            final_cost: Some(scored.response.cost),
+            values: self.own(swept).to_vec(),
+            weights: noise[0].outputs.map(|deviation| deviation.powi(-2)),
+            response: responses
+                .map(|r| Response::of_outputs(r.predicted.clone()))
+                .collect(),
+            condition_number: Some(bounds.condition_number),
+            undetermined: vec![],
+            covariance: Some(bounds.covariance.clone()),
+            covariance_held: None,
+            covariance_calibration: None,
+            covariance_corrected: Some(bounds.corrected(&self.joint(swept), scored)),
+            shared_errors: vec![],
+        };
+        self.add_held(swept, &mut fit);
+        self.add_calibration(swept, &mut fit);
+        fit
+    }
+
+    /// Adds the effect of the tunnel's errors on the estimates, and that of the derivatives' change
+    /// over the angles of attack of the maneuvers. Both are common to all maneuvers.
+    fn add_held(&self, swept: &Swept<NG, G>, fit: &mut Fit<Vec<Response>>) {
+        let Some(first) = self.members.first() else {
+            return;
+        };
+        let uncertainties = self.task.held_uncertainties(&first.prepared.model);
+        let bounds = &swept.found.bounds;
+        let changes = bounds.changes(&swept.pass.held_shifts(&uncertainties));
+        let mut held = covariance_of(&changes, fit.values.len());
+        let effects = uncertainties
+            .iter()
+            .zip(&changes)
+            .map(|((name, deviation), change)| {
+                ErrorEffect::new(SharedError::Held((*name).to_owned()), *deviation, change)
+            });
+        fit.shared_errors.extend(effects);
+        if let Some(effect) = &swept.effect {
+            for (value, change) in fit.values.iter_mut().zip(effect.change.iter()) {
+                *value += change;
+            }
+            held += &effect.covariance;
+        }
+        add(&mut fit.covariance, &held);
+        add(&mut fit.covariance_corrected, &held);
+        fit.covariance_held = Some(held);
+    }
+
+    /// Adds the effect of calibration errors. The estimates move by H⁻¹ times the gradient of the
+    /// maneuvers as an instrument in error would have recorded them; its error is taken as common to
+    /// all.
+    fn add_calibration(&self, swept: &Swept<NG, G>, fit: &mut Fit<Vec<Response>>) {
+        let Some(first) = self.members.first() else {
+            return;
+        };
+        let errors = first.task.misreadings(&first.slopes.window);
+        if self.task.context.settings.calibration.is_empty() && errors.is_empty() {
+            return;
+        }
+        let mut together = vec![DVector::zeros(fit.values.len()); errors.len()];
+        for (i, (member, filter)) in self.members.iter().zip(&swept.filters).enumerate() {
+            let parameters = self.joint(swept).parameters_of(i, swept.parameters());
+            let shifts = member.gradient_shifts(&errors, &swept.sweep, filter, &parameters);
+            let Ok(shifts) = shifts else {
+                fit.reason.push_str(NOT_COUNTED);
+                return;
+            };
+            for (sum, shift) in together.iter_mut().zip(&shifts) {
+                add_vector(self.parameters.places(i), shift, sum);
+            }
+        }
+        let changes = swept.found.bounds.changes(&together);
+        let common = covariance_of(&changes, fit.values.len());
+        let effects = errors.iter().zip(&changes);
+        fit.shared_errors
+            .extend(effects.map(|(error, change)| error.effect(change)));
+        add(&mut fit.covariance_corrected, &common);
+        fit.covariance_calibration = Some(common);
+    }
+}
+
+fn add(sum: &mut Option<DMatrix<f64>>, part: &DMatrix<f64>) {
+    if let Some(sum) = sum {
+        *sum += part;
+    }
+}
+
+/// Slopes of the derivatives over α, and the values at which a fit holds them. Slopes of one name are
+/// common to the maneuvers.
+#[derive(Clone)]
+pub(super) struct Sweep {
+    names: Vec<String>,
+    values: Vec<f64>,
+}
+
+impl Sweep {
+    /// Derivatives that do not change over α.
+    fn constant<'s>(members: impl Iterator<Item = &'s AlphaSlopes>) -> Self {
+        let mut names: Vec<String> = vec![];
+        for derivative in members.flat_map(|slopes| &slopes.derivatives) {
+            if !names.contains(&derivative.name) {
+                names.push(derivative.name.clone());
+            }
+        }
+        let values = vec![0.0; names.len()];
+        Sweep { names, values }
+    }
+
+    /// A share of the way to other values.
+    fn towards(&self, values: &DVector<f64>, share: f64) -> Self {
+        let both = self.values.iter().zip(values.iter());
+        Sweep {
+            names: self.names.clone(),
+            values: both.map(|(from, to)| from + share * (to - from)).collect(),
+        }
+    }
+
+    fn effect(&self, pass: &WidePass, bounds: &Bounds) -> Option<SlopeEffect> {
+        pass.slope_effect(bounds, &self.names, &self.values)
+    }
+
+    fn is_constant(&self) -> bool {
+        self.values.iter().all(|v| *v == 0.0)
+    }
+
+    /// Values of a maneuver's slopes, in their order.
+    fn values_of(&self, slopes: &AlphaSlopes) -> Vec<f64> {
+        let value = |name: &str| {
+            let place = self.names.iter().position(|n| n == name);
+            place.map_or(0.0, |place| self.values[place])
+        };
+        let derivatives = slopes.derivatives.iter();
+        derivatives.map(|d| value(&d.name)).collect()
+    }
+}
+
+/// Fit with the derivatives' slopes held, and the effect of what they are known to be off.
+pub(super) struct Swept<const NG: usize, G: InGusts<NG>> {
+    pub sweep: Sweep,
+    filters: Vec<Filter<NG, G>>,
+    found: Minimum,
+    pass: WidePass,
+    effect: Option<SlopeEffect>,
+}
+
+impl<const NG: usize, G: InGusts<NG>> Swept<NG, G> {
+    /// Effect of the slopes, if it moves the estimates by more than a small part of their bounds.
+    fn moving_effect(&self) -> Option<&SlopeEffect> {
+        let bounds = &self.found.bounds;
+        let moves = |e: &&SlopeEffect| bounds.are_exceeded_by(&e.change, SMALL_CHANGE);
+        self.effect.as_ref().filter(moves)
+    }
+
+    fn parameters(&self) -> &[f64] {
+        &self.found.scored.parameters
+    }
+
+    /// −log of the likelihood.
+    pub fn cost(&self) -> f64 {
+        self.found.cost()
+    }
+
+    /// −log of the likelihood of each maneuver.
+    pub fn costs(&self) -> Vec<f64> {
+        let members = self.found.scored.response.members.iter();
+        members.map(|response| response.cost).collect()
+    }
+}
+
+/// Start of a filter's iteration.
+pub(super) struct FilterStart {
+    /// Derivatives, biases and initial states.
+    pub own: Vec<f64>,
+    /// Noise of each maneuver.
+    pub noise: Vec<Noise>,
+}
+
+/// Minimum of a filter's cost with its bounds.
+pub(super) struct Minimum {
+    pub scored: Scored,
+    bounds: Bounds,
+}
+
+impl Minimum {
+    /// −log of the likelihood.
+    fn cost(&self) -> f64 {
+        self.scored.response.cost
+    }
+
+    pub fn by_cost(&self, other: &Minimum) -> Ordering {
+        self.cost().total_cmp(&other.cost())
+    }
+}
+
+/// Measurements as an instrument in error would have recorded them.
+fn misread<const NX: usize, E: Equations<NX>>(
+    case: &Case<NX, E>,
+    error: &Misreading,
+) -> Measurements {
+    let mut measured = case.measurements.clone();
+    let outputs = E::AXIS.outputs();
+    if let Some(o) = outputs.iter().position(|o| o.signal() == error.signal) {
+        for values in &mut measured.values {
+            values[o] += error.scale * values[o] + error.bias;
+        }
+    }
+    measured
+}

@@ -1,0 +1,66 @@
+//! Residuals of a fit as white noise: their correlation, cost, and the noise of the samples.
+
+use crate::dynamics::OUTPUTS;
+use crate::numerics::order_statistics::median;
+use crate::output_error::{Fit, Measurements, Outcome};
+
+/// Correlation of neighbouring residuals from which the air is taken to move: white residuals of a
+/// short maneuver stay below it.
+const COLOURED: f64 = 0.3;
+
+/// Standard deviation of an output's white noise: the second difference of white noise has six times
+/// its variance, and that of the motion is small.
+pub(super) fn sample_noise(measurements: &Measurements, output: usize) -> f64 {
+    const NORMAL_MEDIAN: f64 = 0.674_489_75;
+    let both = measurements
+        .values
+        .windows(3)
+        .zip(measurements.used.windows(3));
+    let differences = both
+        .filter(|(_, used)| used.iter().all(|used| used[output]))
+        .map(|(z, _)| (z[0][output] - 2.0 * z[1][output] + z[2][output]).abs());
+    median(differences).unwrap_or(0.0) / (NORMAL_MEDIAN * 6f64.sqrt())
+}
+
+/// True for a fit by output error whose residuals show no motion of the air.
+pub(super) fn is_white(measurements: &Measurements, fit: &Fit) -> bool {
+    let correlations = lag_one(measurements, &fit.response.outputs);
+    fit.outcome == Outcome::Converged && correlations.iter().all(|r| *r < COLOURED)
+}
+
+/// Correlation of neighbouring residuals, output by output.
+pub(super) fn lag_one(measurements: &Measurements, computed: &[[f64; OUTPUTS]]) -> [f64; OUTPUTS] {
+    let residual = |k: usize, o: usize| {
+        let (z, y) = (measurements.values.get(k)?, computed.get(k)?);
+        measurements.used[k][o].then(|| z[o] - y[o])
+    };
+    std::array::from_fn(|o| {
+        let (mut square, mut product) = (0.0, 0.0);
+        for k in 1..measurements.values.len() {
+            if let (Some(before), Some(now)) = (residual(k - 1, o), residual(k, o)) {
+                square += 0.5 * (before * before + now * now);
+                product += before * now;
+            }
+        }
+        if square > 0.0 { product / square } else { 0.0 }
+    })
+}
+
+pub(super) fn largest(values: [f64; OUTPUTS]) -> Option<f64> {
+    values.into_iter().reduce(f64::max)
+}
+
+/// Cost of output error's residuals as white noise of their own variances.
+pub(super) fn white_cost(measurements: &Measurements, fit: &Fit) -> Option<f64> {
+    fit.final_cost?;
+    let mut cost = 0.0;
+    for o in 0..OUTPUTS {
+        let both = measurements.values.iter().zip(&fit.response.outputs);
+        let counted = both.zip(&measurements.used).filter(|(_, used)| used[o]);
+        let squares: Vec<f64> = counted.map(|((z, y), _)| (z[o] - y[o]).powi(2)).collect();
+        let count = squares.len() as f64;
+        let variance = squares.iter().sum::<f64>() / count.max(1.0);
+        cost += 0.5 * count * (variance.ln() + 1.0);
+    }
+    cost.is_finite().then_some(cost)
+}
