@@ -29,7 +29,9 @@ pub(super) struct Filtered {
     pub fit: Fit,
     /// Information of derivatives, biases and initial states.
     pub information: DMatrix<f64>,
-    noise: Noise,
+    pub noise: Noise,
+    /// −log of the likelihood.
+    pub cost: f64,
     /// True where gusts account for a drift of the attitude.
     pub attitude_drifts: bool,
     /// Lag-one correlation of each output's innovations.
@@ -104,6 +106,7 @@ impl<'a> Task<'a> {
             outputs_along_air: group.outputs_along_air(0, &swept),
             second_opinion: member.second_opinion_on(&swept.sweep),
             noise,
+            cost: swept.cost(),
             attitude_drifts: noise.is_of_air(G::FELT_RATES.len(), case.step_s),
             autocorrelation: lag_one(&case.measurements, &fit.response.outputs),
             output_error_costs: [output_error.initial_cost, output_error.final_cost],
@@ -115,22 +118,30 @@ impl<'a> Task<'a> {
 
     /// Adds what the filter found of the air to the row of `fits`.
     pub(super) fn add_gusts(&self, filtered: &Filtered, step_s: f64, row: &mut FitRow) {
-        let noise = &filtered.noise;
+        [row.initial_cost, row.final_cost] = filtered.output_error_costs;
+        row.method = Some(EstimationMethod::FilterError);
+        row.gust_ft_s = Some(self.gust_ft_s(&filtered.noise, step_s));
+        row.rotary_gust_deg_s = Some(self.rotary_gust_deg_s(&filtered.noise));
+        row.gust_corner_rad_s = Some(filtered.noise.corner);
+        row.autocorrelation = largest(filtered.autocorrelation);
+        row.likelihood_gain = filtered.likelihood_gain;
+    }
+
+    /// Speed of the gusts across the flight path, rms.
+    pub(super) fn gust_ft_s(&self, noise: &Noise, step_s: f64) -> f64 {
         let maneuver = self.record.values(signal::VELOCITY).unwrap_or_default();
         let velocities = maneuver.get(self.range()).unwrap_or_default();
         let velocity = velocities.iter().sum::<f64>() / velocities.len().max(1) as f64;
         let steps = GUST_SCALE_FT / (2.0 * velocity * step_s);
-        let rotary = match self.class.axis {
+        velocity * noise.angle * steps.sqrt()
+    }
+
+    /// Rotary gust, rms: of the axis's gusts the larger one.
+    pub(super) fn rotary_gust_deg_s(&self, noise: &Noise) -> f64 {
+        DEG * match self.class.axis {
             Axis::Longitudinal => noise.gusts[0],
             Axis::Lateral => noise.gusts[0].max(noise.gusts[1]),
-        };
-        [row.initial_cost, row.final_cost] = filtered.output_error_costs;
-        row.method = Some(EstimationMethod::FilterError);
-        row.gust_ft_s = Some(velocity * noise.angle * steps.sqrt());
-        row.rotary_gust_deg_s = Some(rotary * DEG);
-        row.gust_corner_rad_s = Some(noise.corner);
-        row.autocorrelation = largest(filtered.autocorrelation);
-        row.likelihood_gain = filtered.likelihood_gain;
+        }
     }
 
     /// Adds the residuals' correlation to the row of a fit by output error.

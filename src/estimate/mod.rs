@@ -1,4 +1,4 @@
-//! Estimation of a maneuver's derivatives, by output error on its axis's equations.
+//! Estimation of a maneuver's derivatives, by filter error or output error on its axis's equations.
 //!
 //! [`maneuver`] estimates one maneuver. [`joint`] estimates several that share their derivatives,
 //! and [`prediction`] predicts one from the others.

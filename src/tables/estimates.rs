@@ -25,10 +25,12 @@ table! {
         pub start: Option<StartingValues>,
         /// Number of steps of the iteration.
         pub iterations: usize ["1"],
-        /// Cost J of eq. 1.2 at the start of output error, weights on residuals in deg, deg/s and g.
+        /// Cost J of eq. 1.2 at the start of output error, weights on residuals in deg, deg/s and g. None
+        /// for maneuvers that filter error estimates together.
         pub initial_cost: Option<f64> ["1"],
         /// Cost J of eq. 1.2 at the end of output error, also where filter error follows. Like the
-        /// initial cost with the weights of the class's table, whatever weights the fit has.
+        /// initial cost with the weights of the class's table, whatever weights the fit has, and none
+        /// for maneuvers that filter error estimates together.
         pub final_cost: Option<f64> ["1"],
         /// Condition number of the information matrix scaled to unit diagonal; beyond 10¹⁰ the fit
         /// is `unidentifiable`.
@@ -46,16 +48,18 @@ table! {
         pub method: Option<EstimationMethod>,
         /// Speed of the gusts across the flight path, rms, as filter error found them: `w_g` of
         /// a longitudinal, `v_g` of a lateral maneuver. Found from the gusts' fast part, for a scale
-        /// of turbulence of 1,750 ft.
+        /// of turbulence of 1,750 ft. Of maneuvers estimated together the root mean square.
         pub gust_ft_s: Option<f64> ["ft/s"],
-        /// Rotary gust, rms: `q_g`, or the larger one of `p_g` and `r_g`.
+        /// Rotary gust, rms: `q_g`, or the larger one of `p_g` and `r_g`. Of maneuvers estimated together
+        /// the root mean square.
         pub rotary_gust_deg_s: Option<f64> ["deg/s"],
-        /// Corner of the rotary gusts.
+        /// Corner of the rotary gusts; none for maneuvers estimated together, each of which has its own.
         pub gust_corner_rad_s: Option<f64> ["rad/s"],
         /// Correlation of neighbouring residuals, or innovations, of the output with the largest one.
         /// White noise has none.
         pub autocorrelation: Option<f64> ["1"],
-        /// Log-likelihood that filter error gained over output error.
+        /// Log-likelihood that filter error gained over output error; none for maneuvers estimated
+        /// together.
         pub likelihood_gain: Option<f64> ["1"],
         /// Distance of the derivatives from equation error, √(dᵀ C⁻¹ d / n): d are the differences of
         /// the n derivatives that both estimate, C is the sum of both covariances. Around or below
@@ -290,10 +294,10 @@ table! {
         pub mach: f64 ["1"],
         /// Participation of the maneuver.
         pub part: Participation,
-        /// Cost J of eq. 1.2 with the maneuver's own derivatives.
+        /// Cost with the maneuver's own derivatives: J of eq. 1.2, or −log of the likelihood where filter
+        /// error estimates the group. None for a maneuver that filter error cannot estimate alone.
         pub cost_alone: Option<f64> ["1"],
-        /// Cost J of eq. 1.2 with the shared derivatives; much larger where the maneuver does not
-        /// share them.
+        /// Same cost with the shared derivatives; much larger where the maneuver does not share them.
         pub cost_joint: Option<f64> ["1"],
     }
 }

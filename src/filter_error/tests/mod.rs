@@ -1,5 +1,7 @@
 //! The filter against finite differences, closed forms, a plain simulation and Monte Carlo.
 
+mod joint;
+
 use std::collections::BTreeMap;
 
 use approx::{assert_abs_diff_eq, assert_relative_eq};

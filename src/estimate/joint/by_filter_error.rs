@@ -1,0 +1,137 @@
+//! Joint estimation by filter error.
+
+use super::member::{Fitted, Member, is_own, starting_values};
+use crate::dynamics::{Equations, InGusts, OUTPUTS};
+use crate::estimate::filter_group::{FilterStart, Group, GroupMember, Swept};
+use crate::estimate::task::Task;
+use crate::estimate::whiteness::{lag_one, largest};
+use crate::filter_error::noise::Noise;
+use crate::output_error::sharing::SharedParameters;
+use crate::output_error::{Case, Fit, Outcome, Response};
+use crate::tables::{EstimationMethod, FitRow};
+
+/// A maneuver with its own estimate, from which the joint one starts.
+pub struct OwnEstimate<'m, 'a, const NX: usize, E: Equations<NX>> {
+    pub member: &'m Member<'a, NX, E>,
+    /// The maneuver with the held derivatives free as well.
+    wide: Case<NX, E>,
+    fit: Fit,
+    noise: Noise,
+    /// −log of the likelihood by filter error; `None` where a maneuver alone does not determine its
+    /// derivatives.
+    pub cost: Option<f64>,
+}
+
+impl<'m, 'a, const NX: usize, E: Equations<NX>> OwnEstimate<'m, 'a, NX, E> {
+    /// Estimates a maneuver alone. One that does not determine its derivatives takes part from those
+    /// of output error.
+    pub fn new<const NG: usize, G: InGusts<NG>>(
+        member: &'m Member<'a, NX, E>,
+    ) -> Result<Self, String> {
+        let (task, prepared) = (&member.task, &member.prepared);
+        let wide = task.with_held_free(prepared);
+        let implied = member.starts.implied.clone();
+        let filtered = task.filtered::<NX, E, NG, G>(prepared, &wide, implied, &member.alone);
+        let (fit, noise, cost) = match filtered {
+            Some(filtered) => (filtered.fit, filtered.noise, Some(filtered.cost)),
+            None if member.alone.outcome == Outcome::Unidentifiable => {
+                let deviations = task.least_deviations(&prepared.case.measurements);
+                (member.alone.clone(), Noise::starting(deviations), None)
+            }
+            None => return Err("alone: filter error does not converge".to_owned()),
+        };
+        Ok(OwnEstimate {
+            member,
+            wide,
+            fit,
+            noise,
+            cost,
+        })
+    }
+}
+
+/// Filter error on the sum of the costs, from the mean of the maneuvers' own estimates.
+pub fn fit<'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
+    task: &Task<'a>,
+    own: &[OwnEstimate<'_, 'a, NX, E>],
+) -> Result<Fitted, String> {
+    let named = own.iter().map(|o| {
+        let case = &o.member.prepared.case;
+        let label = o.member.task.maneuver.maneuver_id.as_str();
+        (label, case.names.as_slice(), case.derivatives())
+    });
+    let parameters = SharedParameters::new(named, |name| is_own(task, name))?;
+    let members = own
+        .iter()
+        .map(|o| GroupMember::new(&o.member.task, &o.member.prepared, &o.wide));
+    let group: Group<NX, E, NG, G> = Group::new(task, members.collect(), parameters);
+    let swept = minimum(&group, own).ok_or("filter error does not converge")?;
+    let (fit, responses) = group.fit(&swept).with_response(Response::default());
+    let members = own.iter().map(|o| o.member);
+    let mut fitted = Fitted::new(task, group.parameters.names(), &fit, members, swept.costs());
+    let air = JointAir {
+        noise: group.noise(&swept),
+        responses,
+    };
+    air.add(own, &mut fitted.estimated.fit);
+    Ok(fitted)
+}
+
+/// Fit of a group: from the noise of the maneuvers' own fits, and from light turbulence where the
+/// iteration does not converge.
+fn minimum<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
+    group: &Group<NX, E, NG, G>,
+    own: &[OwnEstimate<NX, E>],
+) -> Option<Swept<NG, G>> {
+    let alone: Vec<&Fit> = own.iter().map(|o| &o.fit).collect();
+    let shared = starting_values(&alone, group.parameters.shared());
+    let values: Vec<Vec<f64>> = alone.iter().map(|fit| fit.values.clone()).collect();
+    let start = |noise: Vec<Noise>| FilterStart {
+        own: group.parameters.assemble(&shared, &values),
+        noise,
+    };
+    let found = start(own.iter().map(|o| o.noise).collect());
+    let deviations = group.members.iter().map(|member| member.deviations);
+    let light = start(deviations.map(Noise::starting).collect());
+    let constant = group.constant();
+    let filters = group.filters(&constant, None);
+    let minimum = group.minimum(&filters, &found);
+    let minimum = minimum.or_else(|| group.minimum(&filters, &light))?;
+    Some(group.with_slopes(group.swept(constant, filters, minimum)?))
+}
+
+/// Air of a group's maneuvers, and their predicted outputs.
+struct JointAir {
+    noise: Vec<Noise>,
+    responses: Vec<Response>,
+}
+
+impl JointAir {
+    /// Adds what the filters found of the air to the row of `fits`: the root mean square of the
+    /// maneuvers' gusts, and the largest correlation of innovations. Costs of output error there are
+    /// none.
+    fn add<const NX: usize, E: Equations<NX>>(&self, own: &[OwnEstimate<NX, E>], row: &mut FitRow) {
+        let air = own.iter().zip(&self.noise).map(|(o, noise)| {
+            let (task, case) = (&o.member.task, &o.member.prepared.case);
+            (
+                task.gust_ft_s(noise, case.step_s),
+                task.rotary_gust_deg_s(noise),
+            )
+        });
+        let air: Vec<(f64, f64)> = air.collect();
+        let rms = |value: fn(&(f64, f64)) -> f64| {
+            let square: f64 = air.iter().map(|both| value(both).powi(2)).sum();
+            (square / air.len().max(1) as f64).sqrt()
+        };
+        let correlations = own.iter().zip(&self.responses).map(|(o, response)| {
+            let measured = &o.member.prepared.case.measurements;
+            let correlations: [f64; OUTPUTS] = lag_one(measured, &response.outputs);
+            largest(correlations)
+        });
+        [row.initial_cost, row.final_cost] = [None; 2];
+        row.method = Some(EstimationMethod::FilterError);
+        row.gust_ft_s = Some(rms(|(gust, _)| *gust));
+        row.rotary_gust_deg_s = Some(rms(|(_, rotary)| *rotary));
+        row.autocorrelation = correlations.flatten().reduce(f64::max);
+    }
+}

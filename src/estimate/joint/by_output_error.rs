@@ -1,0 +1,150 @@
+//! Joint estimation by output error.
+
+use nalgebra::DVector;
+
+use super::member::{Fitted, Member, is_own, starting_values};
+use crate::dynamics::Equations;
+use crate::estimate::calibration_effect::NOT_COUNTED;
+use crate::estimate::task::{Task, values_by_name};
+use crate::estimate::whiteness::{lag_one, largest};
+use crate::output_error::consider::{self, Considered};
+use crate::output_error::{
+    Case, Fit, Joint, Likelihood, Outcome, Response, calibration_errors, estimation,
+};
+use crate::tables::EstimationMethod;
+
+/// Output error on the sum of the costs, from the mean of the maneuvers' own estimates.
+pub fn fit<'a, const NX: usize, E: Equations<NX>>(
+    task: &Task<'a>,
+    parts: &[Member<'a, NX, E>],
+) -> Result<Fitted, String> {
+    let cases = parts
+        .iter()
+        .map(|p| (p.task.maneuver.maneuver_id.as_str(), &p.prepared.case));
+    let settings = task.context.settings;
+    let joint = Joint::new(cases, |name| is_own(task, name))?;
+    let (weights, resolution) = (task.weights()?, task.resolution());
+    let own: Vec<Vec<f64>> = parts.iter().map(|p| p.alone.values.clone()).collect();
+    let from = |shared: &[f64]| {
+        let start = joint.parameters().assemble(shared, &own);
+        estimation::estimate(
+            &joint,
+            start,
+            weights,
+            settings.weights,
+            resolution,
+            &settings.iteration,
+        )
+    };
+    let alone: Vec<&Fit> = parts.iter().map(|p| &p.alone).collect();
+    let mut fit = from(&starting_values(&alone, joint.parameters().shared()));
+    if fit.outcome != Outcome::Converged {
+        // From the derivatives of the maneuver that fits best alone.
+        let cost = |p: &&Member<NX, E>| p.alone.final_cost.unwrap_or(f64::INFINITY);
+        let best = parts.iter().min_by(|a, b| cost(a).total_cmp(&cost(b)));
+        let other = best.map(|p| {
+            from(
+                &joint
+                    .parameters()
+                    .shared()
+                    .iter()
+                    .map(|&j| p.alone.values[j])
+                    .collect::<Vec<_>>(),
+            )
+        });
+        fit = other
+            .filter(|f| f.outcome == Outcome::Converged)
+            .unwrap_or(fit);
+    }
+    let costs = if fit.final_cost.is_some() {
+        joint.costs(&fit.response, &weights)
+    } else {
+        vec![]
+    };
+    add_held_uncertainty(task, parts, &joint, &mut fit);
+    add_calibration_errors(parts, &joint, &mut fit);
+    let members = parts.iter().zip(&fit.response);
+    let correlations = members.map(|(part, response)| {
+        largest(lag_one(&part.prepared.case.measurements, &response.outputs))
+    });
+    let autocorrelation = correlations.flatten().reduce(f64::max);
+    let (fit, _) = fit.with_response(Response::default());
+    let mut fitted = Fitted::new(task, joint.names(), &fit, parts.iter(), costs);
+    fitted.estimated.fit.method = Some(EstimationMethod::OutputError);
+    fitted.estimated.fit.autocorrelation = autocorrelation;
+    Ok(fitted)
+}
+
+/// Adds the effect of the tunnel's errors to the covariances of the shared derivatives.
+fn add_held_uncertainty<'a, const NX: usize, E: Equations<NX>>(
+    task: &Task<'a>,
+    parts: &[Member<'a, NX, E>],
+    joint: &Joint<NX, E>,
+    fit: &mut Fit<Vec<Response>>,
+) {
+    let Some(first) = parts.first() else { return };
+    let wide: Vec<Case<NX, E>> = parts
+        .iter()
+        .map(|p| p.task.with_held_free(&p.prepared))
+        .collect();
+    let own = |i: usize| {
+        joint
+            .parameters()
+            .places(i)
+            .iter()
+            .filter_map(|&p| fit.values.get(p))
+            .copied()
+            .collect::<Vec<f64>>()
+    };
+    let considered: Vec<Considered<NX, E>> = parts
+        .iter()
+        .zip(&wide)
+        .enumerate()
+        .map(|(i, (part, wide))| Considered {
+            case: &part.prepared.case,
+            wide,
+            values: values_by_name(&part.prepared.model, &part.prepared.case.names, &own(i)),
+            places: joint.parameters().places(i).to_vec(),
+        })
+        .collect();
+    consider::consider_together(
+        &considered,
+        &task.held_uncertainties(&first.prepared.model),
+        fit,
+    );
+}
+
+/// Adds the effect of calibration errors to the covariance of the shared derivatives.
+///
+/// An error of a signal is taken as common to all maneuvers. That is so within a flight; between
+/// flights it overestimates the effect.
+fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
+    parts: &[Member<NX, E>],
+    joint: &Joint<NX, E>,
+    fit: &mut Fit<Vec<Response>>,
+) {
+    if fit.covariance_corrected.is_none() {
+        return;
+    }
+    let mut together: Vec<DVector<f64>> = vec![];
+    let mut errors = vec![];
+    for (i, part) in parts.iter().enumerate() {
+        let places = joint.parameters().places(i);
+        let own: Vec<f64> = places.iter().map(|&p| fit.values[p]).collect();
+        errors = part.task.misreadings(&part.prepared.window);
+        let Ok(shifts) = part
+            .task
+            .gradient_shifts(&part.prepared, &errors, &own, &fit.weights)
+        else {
+            fit.reason.push_str(NOT_COUNTED);
+            return;
+        };
+        together.resize(shifts.len(), DVector::zeros(joint.names().len()));
+        for (sum, shift) in together.iter_mut().zip(shifts) {
+            for (&place, value) in places.iter().zip(shift.iter()) {
+                sum[place] += value;
+            }
+        }
+    }
+    calibration_errors::add_calibration_errors(joint, &errors, &together, fit);
+}
