@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
+use crate::filter_error::noise::Noise;
 use crate::maneuver::{Maneuver, Means};
 use crate::output_error::Fit;
 use crate::output_error::error_effect::ErrorEffect;
@@ -49,6 +50,8 @@ pub struct Estimated {
     pub history: Option<History>,
     /// Agreement of each output with the maneuver's own fit.
     pub fit_outputs: Vec<AgreementRow>,
+    /// Noise that filter error found; `None` for output error.
+    pub noise: Option<Noise>,
     /// Means of the record; `None` before they are added, or where a signal is missing.
     pub means: Option<Means>,
 }
@@ -71,6 +74,7 @@ impl Estimated {
             correlations: vec![],
             history: None,
             fit_outputs: vec![],
+            noise: None,
             means: None,
         }
     }

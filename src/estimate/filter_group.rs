@@ -11,6 +11,8 @@ use super::calibration_effect::NOT_COUNTED;
 use super::prepared_case::{PreparedCase, all_free};
 use super::task::{Task, values_by_name};
 use super::whiteness::sample_noise;
+use crate::aero::Output;
+use crate::dynamics::motion::Window;
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
 use crate::filter_error::bounds::{self, Bounds, WidePass};
 use crate::filter_error::filter::Filter;
@@ -87,17 +89,11 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
         like: Option<&Filter<NG, G>>,
     ) -> Filter<NG, G> {
         let (aircraft, window) = (self.task.context.aircraft, &self.slopes.window);
-        let calibration = &self.task.context.settings.calibration;
-        let uncertainty = |output: crate::aero::Output| {
-            let known = calibration.get(output.signal())?;
-            (known.bias > 0.0).then_some(known.bias)
-        };
-        let biases: Vec<Option<f64>> = model.biases.iter().map(|b| uncertainty(b.output)).collect();
         if let Some(filter) = like {
+            let biases = self.task.bias_uncertainties(model);
             return filter.with_model(aircraft, window, model, &biases);
         }
-        let measurements = self.prepared.case.measurements.clone();
-        Filter::new(aircraft, window, measurements, model, &biases)
+        self.task.filter(self.prepared, window, model)
     }
 
     /// Pass at a fit with the held derivatives and the slopes free as well.
@@ -157,6 +153,27 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
 }
 
 impl Task<'_> {
+    /// Filter of a model in a window of the maneuver.
+    pub(super) fn filter<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
+        &self,
+        prepared: &PreparedCase<NX, E>,
+        window: &Window,
+        model: &Model,
+    ) -> Filter<NG, G> {
+        let measurements = prepared.case.measurements.clone();
+        let biases = self.bias_uncertainties(model);
+        Filter::new(self.context.aircraft, window, measurements, model, &biases)
+    }
+
+    /// Standard uncertainty of each bias, where calibration knows it.
+    fn bias_uncertainties(&self, model: &Model) -> Vec<Option<f64>> {
+        let uncertainty = |output: Output| {
+            let known = self.context.settings.calibration.get(output.signal())?;
+            (known.bias > 0.0).then_some(known.bias)
+        };
+        model.biases.iter().map(|b| uncertainty(b.output)).collect()
+    }
+
     /// Standard deviations of the outputs' own noise: of the second differences of the measured
     /// values, and at least the configured resolution.
     pub(super) fn least_deviations(&self, measurements: &Measurements) -> [f64; OUTPUTS] {

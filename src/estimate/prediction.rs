@@ -6,6 +6,10 @@
 //! unless `share_constants` is set, its constants (`CN_0`), which take up the zero errors of the
 //! flight's vanes and surfaces. The remaining difference between measured and computed outputs is
 //! due to the derivatives; Theil's coefficient and R² measure it.
+//!
+//! Where filter error estimated the maneuver, it also fits what the prediction leaves free, with the
+//! noise of the maneuver's own fit. A prediction from one sample to the next follows any motion, so the
+//! computed outputs are those along the air's angle, as for the own fit: both compare.
 
 use std::collections::BTreeMap;
 
@@ -14,13 +18,20 @@ use serde::{Deserialize, Serialize};
 
 use super::context::Context;
 use super::estimated::Estimated;
+use super::prepared_case::PreparedCase;
 use super::settings::Hold;
 use super::settings::PredictionSettings;
 use super::task::Task;
 use crate::aero::{Axis, Derivative};
-use crate::dynamics::{Equations, Lateral, Longitudinal, OUTPUTS};
+use crate::dynamics::{
+    Equations, InGusts, Lateral, LateralInGusts, Longitudinal, LongitudinalInGusts, OUTPUTS,
+};
+use crate::filter_error::joint_filter::JointFilter;
+use crate::filter_error::noise::Noise;
+use crate::filter_error::scoring::minimise;
 use crate::flight::Record;
 use crate::maneuver::{Class, Maneuver, Status};
+use crate::output_error::sharing::SharedParameters;
 use crate::output_error::theil::{self, Agreement};
 use crate::output_error::{Case, Fit, Model, Outcome, cost, estimation, mean};
 use crate::tables::{AgreementRow, EstimateRow, FitRow, PredictedRow, PredictionStatus};
@@ -81,13 +92,15 @@ pub fn others(
     maneuvers.iter().enumerate().map(of).collect()
 }
 
-/// Predicts one maneuver from others. The column `prediction` has any failure.
+/// Predicts one maneuver from others. `own` is its own estimate. The column `prediction` has any
+/// failure.
 #[must_use]
 pub fn maneuver(
     record: &Record,
     maneuver: &Maneuver,
     class: &Class,
     context: &Context,
+    own: &Estimated,
     others: &[&Estimated],
 ) -> Predicted {
     let task = Task {
@@ -97,14 +110,17 @@ pub fn maneuver(
         context,
     };
     let predicted = match class.axis {
-        Axis::Longitudinal => predict::<3, Longitudinal>(&task, others),
-        Axis::Lateral => predict::<4, Lateral>(&task, others),
+        Axis::Longitudinal => {
+            predict::<3, Longitudinal, 4, LongitudinalInGusts>(&task, own, others)
+        }
+        Axis::Lateral => predict::<4, Lateral, 6, LateralInGusts>(&task, own, others),
     };
     predicted.unwrap_or_else(|reason| Predicted::none(reason, others.len()))
 }
 
-fn predict<const NX: usize, E: Equations<NX>>(
+fn predict<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
     task: &Task,
+    own: &Estimated,
     others: &[&Estimated],
 ) -> Result<Predicted, String> {
     let settings = task.context.settings;
@@ -123,7 +139,7 @@ fn predict<const NX: usize, E: Equations<NX>>(
         .map(|d| d.name.as_str())
         .zip(mean_derivatives(task, &model.free, others)?)
         .collect();
-    let (own, fixed): (Vec<&Derivative>, Vec<&Derivative>) = model
+    let (kept, fixed): (Vec<&Derivative>, Vec<&Derivative>) = model
         .free
         .iter()
         .partition(|d| !share_constants && task.is_constant(&d.name));
@@ -134,50 +150,113 @@ fn predict<const NX: usize, E: Equations<NX>>(
         .copied()
         .chain(fixed.into_iter().map(|d| (d, value(&d.name))));
     let fixed = Model {
-        free: own,
+        free: kept,
         held: held.collect(),
         ..model.clone()
     };
     let prepared = task.prepare::<NX, E>(fixed)?;
-    let (case, weights) = (&prepared.case, task.weights()?);
+    let start = prepared.case.starting_values(value);
+    let by_output_error = predict_by_output_error(task, &prepared.case, &start)?;
+    let prediction = match own.noise {
+        Some(noise) => {
+            predict_in_gusts::<NX, E, NG, G>(task, &prepared, &noise, by_output_error, start)?
+        }
+        None => by_output_error.sound()?,
+    };
+    Ok(rows(task, &prepared.case, &prediction, others.len()))
+}
+
+/// Computed outputs of a prediction.
+struct Prediction {
+    /// Weights of the outputs in Theil's coefficient.
+    weights: [f64; OUTPUTS],
+    outputs: Vec<[f64; OUTPUTS]>,
+    /// Own constants, biases and initial states.
+    values: Vec<f64>,
+    /// Cost of output error; the reason where it does not converge.
+    cost: Result<f64, String>,
+}
+
+impl Prediction {
+    /// Prediction of output error that converged.
+    fn sound(self) -> Result<Prediction, String> {
+        match &self.cost {
+            Ok(_) => Ok(self),
+            Err(reason) => Err(reason.clone()),
+        }
+    }
+}
+
+fn predict_by_output_error<const NX: usize, E: Equations<NX>>(
+    task: &Task,
+    case: &Case<NX, E>,
+    start: &[f64],
+) -> Result<Prediction, String> {
+    let (settings, weights) = (task.context.settings, task.weights()?);
     if case.parameters() == 0 {
         let mut response = case.response();
         let diverged = case.respond(&[], &mut response).is_err();
         let cost = cost::sums(&response, &weights).cost();
-        return if diverged {
-            Err("the integration diverges".into())
-        } else {
-            Ok(rows(
-                task,
-                case,
-                &response.outputs,
-                &weights,
-                cost,
-                others.len(),
-            ))
-        };
+        return Ok(Prediction {
+            weights,
+            outputs: response.outputs,
+            values: vec![],
+            cost: if diverged {
+                Err("the integration diverges".into())
+            } else {
+                Ok(cost)
+            },
+        });
     }
-    let start = case.starting_values(value);
     let fit: Fit = estimation::estimate_values(
         case,
-        start,
+        start.to_vec(),
         weights,
         settings.weights,
         task.resolution(),
         &settings.iteration,
     );
-    match (fit.outcome, fit.final_cost) {
-        // Collinear biases do not change the response.
-        (Outcome::Converged | Outcome::Unidentifiable, Some(cost)) => Ok(rows(
-            task,
-            case,
-            &fit.response.outputs,
-            &fit.weights,
-            cost,
-            others.len(),
-        )),
-        _ => Err(fit.reason),
+    Ok(Prediction {
+        cost: match (fit.outcome, fit.final_cost) {
+            // Collinear biases do not change the response.
+            (Outcome::Converged | Outcome::Unidentifiable, Some(cost)) => Ok(cost),
+            _ => Err(fit.reason),
+        },
+        weights: fit.weights,
+        outputs: fit.response.outputs,
+        values: fit.values,
+    })
+}
+
+/// Filter error on the maneuver's own constants, biases and initial states at known noise, from those
+/// of output error where it converges.
+fn predict_in_gusts<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
+    task: &Task,
+    prepared: &PreparedCase<NX, E>,
+    noise: &Noise,
+    by_output_error: Prediction,
+    start: Vec<f64>,
+) -> Result<Prediction, String> {
+    let filter = task.filter::<NX, E, NG, G>(prepared, &prepared.window, &prepared.model);
+    let own = SharedParameters::of_one(filter.names());
+    let joint = JointFilter::new(std::slice::from_ref(&filter), &own).with_known_noise();
+    let start = if by_output_error.cost.is_ok() {
+        by_output_error.values.clone()
+    } else {
+        start
+    };
+    let start = joint.with_noise(&start, std::slice::from_ref(noise));
+    let floors = vec![f64::NEG_INFINITY; start.len()];
+    let scored = minimise(&joint, start, &floors, &task.context.settings.filter);
+    let scored = scored.ok_or("filter error diverges")?;
+    if !scored.converged {
+        return Err(format!("filter error: {}", scored.reason));
     }
+    let outputs = filter.outputs_along_air(&scored.parameters);
+    Ok(Prediction {
+        outputs: outputs.map_err(|_| "its equations diverge along the maneuver")?,
+        ..by_output_error
+    })
 }
 
 /// Mean over the others of the derivatives that are free in the predicted maneuver; the tunnel's
@@ -251,23 +330,18 @@ fn estimate(estimated: &Estimated, wanted: &[&str]) -> Option<mean::Estimate> {
 fn rows<const NX: usize, E: Equations<NX>>(
     task: &Task,
     case: &Case<NX, E>,
-    computed: &[[f64; OUTPUTS]],
-    weights: &[f64; OUTPUTS],
-    cost: f64,
+    prediction: &Prediction,
     others: usize,
 ) -> Predicted {
-    let agreements = Agreement::of_outputs(&case.measurements, computed);
-    let weighted: Vec<(Agreement, f64)> = agreements
-        .iter()
-        .copied()
-        .zip(weights.iter().copied())
-        .collect();
+    let agreements = Agreement::of_outputs(&case.measurements, &prediction.outputs);
+    let weighted: Vec<(Agreement, f64)> =
+        agreements.iter().copied().zip(prediction.weights).collect();
     let named = || task.class.axis.outputs().into_iter().zip(&agreements);
     let whole = theil::theil(&weighted);
     let summary = PredictedRow {
         prediction: Some(PredictionStatus::Predicted),
         predicted_from: Some(others),
-        predicted_cost: Some(cost),
+        predicted_cost: prediction.cost.as_ref().ok().copied(),
         theil: whole.map(|t| t.coefficient),
         theil_bias: whole.map(|t| t.bias),
         theil_variance: whole.map(|t| t.variance),

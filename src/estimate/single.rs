@@ -129,6 +129,7 @@ impl Task<'_> {
         let second = filtered.second_opinion.as_ref().unwrap_or(second);
         let mut estimated = self.estimated(prepared, &filtered.fit, start, information, second);
         self.add_gusts(filtered, prepared.case.step_s, &mut estimated.fit);
+        estimated.noise = Some(filtered.noise);
         let explanation = Explanation {
             outputs: filtered.outputs_along_air.as_deref(),
             attitude_drifts: filtered.attitude_drifts,
@@ -162,6 +163,7 @@ impl Task<'_> {
             history: Some(self.history(&case.measurements, fit, window, surfaces)),
             fit: self.fit_row(fit, *left_out, start),
             fit_outputs: vec![],
+            noise: None,
             means: None,
         };
         add_second_opinion(&case.names, second, &mut estimated.estimates);

@@ -20,6 +20,7 @@ pub struct JointFilter<'f, const NX: usize, E: InGusts<NX>> {
     filters: &'f [Filter<NX, E>],
     /// Derivatives, biases and initial states.
     own: &'f SharedParameters,
+    noise_is_known: bool,
 }
 
 /// Result of a pass over all maneuvers.
@@ -44,7 +45,20 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
     /// Joins filters; `own` places their derivatives, biases and initial states.
     #[must_use]
     pub fn new(filters: &'f [Filter<NX, E>], own: &'f SharedParameters) -> Self {
-        JointFilter { filters, own }
+        JointFilter {
+            filters,
+            own,
+            noise_is_known: false,
+        }
+    }
+
+    /// Fixes the noise where the iteration starts.
+    #[must_use]
+    pub fn with_known_noise(self) -> Self {
+        JointFilter {
+            noise_is_known: true,
+            ..self
+        }
     }
 
     /// Filter of each maneuver.
@@ -185,8 +199,11 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
         own.into_iter().chain(noise).collect()
     }
 
-    /// Fixes the corner and the correlations of rotary gusts that are fixed themselves.
-    pub(super) fn fix_without_effect(&self, free: &mut [bool]) {
+    /// Fixes known noise, and the corner and the correlations of rotary gusts that are fixed themselves.
+    pub(super) fn fix_noise(&self, free: &mut [bool]) {
+        if self.noise_is_known {
+            free[self.first_noise()..].fill(false);
+        }
         for (member, filter) in self.filters.iter().enumerate() {
             let noise = &mut free[self.noise_places(member)];
             fix_without_effect(filter.noise_parameters(), E::FELT_RATES.len(), noise);

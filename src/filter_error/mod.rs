@@ -40,4 +40,4 @@ pub mod scoring;
 pub mod slopes;
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -6,6 +6,7 @@
 //! inverse hyperbolic tangents of correlations: any value is possible.
 
 use nalgebra::SMatrix;
+use serde::{Deserialize, Serialize};
 
 use crate::dynamics::{InGusts, OUTPUTS};
 use crate::units::RAD;
@@ -39,7 +40,7 @@ const LEAST_GUST: f64 = 1e-3 * RAD;
 const MOST_EXCESS: f64 = 10.0;
 
 /// Noise of a maneuver.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Noise {
     /// Angle of the air, rad per sample.
     pub angle: f64,

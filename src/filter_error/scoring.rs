@@ -110,7 +110,7 @@ impl Scored {
         let mut information = filter.information(&self.response);
         let at_floor = |j: usize| self.parameters[j] <= floors[j] && gradient[j] <= 0.0;
         self.free = (0..floors.len()).map(|j| !at_floor(j)).collect();
-        filter.fix_without_effect(&mut self.free);
+        filter.fix_noise(&mut self.free);
         for j in (0..self.free.len()).filter(|j| !self.free[*j]) {
             gradient[j] = 0.0;
             information.row_mut(j).fill(0.0);

@@ -195,6 +195,8 @@ pub struct PredictStep<'a> {
     store: &'a Store,
     settings: &'a PredictionSettings,
     member: Member<'a>,
+    /// The maneuver's own estimate.
+    own: &'a Estimated,
     from: Vec<(&'a ArtefactName, &'a Estimated)>,
 }
 
@@ -203,7 +205,7 @@ impl<'a> Step for PredictStep<'a> {
     type Artefact = Predicted;
 
     const KIND: Kind = Kind::Predict;
-    const VERSION: u32 = 6;
+    const VERSION: u32 = 7;
 
     fn item(&self) -> &str {
         &self.member.maneuver.maneuver_id
@@ -224,7 +226,7 @@ impl<'a> Step for PredictStep<'a> {
             Some(class) => {
                 let record = self.member.record(self.store)?;
                 let context = context(self.config, self.member.delays);
-                prediction::maneuver(&record, maneuver, class, &context, &from)
+                prediction::maneuver(&record, maneuver, class, &context, self.own, &from)
             }
             None => Predicted::none("the configuration has no such class", from.len()),
         };
@@ -257,13 +259,15 @@ pub fn predict(
             Some((name, estimates.get(j)?))
         });
         let from: Vec<_> = from.collect();
-        match Member::of(campaign, i).filter(|_| !from.is_empty()) {
-            Some(member) => {
+        let member = Member::of(campaign, i).filter(|_| !from.is_empty());
+        match member.zip(estimates.get(i)) {
+            Some((member, own)) => {
                 let step = PredictStep {
                     config: runner.config,
                     store: &runner.store,
                     settings,
                     member,
+                    own,
                     from,
                 };
                 Ok(runner.bring(&step)?.map(|brought| brought.artefact))

@@ -14,10 +14,11 @@ table! {
         /// Number of maneuvers from which it was predicted: same class, converged, mean α within
         /// 2.5° (`alpha_distance_deg`).
         pub predicted_from: Option<usize> ["maneuvers"],
-        /// Cost J of eq. 1.2 of the prediction, to be compared with `final_cost`.
+        /// Cost J of eq. 1.2 of the prediction by output error, also where filter error follows, to be
+        /// compared with `final_cost`. None where output error does not converge.
         pub predicted_cost: Option<f64> ["1"],
-        /// Theil's inequality coefficient over all outputs, weighted as in the cost: 0 perfect,
-        /// 1 no relation.
+        /// Theil's inequality coefficient over all outputs, weighted as in the cost of output error:
+        /// 0 perfect, 1 no relation.
         pub theil: Option<f64> ["1"],
         /// Share of Theil's coefficient from a wrong mean.
         pub theil_bias: Option<f64> ["1"],
@@ -76,6 +77,10 @@ table! {
     /// that some other estimates; the tunnel gives the rest. Biases, initial states and, unless
     /// `share_constants`, constants are the maneuver's own: they are fitted again with the
     /// derivatives fixed, because they take up the zero errors of the flight's vanes and surfaces.
+    ///
+    /// Where filter error estimated the maneuver, it also fits these, with the noise of the maneuver's own
+    /// fit. The computed outputs are those of the table `fit_outputs`, so that both compare: the angle of
+    /// the air follows the vane, and nothing else follows the measurements.
     pub struct AgreementRow in "predictions" per "predicted maneuver and output" {
         /// Maneuver.
         pub maneuver_id: String,

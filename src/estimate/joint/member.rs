@@ -75,6 +75,7 @@ impl Fitted {
             covariance: Covariance::of_fit(&names, fit),
             history: None,
             fit_outputs: vec![],
+            noise: None,
             means: None,
             fit: task.fit_row(fit, left_out, StartingValues::SingleEstimates),
         };

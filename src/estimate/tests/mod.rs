@@ -3,6 +3,7 @@
 mod calibration;
 mod doubt;
 mod evidence;
+mod gusts;
 
 use std::collections::BTreeMap;
 
@@ -307,11 +308,13 @@ fn predicted(factor: f64) -> prediction::Predicted {
     let near = [bench.flown(1, 1.0, 0.0), bench.flown(2, 1.0, 0.05)]
         .map(|r| bench.estimate(&r, &maneuver("o", 20.0)));
     let record = bench.flown(3, factor, -0.1);
+    let maneuver = maneuver("p", 20.0);
     prediction::maneuver(
         &record,
-        &maneuver("p", 20.0),
+        &maneuver,
         &bench.class,
         &bench.context(),
+        &bench.estimate(&record, &maneuver),
         &[&near[0], &near[1]],
     )
 }

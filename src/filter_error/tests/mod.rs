@@ -97,7 +97,8 @@ impl<const NX: usize, E: InGusts<NX>> Simulated<NX, E> {
     }
 }
 
-fn plain_outputs<const NX: usize, E: Equations<NX>>(
+/// Outputs of a state by the plain equations.
+pub(crate) fn plain_outputs<const NX: usize, E: Equations<NX>>(
     case: &Case<NX, E>,
     parameters: &[f64],
     sample: usize,
@@ -108,7 +109,8 @@ fn plain_outputs<const NX: usize, E: Equations<NX>>(
     E::outputs(inputs, &case.motion.sensor_inputs[sample], x, &c).outputs
 }
 
-fn plain_step<const NX: usize, E: Equations<NX>>(
+/// State after a step of the plain equations.
+pub(crate) fn plain_step<const NX: usize, E: Equations<NX>>(
     case: &Case<NX, E>,
     parameters: &[f64],
     sample: usize,
