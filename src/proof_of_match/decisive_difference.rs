@@ -25,7 +25,7 @@ pub struct DecisiveDifference {
     pub maneuver_id: String,
     pub condition: Condition,
     pub quantity: MatchedQuantity,
-    /// Of a repeat flight of the posterior's mean from the model.
+    /// Difference of a repeat flight of the posterior's mean from the model.
     pub mean: f64,
     /// Slopes along the values of the posterior.
     pub slopes: Vec<(LocalValue, f64)>,

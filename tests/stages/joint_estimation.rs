@@ -101,10 +101,10 @@ fn joint_estimates_add_rows_without_changing_others_for_any_number_of_threads() 
         of(&alone.table("estimates"), "Cm_alpha"),
     );
     assert_eq!(both["flight_id"], "joint");
-    assert!(
-        number(&both, "bound") < number(&single, "bound"),
-        "{both:?}\n{single:?}"
-    );
+    // What both hold is wrong alike, and how much it matters depends on their noise.
+    let by_data2 = |row: &Row| number(row, "bound").powi(2) - number(row, "bound_held").powi(2);
+    let ratio = (by_data2(&both) / by_data2(&single)).sqrt();
+    assert!((0.6..0.8).contains(&ratio), "{ratio}: {both:?}\n{single:?}");
     assert!(
         (number(&both, "value") - number(&single, "value")).abs()
             < number(&single, "bound_corrected")
