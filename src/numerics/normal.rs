@@ -8,7 +8,19 @@ use statrs::function::erf::{erf, erf_inv};
 #[must_use]
 pub fn within(width: f64, mean: f64, deviation: f64) -> f64 {
     let scale = FRAC_1_SQRT_2 / deviation;
-    0.5 * (erf(scale * (width - mean)) + erf(scale * (width + mean)))
+    0.5 * (error_function(scale * (width - mean)) + error_function(scale * (width + mean)))
+}
+
+/// Argument from which the error function rounds to one: there it is 1 − 2e-17.
+const ROUNDS_TO_ONE: f64 = 6.0;
+
+/// The error function. A limit that is far away takes no polynomials.
+fn error_function(x: f64) -> f64 {
+    if x.abs() >= ROUNDS_TO_ONE {
+        1.0_f64.copysign(x)
+    } else {
+        erf(x)
+    }
 }
 
 /// Probability that a standard normal deviate is below a value.
@@ -27,6 +39,19 @@ pub fn quantile(probability: f64) -> f64 {
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
+
+    #[test]
+    fn the_error_function_has_the_bits_of_the_polynomials() {
+        for k in -400..=400 {
+            let x = 0.05 * f64::from(k);
+            assert_eq!(error_function(x).to_bits(), erf(x).to_bits(), "{x}");
+        }
+        assert_eq!(
+            error_function(f64::NEG_INFINITY).to_bits(),
+            (-1.0_f64).to_bits()
+        );
+        assert!(error_function(f64::NAN).is_nan());
+    }
 
     #[test]
     fn the_probability_is_that_of_the_tables() {

@@ -108,25 +108,14 @@ pub fn fly_again(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
     let Some(specification) = &runner.config.proof_of_match else {
         return Ok(());
     };
-    let tunnel = runner.config.tunnel.clamped();
-    let posterior = proof_of_match::of_posterior(&campaign.model.rows.posterior, &tunnel);
-    let database = |model: &ModelSource| database(runner, campaign, (&posterior, &tunnel), *model);
-    let models = specification.models.iter();
-    let models: Vec<(ModelSource, WindTunnel)> = models.map(|m| (*m, database(m))).collect();
+    let databases = Databases::new(runner.config, campaign, &specification.models);
     let derivatives = Fingerprint::of("models", 1)
-        .with(&models)
-        .with(&tunnel)
+        .with(&databases.models)
+        .with(&databases.tunnel)
         .with(&campaign.model.rows.posterior)
         .with(&campaign.model.rows.covariance)
         .finish();
-    let basis = Basis {
-        aircraft: &runner.config.aircraft,
-        buildup: &runner.config.buildup,
-        models: &models,
-        posterior: &posterior,
-        tunnel: &tunnel,
-        specification,
-    };
+    let basis = databases.basis(runner.config, specification);
     let estimates = by_maneuver(&campaign.estimates);
     let of_flight = |flight: &Flight| {
         let record = LazyRecord::new(flight, &runner.store, &campaign.delays);
@@ -167,20 +156,8 @@ pub fn decisive_differences(
     let Some(specification) = &runner.config.proof_of_match else {
         return Ok(vec![]);
     };
-    let tunnel = runner.config.tunnel.clamped();
-    let posterior = proof_of_match::of_posterior(&campaign.model.rows.posterior, &tunnel);
-    let models = [(
-        model,
-        database(runner, campaign, (&posterior, &tunnel), model),
-    )];
-    let basis = Basis {
-        aircraft: &runner.config.aircraft,
-        buildup: &runner.config.buildup,
-        models: &models,
-        posterior: &posterior,
-        tunnel: &tunnel,
-        specification,
-    };
+    let databases = Databases::new(runner.config, campaign, &[model]);
+    let basis = databases.basis(runner.config, specification);
     let of_flight = |flight: &Flight| {
         let record = LazyRecord::new(flight, &runner.store, &campaign.delays);
         let own = campaign
@@ -192,7 +169,7 @@ pub fn decisive_differences(
             let record = record.part(maneuver)?;
             let local = campaign
                 .model
-                .at(maneuver.axis, &maneuver.condition(&tunnel));
+                .at(maneuver.axis, &maneuver.condition(basis.tunnel));
             let flown = Flown {
                 record: &record,
                 maneuver,
@@ -207,18 +184,39 @@ pub fn decisive_differences(
     Ok(found?.into_iter().flatten().collect())
 }
 
-/// Derivatives of a model.
-fn database(
-    runner: &StepRunner,
-    campaign: &Campaign,
-    (posterior, tunnel): (&WindTunnel, &WindTunnel),
-    model: ModelSource,
-) -> WindTunnel {
-    match model {
-        ModelSource::Posterior => posterior.clone(),
-        ModelSource::Trend => of_trends(runner.config, campaign, tunnel),
-        ModelSource::Tunnel => tunnel.clone(),
-        ModelSource::Database => runner.config.match_database.clamped(),
+/// Derivatives of the models, and of what stands beside them.
+struct Databases {
+    models: Vec<(ModelSource, WindTunnel)>,
+    posterior: WindTunnel,
+    tunnel: WindTunnel,
+}
+
+impl Databases {
+    fn new(config: &Config, campaign: &Campaign, models: &[ModelSource]) -> Databases {
+        let tunnel = config.tunnel.clamped();
+        let posterior = proof_of_match::of_posterior(&campaign.model.rows.posterior, &tunnel);
+        let database = |model: &ModelSource| match model {
+            ModelSource::Posterior => posterior.clone(),
+            ModelSource::Trend => of_trends(config, campaign, &tunnel),
+            ModelSource::Tunnel => tunnel.clone(),
+            ModelSource::Database => config.match_database.clamped(),
+        };
+        Databases {
+            models: models.iter().map(|m| (*m, database(m))).collect(),
+            posterior,
+            tunnel,
+        }
+    }
+
+    fn basis<'a>(&'a self, config: &'a Config, specification: &'a Specification) -> Basis<'a> {
+        Basis {
+            aircraft: &config.aircraft,
+            buildup: &config.buildup,
+            models: &self.models,
+            posterior: &self.posterior,
+            tunnel: &self.tunnel,
+            specification,
+        }
     }
 }
 

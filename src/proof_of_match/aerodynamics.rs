@@ -7,7 +7,7 @@
 
 use nalgebra::Vector3;
 
-use super::derivative_table::{DerivativeTable, Place};
+use super::derivative_table::DerivativeTable;
 use crate::aero::{Axis, Buildup, Coefficient, Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::flight::signal;
@@ -117,26 +117,6 @@ impl<'a> Aerodynamics<'a> {
         terms.map(|(_, factor)| factor.value(flow, recorded))
     }
 
-    /// Change of the coefficients from the trim.
-    #[must_use]
-    pub fn change(&self, flow: &Flow, recorded: &[f64], trim: &Trim) -> [f64; COEFFICIENTS] {
-        let mut change = [0.0; COEFFICIENTS];
-        let (place, trimmed) = (self.place(flow.alpha_deg), self.place(trim.alpha_deg));
-        let terms = self.terms.iter().zip(&trim.factors).enumerate();
-        for (i, ((coefficient, factor), at_trim)) in terms {
-            change[*coefficient] += match factor {
-                Factor::Constant => 0.0,
-                Factor::Alpha => self.table.integral(place, i) - self.table.integral(trimmed, i),
-                _ => self.table.value(place, i) * (factor.value(flow, recorded) - at_trim),
-            };
-        }
-        change
-    }
-
-    fn place(&self, alpha_deg: f64) -> Place {
-        self.table.place(alpha_deg)
-    }
-
     /// Force, lbf, and moment about the c.g., ft lbf, in body axes.
     #[must_use]
     pub fn loads(
@@ -151,6 +131,87 @@ impl<'a> Aerodynamics<'a> {
             Vector3::new(-axial, side, -normal) * area,
             Vector3::new(span * rolling, chord * pitching, span * yawing) * area,
         )
+    }
+}
+
+/// Aerodynamics about a trim, prepared for a run of thousands of instants: the coefficients at the trim
+/// are computed once, and factors that several derivatives have once an instant.
+#[derive(Clone, Debug)]
+pub struct AboutTrim<'a> {
+    table: &'a DerivativeTable,
+    /// Terms of each coefficient in the order of the build-up, without the constants.
+    terms: [Vec<TrimmedTerm>; COEFFICIENTS],
+    /// Factors of the terms, each once.
+    factors: Vec<&'a Factor>,
+    /// Values of the factors at the present instant.
+    values: Vec<f64>,
+}
+
+/// Term of a build-up about a trim.
+#[derive(Clone, Debug)]
+struct TrimmedTerm {
+    derivative: usize,
+    /// Place among the factors.
+    factor: usize,
+    is_along_alpha: bool,
+    /// Factor at the trim; along α the integral of the derivative there.
+    at_trim: f64,
+}
+
+impl<'a> AboutTrim<'a> {
+    #[must_use]
+    pub fn new(aerodynamics: &'a Aerodynamics, trim: &Trim) -> AboutTrim<'a> {
+        let table = &aerodynamics.table;
+        let place = table.place(trim.alpha_deg);
+        let mut terms = [const { Vec::new() }; COEFFICIENTS];
+        let mut factors: Vec<&Factor> = Vec::new();
+        let own = aerodynamics.terms.iter().zip(&trim.factors).enumerate();
+        for (derivative, ((coefficient, factor), factor_at_trim)) in own {
+            if *factor == Factor::Constant {
+                continue;
+            }
+            let is_along_alpha = *factor == Factor::Alpha;
+            let known = factors.iter().position(|known| *known == factor);
+            terms[*coefficient].push(TrimmedTerm {
+                derivative,
+                factor: known.unwrap_or(factors.len()),
+                is_along_alpha,
+                at_trim: if is_along_alpha {
+                    table.entries(place).integral(derivative)
+                } else {
+                    *factor_at_trim
+                },
+            });
+            if known.is_none() {
+                factors.push(factor);
+            }
+        }
+        AboutTrim {
+            table,
+            terms,
+            values: vec![0.0; factors.len()],
+            factors,
+        }
+    }
+
+    /// Change of the coefficients from the trim.
+    #[must_use]
+    pub fn change(&mut self, flow: &Flow, recorded: &[f64]) -> [f64; COEFFICIENTS] {
+        for (value, factor) in self.values.iter_mut().zip(&self.factors) {
+            *value = factor.value(flow, recorded);
+        }
+        let entries = self.table.entries(self.table.place(flow.alpha_deg));
+        let mut change = [0.0; COEFFICIENTS];
+        for (sum, terms) in change.iter_mut().zip(&self.terms) {
+            for term in terms {
+                *sum += if term.is_along_alpha {
+                    entries.integral(term.derivative) - term.at_trim
+                } else {
+                    entries.value(term.derivative) * (self.values[term.factor] - term.at_trim)
+                };
+            }
+        }
+        change
     }
 }
 
@@ -205,6 +266,7 @@ impl Factors<'_> {
 }
 
 impl Factor {
+    #[inline]
     fn value(&self, flow: &Flow, recorded: &[f64]) -> f64 {
         let at = |place: &usize| recorded.get(*place).copied().unwrap_or(0.0);
         match self {

@@ -87,6 +87,7 @@ impl DerivativeTable {
         }
     }
 
+    #[inline]
     #[must_use]
     pub fn place(&self, alpha_deg: f64) -> Place {
         let steps = (alpha_deg - self.first_deg) / STEP_DEG;
@@ -102,21 +103,55 @@ impl DerivativeTable {
         }
     }
 
+    /// Entries of all derivatives on both sides of a place.
+    #[inline]
+    #[must_use]
+    pub fn entries(&self, place: Place) -> Entries<'_> {
+        let both = &self.values[place.row * self.derivatives..][..2 * self.derivatives];
+        let (low, high) = both.split_at(self.derivatives);
+        Entries {
+            low,
+            high,
+            fraction: place.fraction,
+            fraction_inside: place.fraction.clamp(0.0, 1.0),
+        }
+    }
+
     /// Derivative at a place, constant beyond the table.
     #[must_use]
     pub fn value(&self, place: Place, derivative: usize) -> f64 {
-        self.between(place.row, place.fraction.clamp(0.0, 1.0), derivative)
+        self.entries(place).value(derivative)
+    }
+}
+
+/// Entries of a table on both sides of a place.
+#[derive(Clone, Copy, Debug)]
+pub struct Entries<'a> {
+    low: &'a [f64],
+    high: &'a [f64],
+    fraction: f64,
+    /// Fraction of the interval, not beyond the table.
+    fraction_inside: f64,
+}
+
+impl Entries<'_> {
+    /// Derivative, constant beyond the table.
+    #[inline]
+    #[must_use]
+    pub fn value(&self, derivative: usize) -> f64 {
+        self.between(self.fraction_inside, derivative)
     }
 
     /// Integral of a derivative along α, to which the derivative is constant beyond the table.
+    #[inline]
     #[must_use]
-    pub fn integral(&self, place: Place, derivative: usize) -> f64 {
-        self.between(place.row, place.fraction, derivative)
+    pub fn integral(&self, derivative: usize) -> f64 {
+        self.between(self.fraction, derivative)
     }
 
-    fn between(&self, row: usize, fraction: f64, derivative: usize) -> f64 {
-        let at = row * self.derivatives + derivative;
-        let (low, high) = (self.values[at], self.values[at + self.derivatives]);
+    #[inline]
+    fn between(&self, fraction: f64, derivative: usize) -> f64 {
+        let (low, high) = (self.low[derivative], self.high[derivative]);
         low + fraction * (high - low)
     }
 }

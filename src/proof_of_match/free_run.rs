@@ -1,7 +1,7 @@
 //! Free run: the rigid body flies from a start with the recorded surfaces, thrust and mass, and nothing
 //! else of the record.
 
-use super::aerodynamics::{Aerodynamics, COEFFICIENTS, Flow, Trim};
+use super::aerodynamics::{AboutTrim, Aerodynamics, COEFFICIENTS, Flow, Trim};
 use super::outputs::{Outputs, outputs};
 use super::recording::Recording;
 use crate::aircraft::Aircraft;
@@ -80,13 +80,18 @@ impl Simulation<'_> {
     #[must_use]
     pub fn fly(&self, start: &Start, samples: usize, stride: usize) -> FreeRun {
         let step_s = stride as f64 * self.recording.step_s;
+        let mut equations = RunEquations {
+            simulation: self,
+            start,
+            aerodynamics: AboutTrim::new(&self.aerodynamics, &start.trim),
+        };
         let mut state = start.body();
         let mut run = FreeRun {
             outputs: Vec::with_capacity(samples.div_ceil(stride)),
             has_departed: false,
         };
         for sample in (0..samples).step_by(stride) {
-            let instant = self.instant(&state, 2 * sample, start);
+            let instant = equations.instant(&state, 2 * sample);
             let alpha_deg = instant.air.alpha * DEG;
             if !(state.is_finite() && alpha_deg.abs() < DEPARTURE_DEG) {
                 run.has_departed = true;
@@ -96,28 +101,41 @@ impl Simulation<'_> {
             run.outputs
                 .push(outputs(&readings, instant.air.velocity_ft_s));
             if sample + stride < samples {
+                // The first stage is at the sample itself.
                 let rate = |stage: usize, at: &BodyState| {
-                    self.instant(at, 2 * sample + stride * POINT[stage], start)
-                        .rate
+                    if stage == 0 {
+                        return instant.rate;
+                    }
+                    let point = 2 * sample + stride * POINT[stage];
+                    equations.instant(at, point).rate
                 };
                 state = runge_kutta::step(&state, step_s, rate, BodyState::plus).normalised();
             }
         }
         run
     }
+}
 
+/// Equations of motion of one run.
+struct RunEquations<'a> {
+    simulation: &'a Simulation<'a>,
+    start: &'a Start,
+    aerodynamics: AboutTrim<'a>,
+}
+
+impl RunEquations<'_> {
     /// Motion at a state and a point of the recording.
-    #[must_use]
-    pub fn instant(&self, state: &BodyState, point: usize, start: &Start) -> Instant {
-        let inputs = self.recording.inputs(point);
+    fn instant(&mut self, state: &BodyState, point: usize) -> Instant {
+        let recording = self.simulation.recording;
+        let inputs = recording.inputs(point);
         let mut air = AirData::new(&state.velocity, state.position.z);
-        air.qbar_psf *= start.density_ratio;
+        air.qbar_psf *= self.start.density_ratio;
         let flow = flow(&air, state.rates.into());
-        let recorded = self.recording.signals(point);
-        let change = self.aerodynamics.change(&flow, recorded, &start.trim);
-        let level = start.trim.coefficients;
+        let change = self.aerodynamics.change(&flow, recording.signals(point));
+        let level = self.start.trim.coefficients;
         let coefficients: [f64; COEFFICIENTS] = std::array::from_fn(|i| level[i] + change[i]);
-        let (force, moment) = self.aerodynamics.loads(&coefficients, air.qbar_psf);
+        let model = &self.simulation.aerodynamics;
+        let (force, moment) = model.loads(&coefficients, air.qbar_psf);
         let thrust = inputs.thrust;
         let force = force + Vector3::new(thrust.forward_lbf, 0.0, thrust.down_lbf);
         let moment = moment + Vector3::new(0.0, thrust.pitch_ft_lbf, 0.0);
@@ -129,7 +147,7 @@ impl Simulation<'_> {
         };
         Instant {
             state: *state,
-            rate: body::state_rate(state, &inputs.loading, &loads),
+            rate: body::state_rate(state, &inputs.mass, &loads),
             air,
             loading: inputs.loading,
             specific_force: force / inputs.loading.mass_slug,

@@ -241,9 +241,11 @@ impl<'a> Flight<'a> {
 
     /// Effects of the posterior's deviations and of the errors of its start.
     fn effects(&self, posterior: &Trimmed) -> Option<Effects> {
-        let model = (self.basis.buildup, self.maneuver.axis);
+        let basis = self.basis;
+        let model = (basis.buildup, self.maneuver.axis);
         let Trimmed { simulation, start } = posterior;
-        repeat_flight::effects(simulation, start, self.local?, model)
+        let about = (self.local?, self.modes.as_ref());
+        repeat_flight::effects(simulation, start, about, model, basis.specification.draws)
     }
 
     /// Free run and Dutch roll of a trimmed model.
@@ -265,12 +267,12 @@ impl<'a> Flight<'a> {
         effects: Option<&Effects>,
         matched: &mut Matched,
     ) {
-        let specification = self.basis.specification;
-        let counts = (specification.draws, specification.inside_pct);
+        let required_pct = self.basis.specification.inside_pct;
         let judged = judgement::judged(&self.tests, self.modes.is_some());
-        let findings = judgement::judge(&self.recording, simulated, &judged, counts.1);
-        let flown = (&self.recording, self.modes.as_ref());
-        let repeat = effects.map(|e| e.probabilities(flown, simulated, &judged, counts));
+        let findings = judgement::judge(&self.recording, simulated, &judged, required_pct);
+        let repeat = effects.map(|effects| {
+            effects.probabilities(&self.recording, simulated, &judged, required_pct)
+        });
         let repeat = repeat.as_ref();
         matched
             .verdicts

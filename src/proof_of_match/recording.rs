@@ -9,7 +9,7 @@ use crate::dynamics::motion::{MassProperties, Window};
 use crate::flight::Record;
 use crate::maneuver::Maneuver;
 use crate::numerics::order_statistics::median;
-use crate::rigid_body::Loading;
+use crate::rigid_body::{Loading, Mass};
 
 /// Fewest samples of a maneuver that can be flown again.
 const FEWEST_SAMPLES: usize = 20;
@@ -28,6 +28,7 @@ const LEAST_NOISE: Outputs = [
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inputs {
     pub loading: Loading,
+    pub mass: Mass,
     pub thrust: Thrust,
     pub engine_momentum: f64,
     pub gravity_ft_s2: f64,
@@ -146,17 +147,19 @@ impl Recording {
 }
 
 fn inputs(motion: &Motion) -> Inputs {
+    let loading = Loading {
+        mass_slug: motion.mass,
+        x_cg_ft: motion.cg.x_ft,
+        y_cg_ft: motion.cg.y_ft,
+        z_cg_ft: motion.cg.z_ft,
+        ix_slug_ft2: motion.ix,
+        iy_slug_ft2: motion.iy,
+        iz_slug_ft2: motion.iz,
+        ixz_slug_ft2: motion.ixz,
+    };
     Inputs {
-        loading: Loading {
-            mass_slug: motion.mass,
-            x_cg_ft: motion.cg.x_ft,
-            y_cg_ft: motion.cg.y_ft,
-            z_cg_ft: motion.cg.z_ft,
-            ix_slug_ft2: motion.ix,
-            iy_slug_ft2: motion.iy,
-            iz_slug_ft2: motion.iz,
-            ixz_slug_ft2: motion.ixz,
-        },
+        loading,
+        mass: loading.mass(),
         thrust: motion.thrust,
         engine_momentum: motion.engine_momentum,
         gravity_ft_s2: motion.gravity,

@@ -9,7 +9,6 @@
 use nalgebra::{DMatrix, DVector};
 use pulp::Arch;
 
-use super::derivative_table::DerivativeTable;
 use super::deviations::independent;
 use super::dutch_roll::{DutchRoll, LateralModes};
 use super::free_run::{FreeRun, STATES, Simulation, Start};
@@ -39,10 +38,17 @@ pub struct Effects {
     /// Outputs at the mean of the posterior.
     mean: Vec<Outputs>,
     effects: Vec<Histories>,
-    /// Deviations of the derivatives to which the first effects belong, by place in the build-up.
-    deviations: Vec<Vec<(usize, f64)>>,
-    /// Derivatives at the mean of the posterior.
-    table: DerivativeTable,
+    /// Repeat flights, which all models share.
+    draws: Vec<Draw>,
+}
+
+/// Drawn aircraft and start of a repeat flight.
+#[derive(Clone, Debug)]
+struct Draw {
+    /// A standard normal deviate for each effect.
+    deviates: Vec<f64>,
+    /// Dutch roll by the estimates of the repeat flight.
+    dutch_roll: Option<DutchRoll>,
 }
 
 /// History of each output. A draw sums hundreds of them, sample after sample.
@@ -108,11 +114,6 @@ impl<'a> MovedRuns<'a> {
         self.difference(&raised, self.start)
     }
 
-    /// Effect of another start.
-    fn effect_of_start(&self, moved: &Start) -> Histories {
-        self.difference(self.simulation, moved)
-    }
-
     /// Effects of the independent errors of a matched start.
     pub fn effects_of_start(
         &self,
@@ -120,7 +121,7 @@ impl<'a> MovedRuns<'a> {
         axis: Axis,
     ) -> impl Iterator<Item = Histories> {
         let moved = moved_starts(self.start, covariance, axis).into_iter();
-        moved.map(|moved| self.effect_of_start(&moved))
+        moved.map(|moved| self.difference(self.simulation, &moved))
     }
 
     fn difference(&self, simulation: &Simulation, start: &Start) -> Histories {
@@ -129,27 +130,51 @@ impl<'a> MovedRuns<'a> {
     }
 }
 
-/// Flies the effects of a posterior's deviations and of the start's errors; `None` where the start is
-/// not determined or nothing is known of the axis.
+/// Flies the effects of a posterior's deviations and of the start's errors, and draws the repeat flights;
+/// `None` where the start is not determined or nothing is known of the axis.
 #[must_use]
 pub fn effects(
     simulation: &Simulation,
     start: &MatchedStart,
-    posterior: &LocalPosterior,
+    (posterior, modes): (&LocalPosterior, Option<&LateralModes>),
     (buildup, axis): (&Buildup, Axis),
+    draws: usize,
 ) -> Option<Effects> {
     let covariance = start.covariance.as_ref()?;
     let runs = MovedRuns::new(simulation, &start.start, buildup);
     let deviations = deviations(posterior, buildup)?;
     let of_derivatives = deviations.iter().map(|deviation| runs.effect(deviation));
     let effects = of_derivatives.chain(runs.effects_of_start(covariance, axis));
+    let effects: Vec<Histories> = effects.collect();
+    let mut stream = RandomStream::new(SEED, &simulation.recording.start_s.to_string());
+    let draw = |_| {
+        let deviates: Vec<f64> = effects.iter().map(|_| stream.normal()).collect();
+        let dutch_roll = modes.and_then(|modes| {
+            let mean = &simulation.aerodynamics.table;
+            modes.of_repeat(mean, |i| deviation(&deviations, i, &deviates), &mut stream)
+        });
+        Draw {
+            deviates,
+            dutch_roll,
+        }
+    };
+    let draws = (0..draws).map(draw).collect();
     Some(Effects {
-        effects: effects.collect(),
+        effects,
         stride: runs.stride,
         mean: runs.mean.outputs,
-        deviations,
-        table: simulation.aerodynamics.table.clone(),
+        draws,
     })
+}
+
+/// Drawn deviation of a derivative.
+fn deviation(deviations: &[Vec<(usize, f64)>], derivative: usize, deviates: &[f64]) -> f64 {
+    let both = deviations.iter().zip(deviates);
+    let own = both.map(|(deviation, deviate)| {
+        let own = deviation.iter().find(|(i, _)| *i == derivative);
+        own.map_or(0.0, |(_, by)| by * deviate)
+    });
+    own.sum()
 }
 
 /// Places of the derivatives that move a simulation, among the values of a posterior and in the build-up.
@@ -220,10 +245,10 @@ impl Effects {
     #[must_use]
     pub fn probabilities(
         &self,
-        (recording, modes): (&Recording, Option<&LateralModes>),
+        recording: &Recording,
         simulated: &Simulated,
         judged: &[Judged],
-        (draws, required_pct): (usize, f64),
+        required_pct: f64,
     ) -> Probabilities {
         let mut sums = Probabilities {
             tolerances: vec![0.0; judged.len()],
@@ -232,21 +257,25 @@ impl Effects {
         if simulated.run.has_departed || self.mean.len() * self.stride < recording.samples {
             return sums;
         }
+        let limits = judged.iter().map(|own| {
+            let output = place(own.tolerance.quantity)?;
+            let stated = (&own.tolerance, output);
+            Some(Limits::new(recording, stated, self.stride, required_pct))
+        });
         let repeat = Repeat {
             effects: self,
-            recording,
-            modes,
+            judged,
+            limits: limits.collect(),
             simulated,
             bias: self.bias(&simulated.run),
-            required_pct,
         };
-        let mut stream = RandomStream::new(SEED, &recording.start_s.to_string());
-        for _ in 0..draws {
-            let drawn = repeat.draw(judged, &mut stream);
+        let count = self.draws.len() as f64;
+        for draw in &self.draws {
+            let drawn = repeat.probabilities(draw);
             for (sum, inside) in sums.tolerances.iter_mut().zip(&drawn.tolerances) {
-                *sum += inside / draws as f64;
+                *sum += inside / count;
             }
-            sums.whole += drawn.whole / draws as f64;
+            sums.whole += drawn.whole / count;
         }
         sums.clamped()
     }
@@ -258,24 +287,8 @@ impl Effects {
         std::array::from_fn(|i| pairs.clone().map(|(mean, own)| mean[i] - own[i]).collect())
     }
 
-    /// Drawn deviation of a derivative.
-    fn deviation(&self, derivative: usize, deviates: &[f64]) -> f64 {
-        let own = self
-            .deviations
-            .iter()
-            .zip(deviates)
-            .map(|(deviation, deviate)| {
-                let own = deviation.iter().find(|(i, _)| *i == derivative);
-                own.map_or(0.0, |(_, by)| by * deviate)
-            });
-        own.sum()
-    }
-
-    /// Drawn differences of one quantity at every `stride`-th sample.
-    fn drawn(&self, bias: &Histories, deviates: &[f64], tolerance: &Tolerance) -> Vec<f64> {
-        let Some(output) = place(tolerance.quantity) else {
-            return vec![];
-        };
+    /// Drawn differences of one output at every `stride`-th sample.
+    fn drawn(&self, bias: &Histories, deviates: &[f64], output: usize) -> Vec<f64> {
         let mut drawn = bias[output].clone();
         Arch::new().dispatch(|| {
             for (effect, deviate) in self.effects.iter().zip(deviates) {
@@ -291,34 +304,27 @@ impl Effects {
 /// Repeat flights that one model's simulation predicts.
 struct Repeat<'a> {
     effects: &'a Effects,
-    recording: &'a Recording,
-    modes: Option<&'a LateralModes>,
+    judged: &'a [Judged<'a>],
+    /// Limits of each tolerance; `None` for one of the Dutch roll.
+    limits: Vec<Option<Limits>>,
     simulated: &'a Simulated,
     bias: Histories,
-    required_pct: f64,
 }
 
 impl Repeat<'_> {
     /// Probabilities of one aircraft and start, over the sensors' noise.
-    fn draw(&self, judged: &[Judged], stream: &mut RandomStream) -> Probabilities {
+    fn probabilities(&self, draw: &Draw) -> Probabilities {
         let effects = self.effects;
-        let deviates: Vec<f64> = effects.effects.iter().map(|_| stream.normal()).collect();
-        let dutch_roll = self.modes.and_then(|modes| {
-            modes.of_repeat(&effects.table, |i| effects.deviation(i, &deviates), stream)
-        });
-        let inside = |own: &Judged| {
-            let tolerance = &own.tolerance;
-            if tolerance.quantity.is_of_dutch_roll() {
-                return f64::from(u8::from(self.meets(dutch_roll, tolerance)));
+        let inside = |(own, limits): (&Judged, &Option<Limits>)| match limits {
+            None => f64::from(u8::from(self.meets(draw.dutch_roll, &own.tolerance))),
+            Some(limits) => {
+                limits.inside(&effects.drawn(&self.bias, &draw.deviates, limits.output))
             }
-            let drawn = effects.drawn(&self.bias, &deviates, tolerance);
-            let share = (tolerance, self.required_pct);
-            inside(self.recording, &drawn, effects.stride, share)
         };
-        let tolerances: Vec<f64> = judged.iter().map(inside).collect();
+        let tolerances: Vec<f64> = self.judged.iter().zip(&self.limits).map(inside).collect();
         let mut whole = 1.0;
         let mut rest = tolerances.as_slice();
-        for requirement in judged.chunk_by(Judged::is_alternative) {
+        for requirement in self.judged.chunk_by(Judged::is_alternative) {
             let (own, others) = rest.split_at(requirement.len());
             whole *= 1.0 - own.iter().map(|inside| 1.0 - inside).product::<f64>();
             rest = others;
@@ -335,41 +341,75 @@ impl Repeat<'_> {
     }
 }
 
-/// Probability that the required share of samples is inside, over the sensors' noise.
-fn inside(
-    recording: &Recording,
-    drawn: &[f64],
-    stride: usize,
-    (tolerance, required_pct): (&Tolerance, f64),
-) -> f64 {
-    let Some(output) = place(tolerance.quantity) else {
-        return 0.0;
-    };
-    let noise = recording.noise[output];
-    let (mut count, mut outside) = (0, 0);
-    let mut doubtful = Vec::new();
-    for sample in (0..recording.samples).filter(|k| !recording.repaired[*k][output]) {
-        count += 1;
-        let (low, share) = (sample / stride, (sample % stride) as f64 / stride as f64);
-        let (a, b) = (drawn[low], drawn[(low + 1).min(drawn.len() - 1)]);
-        let difference = a + share * (b - a);
-        let width = tolerance.width(recording.measured[sample][output]);
-        let margin = width - difference.abs();
-        if margin < -CERTAIN * noise {
-            outside += 1;
-        } else if margin < CERTAIN * noise {
-            doubtful.push((width, difference));
+/// Limits of a tolerance at the samples that count.
+struct Limits {
+    output: usize,
+    noise: f64,
+    /// Samples that may be outside.
+    allowed: usize,
+    samples: Vec<Limit>,
+}
+
+/// Limit at one sample.
+struct Limit {
+    width: f64,
+    /// Samples of the effects around this one, and its share of the way between them.
+    between: [usize; 2],
+    share: f64,
+}
+
+impl Limits {
+    fn new(
+        recording: &Recording,
+        (tolerance, output): (&Tolerance, usize),
+        stride: usize,
+        required_pct: f64,
+    ) -> Limits {
+        let last = recording.samples.div_ceil(stride).saturating_sub(1);
+        let limit = |sample: usize| Limit {
+            width: tolerance.width(recording.measured[sample][output]),
+            between: [sample / stride, (sample / stride + 1).min(last)],
+            share: (sample % stride) as f64 / stride as f64,
+        };
+        let counted = (0..recording.samples).filter(|k| !recording.repaired[*k][output]);
+        let samples: Vec<Limit> = counted.map(limit).collect();
+        Limits {
+            output,
+            noise: recording.noise[output],
+            allowed: allowed_outside(samples.len(), required_pct),
+            samples,
         }
     }
-    let allowed = allowed_outside(count, required_pct);
-    let Some(allowed) = allowed.checked_sub(outside) else {
-        return 0.0;
-    };
-    let inside = doubtful.into_iter();
-    let inside: Vec<f64> = inside
-        .map(|(width, difference)| normal::within(width, difference, noise))
-        .collect();
-    at_most_outside(&inside, allowed)
+
+    /// Probability that the required share of samples is inside, over the sensors' noise.
+    fn inside(&self, drawn: &[f64]) -> f64 {
+        let noise = self.noise;
+        let mut outside = 0;
+        let mut doubtful = Vec::new();
+        for Limit {
+            width,
+            between,
+            share,
+        } in &self.samples
+        {
+            let [a, b] = between.map(|k| drawn[k]);
+            let difference = a + share * (b - a);
+            let margin = width - difference.abs();
+            if margin < -CERTAIN * noise {
+                outside += 1;
+                if outside > self.allowed {
+                    return 0.0;
+                }
+            } else if margin < CERTAIN * noise {
+                doubtful.push((*width, difference));
+            }
+        }
+        let inside = doubtful.into_iter();
+        let inside: Vec<f64> = inside
+            .map(|(width, difference)| normal::within(width, difference, noise))
+            .collect();
+        at_most_outside(&inside, self.allowed - outside)
+    }
 }
 
 /// Probability that at most `allowed` of independent samples are outside.

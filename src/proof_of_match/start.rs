@@ -7,7 +7,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::aerodynamics::{COEFFICIENTS, Flow, Trim};
+use super::aerodynamics::{AboutTrim, COEFFICIENTS, Flow, Trim};
 use super::free_run::{STATES, Simulation, Start};
 use super::outputs::{COUNT, Outputs};
 use crate::dynamics::{Equations, Lateral, Longitudinal, Motion};
@@ -123,16 +123,13 @@ fn as_measured(simulation: &Simulation) -> Start {
         factors: mean_factors(simulation),
         alpha_deg: mean(motions.iter().map(|m| DEG * m.alpha)),
     };
+    let mut about_trim = AboutTrim::new(&simulation.aerodynamics, &trim);
     let implied: Vec<[f64; COEFFICIENTS]> = motions
         .iter()
         .enumerate()
         .map(|(sample, motion)| {
             let recorded = recording.signals(2 * sample);
-            let change = simulation.aerodynamics.change(
-                &flow(motion, recording.altitude_ft),
-                recorded,
-                &trim,
-            );
+            let change = about_trim.change(&flow(motion, recording.altitude_ft), recorded);
             let implied = implied(simulation, motion);
             std::array::from_fn(|i| implied[i] - change[i])
         })

@@ -8,7 +8,7 @@
 
 use nalgebra::{Matrix3, Quaternion, SVector, UnitQuaternion, Vector3};
 
-use super::loading::Loading;
+use super::loading::Mass;
 use crate::numerics::runge_kutta::{self, POINT};
 
 /// State of the body: velocity u v w over the ground, ft/s; rates p q r, rad/s; attitude, body to
@@ -122,17 +122,16 @@ pub struct Loads {
 
 /// Time derivative of the state under loads.
 #[must_use]
-pub fn state_rate(state: &BodyState, loading: &Loading, loads: &Loads) -> StateRate {
+pub fn state_rate(state: &BodyState, mass: &Mass, loads: &Loads) -> StateRate {
     let (v, w) = (state.velocity, state.rates);
     let to_earth = state.earth_from_body();
     let gravity = to_earth.transpose() * Vector3::new(0.0, 0.0, loads.gravity_ft_s2);
-    let inertia = loading.inertia();
-    let momentum = inertia * w + Vector3::new(loads.engine_momentum, 0.0, 0.0);
+    let momentum = mass.inertia * w + Vector3::new(loads.engine_momentum, 0.0, 0.0);
     let turning = loads.moment - w.cross(&momentum);
     let over_ground = to_earth * v;
     BodyState {
-        velocity: loads.force / loading.mass_slug + gravity - w.cross(&v),
-        rates: loading.inverse_inertia() * turning,
+        velocity: loads.force / mass.mass_slug + gravity - w.cross(&v),
+        rates: mass.inverse_inertia * turning,
         attitude: state.attitude * Quaternion::from_imag(w) * 0.5,
         position: Vector3::new(over_ground.x, over_ground.y, -over_ground.z),
     }
@@ -152,6 +151,7 @@ pub fn runge_kutta_step(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::rigid_body::Loading;
     use approx::{assert_abs_diff_eq, assert_relative_eq};
 
     const LOADING: Loading = Loading {
@@ -187,7 +187,9 @@ mod tests {
 
     fn after(state: BodyState, time_s: u32, loads: &Loads) -> BodyState {
         (0..time_s * 400).fold(state, |s, _| {
-            runge_kutta_step(&s, 1.0 / 400.0, |at, _| state_rate(at, &LOADING, loads))
+            runge_kutta_step(&s, 1.0 / 400.0, |at, _| {
+                state_rate(at, &LOADING.mass(), loads)
+            })
         })
     }
 
@@ -230,8 +232,8 @@ mod tests {
             rates: Vector3::new(0.0, 0.0, 0.2),
             ..tumbling()
         };
-        let with = state_rate(&state, &LOADING, &loads).rates;
-        let without = state_rate(&state, &LOADING, &FREE).rates;
+        let with = state_rate(&state, &LOADING.mass(), &loads).rates;
+        let without = state_rate(&state, &LOADING.mass(), &FREE).rates;
         assert_relative_eq!(
             (with - without).y,
             -0.2 * 7500.0 / LOADING.iy_slug_ft2,
@@ -242,13 +244,13 @@ mod tests {
             rates: Vector3::new(0.0, 0.2, 0.0),
             ..tumbling()
         };
-        assert!(state_rate(&state, &LOADING, &loads).rates.z > 0.0);
+        assert!(state_rate(&state, &LOADING.mass(), &loads).rates.z > 0.0);
     }
 
     #[test]
     fn angles_and_their_rates_are_those_of_the_attitude() {
         let (state, h) = (tumbling(), 1e-6);
-        let s = state_rate(&state, &LOADING, &FREE);
+        let s = state_rate(&state, &LOADING.mass(), &FREE);
         let (phi_dot, theta_dot) = state.euler_rates(&s);
         let (up, down) = (state.plus(&s, h).euler(), state.plus(&s, -h).euler());
         assert_abs_diff_eq!(phi_dot, (up.phi - down.phi) / (2.0 * h), epsilon = 1e-8);

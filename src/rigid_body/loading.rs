@@ -20,6 +20,14 @@ pub struct Loading {
     pub ixz_slug_ft2: f64,
 }
 
+/// Mass and inertias about the c.g. as the equations of motion use them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mass {
+    pub mass_slug: f64,
+    pub inertia: Matrix3<f64>,
+    pub inverse_inertia: Matrix3<f64>,
+}
+
 impl Loading {
     /// Interpolates the loadings at a mass; extrapolates along the line through the two nearest.
     /// All zero for an empty list, which [`super::Settings`] refuses.
@@ -75,9 +83,14 @@ impl Loading {
     }
 
     #[must_use]
-    pub fn inverse_inertia(&self) -> Matrix3<f64> {
-        // `Settings` refuses singular matrices; zeros avoid a panic.
-        self.inertia().try_inverse().unwrap_or_else(Matrix3::zeros)
+    pub fn mass(&self) -> Mass {
+        let inertia = self.inertia();
+        Mass {
+            mass_slug: self.mass_slug,
+            inertia,
+            // `Settings` refuses singular matrices; zeros avoid a panic.
+            inverse_inertia: inertia.try_inverse().unwrap_or_else(Matrix3::zeros),
+        }
     }
 }
 

@@ -11,5 +11,5 @@ pub mod readings;
 
 pub use air_data::AirData;
 pub use body::{BodyState, Euler, Loads, StateRate};
-pub use loading::Loading;
+pub use loading::{Loading, Mass};
 pub use readings::{Instant, Readings};

@@ -96,7 +96,7 @@ impl Plant {
         };
         PlantOutputs {
             air,
-            rate: body::state_rate(state, &loading, &loads),
+            rate: body::state_rate(state, &loading.mass(), &loads),
             loading,
             specific_force: force / loading.mass_slug,
         }
