@@ -310,16 +310,15 @@ fn standardised(
     weights: &DVector<f64>,
     inverse: &DMatrix<f64>,
 ) -> Vec<Residual> {
-    let of = |i: usize| {
-        let row = design.row(i);
-        let leverage = weights[i] * (row * inverse * row.transpose())[(0, 0)];
-        let left = (1.0 - leverage).max(1e-6);
+    let residual = |(i, spread): (usize, f64)| {
+        let left = (1.0 - weights[i] * spread).max(1e-6);
         Residual {
             z: residuals[i] / (variances[i] * left).sqrt(),
             share: weights[i] * variances[i],
         }
     };
-    (0..design.nrows()).map(of).collect()
+    let spreads = spreads(design, inverse).into_iter();
+    spreads.enumerate().map(residual).collect()
 }
 
 /// 1 − h of each point, with h its leverage.
@@ -328,11 +327,30 @@ fn residual_freedom(
     weights: &DVector<f64>,
     inverse: &DMatrix<f64>,
 ) -> Vec<f64> {
-    let of = |i: usize| {
-        let row = design.row(i);
-        (1.0 - weights[i] * (row * inverse * row.transpose())[(0, 0)]).max(0.0)
+    let spreads = spreads(design, inverse).into_iter().zip(weights);
+    spreads
+        .map(|(spread, weight)| (1.0 - weight * spread).max(0.0))
+        .collect()
+}
+
+/// x M xᵀ of each row x of the design. Products of so small matrices take the library several times as
+/// long.
+fn spreads(design: &DMatrix<f64>, matrix: &DMatrix<f64>) -> Vec<f64> {
+    let (rows, columns_of_rows) = (design.transpose(), matrix.transpose());
+    let mut image = vec![0.0; matrix.ncols()];
+    let of = |row: &[f64]| {
+        image.fill(0.0);
+        for (value, own) in row.iter().zip(columns_of_rows.column_iter()) {
+            for (sum, element) in image.iter_mut().zip(&own) {
+                *sum += element * value;
+            }
+        }
+        image.iter().zip(row).map(|(a, b)| a * b).sum()
     };
-    (0..design.nrows()).map(of).collect()
+    rows.as_slice()
+        .chunks_exact(design.ncols().max(1))
+        .map(of)
+        .collect()
 }
 
 /// Coefficients and their covariance for given weights.
@@ -344,8 +362,9 @@ fn solve(
     let weighted = DMatrix::from_fn(design.nrows(), design.ncols(), |i, j| {
         weights[i] * design[(i, j)]
     });
-    let inverse = symmetric::inverse(&(weighted.transpose() * design))?;
-    Some((&inverse * (weighted.transpose() * values), inverse))
+    let weighted = weighted.transpose();
+    let inverse = symmetric::inverse(&(&weighted * design))?;
+    Some((&inverse * (&weighted * values), inverse))
 }
 
 /// Weight of a residual: one over the variance, less for an outlier.

@@ -82,6 +82,10 @@ pub(super) fn scatter_squared(
     let (mut low, mut high) = (0.0, square / expected);
     for _ in 0..200 {
         let middle = 0.5 * (low + high);
+        if !(low < middle && middle < high) {
+            // Neighbours: further halves change nothing.
+            break;
+        }
         if sum(middle) > expected {
             low = middle;
         } else {
