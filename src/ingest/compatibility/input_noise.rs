@@ -11,7 +11,10 @@
 //! and has the covariance M = Σ over t of g Q gᵀ beside the H of the outputs' own noise. An estimate
 //! H⁻¹ Sᵀ R⁻¹ v then has the covariance H⁻¹ (H + M) H⁻¹: its information is H (H + M)⁻¹ H.
 
+#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
+
 use nalgebra::{DMatrix, DVector};
+use pulp::Arch;
 
 use super::equations::STATES;
 use super::parameters::{INPUTS, KINDS, Kind, OUTPUTS, PARAMETERS, Parameters, place};
@@ -45,12 +48,11 @@ pub fn score_covariance(
         later += block;
     }
     make_consistent(&mut scores, window, &information.shared);
-    let zero = DMatrix::zeros(PARAMETERS, PARAMETERS);
-    Some(
-        scores
-            .iter()
-            .fold(zero, |sum, score| sum + score * score.transpose()),
-    )
+    let mut covariance = DMatrix::zeros(PARAMETERS, PARAMETERS);
+    for score in &scores {
+        covariance.gemm(1.0, score, &score.transpose(), 1.0);
+    }
+    Some(covariance)
 }
 
 /// Adds to the scores of all blocks, from the last to the first, what they lack in the score of a bias: noise
@@ -111,19 +113,22 @@ fn block_products(
 ) -> Vec<DMatrix<f64>> {
     let (length, spacing) = (block_length(window), window.samples_per_node());
     let mut blocks = vec![DMatrix::zeros(ALL, STATES); window.samples.div_ceil(length)];
-    for (node, rows) in linearised.sensitivities.rows.iter().enumerate() {
-        let block = &mut blocks[node * spacing / length];
-        for (output, row) in rows.iter().enumerate() {
-            let count = linearised.counts[output][node];
-            if count > 0.0 {
-                add_products(block, row, output, count * weights[output]);
+    Arch::new().dispatch(|| {
+        for (node, rows) in linearised.sensitivities.rows.iter().enumerate() {
+            let block = &mut blocks[node * spacing / length];
+            for (output, row) in rows.iter().enumerate() {
+                let count = linearised.counts[output][node];
+                if count > 0.0 {
+                    add_products(block, row, output, count * weights[output]);
+                }
             }
         }
-    }
+    });
     blocks
 }
 
 /// Adds the products of a row with its slopes along the initial state.
+#[inline(always)]
 fn add_products(block: &mut DMatrix<f64>, row: &Row, output: usize, weight: f64) {
     // Parameters of the states stand alike in a row and among all; those of the output do not.
     let own = place_among_all(DRIVING, output);
@@ -135,6 +140,7 @@ fn add_products(block: &mut DMatrix<f64>, row: &Row, output: usize, weight: f64)
     }
 }
 
+#[inline(always)]
 fn add_scaled(sums: &mut [f64], values: &[f64], factor: f64) {
     for (sum, value) in sums.iter_mut().zip(values) {
         *sum += factor * value;

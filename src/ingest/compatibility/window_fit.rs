@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use super::equations::STATES;
 use super::input_noise::{score_covariance, with_input_noise};
 use super::parameters::{INPUTS, Kind, OUTPUTS, PARAMETERS, Parameters};
-use super::reconstruction::{LOCAL, Local, Path, WIND, reconstruct, sensitivities};
+use super::reconstruction::{LOCAL, Local, Path, Row, WIND, reconstruct, sensitivities};
 use super::settings::Compatibility;
 use super::window::Window;
 use super::window_sums::{Comparison, LinearisedWindow, ReducedInformation, weighted_gradient};
@@ -52,6 +52,8 @@ pub struct WindowFit<'a> {
     comparison: Comparison,
     linearised: Arc<LinearisedWindow>,
     information: Arc<ReducedInformation>,
+    /// Gradients of the outputs on their parameters, which the weights do not change.
+    gradients: [Row; OUTPUTS],
     /// Gradient on all parameters, the window's own before the shared ones.
     full_gradient: DVector<f64>,
     /// Gradient on the shared parameters with the local ones eliminated.
@@ -114,6 +116,7 @@ impl<'a> WindowFit<'a> {
         let linearised = LinearisedWindow::of(slopes, &comparison);
         let priors = local_priors(window, &local, context);
         let information = reduced_information(&linearised, &variances, &priors)?;
+        let gradients = comparison.gradients(&linearised.sensitivities);
         let mut fit = WindowFit {
             window,
             local,
@@ -122,6 +125,7 @@ impl<'a> WindowFit<'a> {
             comparison,
             linearised: Arc::new(linearised),
             information: Arc::new(information),
+            gradients,
             full_gradient: DVector::zeros(0),
             gradient: DVector::zeros(0),
             cost: 0.0,
@@ -151,11 +155,13 @@ impl<'a> WindowFit<'a> {
         let local = std::array::from_fn(|i| self.local[i] + share * local_step[i]);
         let path = reconstruct(self.window, context.aircraft, &local, shared)?;
         let samples = context.compared(self.window);
+        let comparison = Comparison::of(self.window, &path, shared, &samples);
         let mut moved = WindowFit {
             window: self.window,
             local,
             variances: self.variances,
-            comparison: Comparison::of(self.window, &path, shared, &samples),
+            gradients: comparison.gradients(&self.linearised.sensitivities),
+            comparison,
             path,
             linearised: Arc::clone(&self.linearised),
             information: Arc::clone(&self.information),
@@ -172,6 +178,7 @@ impl<'a> WindowFit<'a> {
     /// Linearises the equations anew, about the present parameters.
     pub fn linearise(&mut self, context: &FitContext, shared: &Parameters) {
         let slopes = sensitivities(self.window, context.aircraft, shared, &self.path);
+        self.gradients = self.comparison.gradients(&slopes);
         self.linearised = Arc::new(LinearisedWindow::of(slopes, &self.comparison));
         self.weigh(context);
     }
@@ -189,9 +196,8 @@ impl<'a> WindowFit<'a> {
 
     /// Computes the gradient and the cost.
     fn weigh_residuals(&mut self, context: &FitContext) {
-        let gradients = self.comparison.gradients(&self.linearised.sensitivities);
         let weights = weights(&self.variances);
-        let mut gradient = weighted_gradient(&gradients, &weights);
+        let mut gradient = weighted_gradient(&self.gradients, &weights);
         let squares = self.comparison.squares.iter().zip(weights);
         self.cost = squares.map(|(square, weight)| weight * square).sum();
         for prior in local_priors(self.window, &self.local, context) {
