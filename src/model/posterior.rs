@@ -44,11 +44,7 @@ impl<'a> Solved<'a> {
     /// Posterior; `None` where the data are not finite.
     #[must_use]
     pub fn new(root: &'a BlockRoot, information: &Information) -> Option<Solved<'a>> {
-        let mut inner = root.right(&root.left(&information.matrix));
-        for j in 0..inner.nrows() {
-            inner[(j, j)] += 1.0 + ROUNDING * inner[(j, j)];
-        }
-        let lower = cholesky(inner)?;
+        let lower = inner_root(root.right(&root.left(&information.matrix)))?;
         Some(Solved { root, lower })
     }
 
@@ -76,6 +72,15 @@ impl<'a> Solved<'a> {
         self.lower.solve_lower_triangular_mut(&mut seen);
         (halves.tr_mul(&seen), square(&halves))
     }
+}
+
+/// L with L Lᵀ = I + Rᵀ Λ R, from Rᵀ Λ R.
+#[must_use]
+pub fn inner_root(mut inner: DMatrix<f64>) -> Option<DMatrix<f64>> {
+    for j in 0..inner.nrows() {
+        inner[(j, j)] += 1.0 + ROUNDING * inner[(j, j)];
+    }
+    cholesky(inner)
 }
 
 /// Gaussian with a prior covariance R Rᵀ. `None` where the data are not finite.

@@ -5,13 +5,14 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::flight_data::Information;
+use super::posterior::inner_root;
 use super::prior_covariance::PriorCovariance;
 use super::scale_prior::{Scale, ScalePrior};
 use super::term::Term;
 use super::unknowns::Unknowns;
 use crate::numerics::root::{BlockRoot, root, root_of_some};
 use crate::numerics::symmetric::square;
-use crate::numerics::triangular::{cholesky, solve_lower};
+use crate::numerics::triangular::solve_lower;
 
 /// Differences that the data touch, term by term, with the information on them.
 #[derive(Clone, Debug)]
@@ -128,12 +129,4 @@ pub struct Fit {
     pub innovation: DVector<f64>,
     /// M = Λ − Λ P Λ, the information of the innovations.
     pub information: DMatrix<f64>,
-}
-
-/// L with L Lᵀ = I + Rᵀ Λ R, from Rᵀ Λ R.
-fn inner_root(mut inner: DMatrix<f64>) -> Option<DMatrix<f64>> {
-    for j in 0..inner.nrows() {
-        inner[(j, j)] += 1.0;
-    }
-    cholesky(inner)
 }

@@ -14,7 +14,7 @@ use crate::output_error::Outcome;
 use crate::tables::{EstimateRow, LiftAndDragRow};
 
 /// Version of the posterior.
-pub const MODEL_VERSION: u32 = 4;
+pub const MODEL_VERSION: u32 = 5;
 
 /// Computes the posterior from the maneuvers that converged.
 pub fn fit_model(config: &Config, campaign: &mut Campaign) {
