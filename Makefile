@@ -149,7 +149,7 @@ fuzz: ## FILES spoiled flights, and as many spoiled YAML and CSV files
 match-study: ## are the probabilities of the proof of match calibrated, over 540 simulated maneuvers
 	cargo test --release --locked --lib -- --ignored proof_of_match::
 
-next-study: ## are the bounds that plans of the next flight predict kept, over ten simulated campaigns
+next-study: ## are the bounds that plans of the next flight predict kept, and how many minutes do they save, over ten simulated campaigns
 	cargo test --release --locked --lib -- --ignored --nocapture flight_plan::
 
 bench: ## run the benchmarks

@@ -48,6 +48,17 @@ pub struct Subject {
     pub cards: Vec<Option<PlannedRows>>,
 }
 
+/// Variance of an aim's parts, from the covariance of each subject.
+pub fn variance<'c>(
+    parts: &[(usize, usize)],
+    covariance: impl Fn(usize) -> &'c DMatrix<f64>,
+) -> f64 {
+    let variances = parts.iter();
+    variances
+        .map(|(subject, row)| covariance(*subject)[(*row, *row)])
+        .sum()
+}
+
 /// Price of a card.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Price {
@@ -92,13 +103,6 @@ pub struct CardSet<'a> {
 }
 
 impl CardChoice {
-    /// Variance of an aim before the flight.
-    fn variance(&self, aim: &Aim) -> f64 {
-        let parts = aim.parts.iter();
-        let of_part = |(s, row): &(usize, usize)| self.subjects[*s].covariance[(*row, *row)];
-        parts.map(of_part).sum()
-    }
-
     /// The set that is worth most, as far as exchanges find it.
     #[must_use]
     pub fn choose(&self) -> CardSet<'_> {
@@ -177,7 +181,8 @@ impl<'a> CardSet<'a> {
     #[must_use]
     pub fn worth(&self) -> f64 {
         let aims = self.choice.aims.iter();
-        aims.map(|aim| aim.worth(self.choice.variance(aim), self.variance(aim)))
+        let before = |subject: usize| &self.choice.subjects[subject].covariance;
+        aims.map(|aim| aim.worth(variance(&aim.parts, before), self.variance(aim)))
             .sum()
     }
 
@@ -207,10 +212,7 @@ impl<'a> CardSet<'a> {
     }
 
     fn variance(&self, aim: &Aim) -> f64 {
-        let parts = aim.parts.iter();
-        parts
-            .map(|(s, row)| self.covariances[*s][(*row, *row)])
-            .sum()
+        variance(&aim.parts, |subject| &self.covariances[subject])
     }
 
     /// Standard deviation of an aim.

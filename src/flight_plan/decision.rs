@@ -83,16 +83,7 @@ impl Decision {
     /// none does.
     #[must_use]
     pub fn wanted(&self, before: f64) -> f64 {
-        let (mut low, mut high) = (0.0, before);
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            if self.decided(before, middle) >= self.share {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        low
+        largest_up_to(before, |after| self.decided(before, after) >= self.share)
     }
 
     fn intervals(&self) -> impl Iterator<Item = (f64, f64)> {
@@ -112,18 +103,25 @@ impl Decision {
                 let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
                 let inside = |offset: f64| normal::within(half, offset, spread);
                 (inside(0.0) >= self.share).then(|| {
-                    let (mut inner, mut outer) = (0.0, half);
-                    for _ in 0..HALVINGS {
-                        let offset = 0.5 * (inner + outer);
-                        if inside(offset) >= self.share {
-                            inner = offset;
-                        } else {
-                            outer = offset;
-                        }
-                    }
-                    (middle - inner, middle + inner)
+                    let offset = largest_up_to(half, |offset| inside(offset) >= self.share);
+                    (middle - offset, middle + offset)
                 })
             }
         }
     }
+}
+
+/// Largest number from zero up to a limit for which a condition holds that fails beyond it; zero where it holds
+/// nowhere.
+fn largest_up_to(limit: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    let (mut low, mut high) = (0.0, limit);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if holds(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    low
 }

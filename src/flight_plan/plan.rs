@@ -1,7 +1,7 @@
 //! Plan of the next flight: candidates and goals to a choice, and the choice to the rows of the tables.
 
 use super::candidate::{Candidate, reach_deg};
-use super::choice::{Aim, Budget, CardChoice, CardSet, Price, Subject};
+use super::choice::{Aim, Budget, CardChoice, CardSet, Price, Subject, variance};
 use super::experience::{CampaignHistory, noise_factors, with_noise};
 use super::goal_points::{GoalBasis, GoalPoint, Matches, Target};
 use super::goals::Goal;
@@ -159,10 +159,8 @@ fn aims(outlooks: &[Outlook], points: &[GoalPoint]) -> Vec<Aim> {
     let known = all.filter(|(_, (_, parts))| !parts.is_empty());
     known
         .map(|(point, (goal, parts))| {
-            let variances = parts
-                .iter()
-                .map(|(s, row)| outlooks[*s].covariance[(*row, *row)]);
-            let before = variances.sum::<f64>().max(0.0).sqrt();
+            let before = variance(&parts, |subject| &outlooks[subject].covariance);
+            let before = before.max(0.0).sqrt();
             Aim {
                 parts,
                 weight: goal.weight,

@@ -4,4 +4,6 @@ mod choice;
 mod decision;
 mod experience;
 mod limits;
+mod world;
 mod promise;
+mod minutes;

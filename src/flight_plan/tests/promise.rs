@@ -1,158 +1,12 @@
 //! The promise of a plan: the bounds that it predicts are those after its cards were flown, estimated and
 //! fused.
 
-use std::collections::BTreeMap;
-use std::path::Path;
-
-use rayon::prelude::*;
-
-use crate::aero::WindTunnel;
-use crate::config::Config;
-use crate::estimate::Estimated;
-use crate::flight_plan::candidate::{Candidate, candidates};
+use super::world::{FlownCard, World, deviation, evidence};
+use crate::flight_plan::candidate::Candidate;
 use crate::flight_plan::choice::Budget;
-use crate::flight_plan::experience::CampaignHistory;
-use crate::flight_plan::goals::Goal;
-use crate::flight_plan::plan::{Plan, Rehearsal, Tonight, plan};
-use crate::flight_plan::rehearsal::{RehearsalBasis, derivatives, instruments};
-use crate::lab::campaign::{FlightLimits, SimulatedCampaign, TestPoint, tunnel_rows};
-use crate::lab::simulator::{Instruments, Simulator};
-use crate::maneuver::Maneuver;
-use crate::model::{Evidence, Model, model};
 use crate::numerics::order_statistics::{median, quantile};
-use crate::numerics::random::derived_seed;
-use crate::pipeline::estimate_maneuver;
-use crate::proof_of_match::of_posterior;
-use crate::tables::{NextGoalRow, PosteriorRow};
-
-/// A simulated world: the aircraft as it is, and the analyst who has a wrong tunnel.
-struct World {
-    shipped: SimulatedCampaign,
-    /// With the tunnel's tables in place of the truth.
-    config: Config,
-    instruments: Instruments,
-    seed: u64,
-}
-
-/// A flown maneuver with its estimate.
-type FlownCard = (Maneuver, Estimated);
 
 impl World {
-    /// World whose tunnel errs as the cards say: by 8 % of a derivative, and by 3 % further at each
-    /// point.
-    fn new(seed: u64, points: &[(&str, &[f64])]) -> World {
-        let mut shipped = SimulatedCampaign::load(Path::new("pipelines/harv/cards.yaml")).unwrap();
-        let point = |(class, alphas): &(&str, &[f64])| TestPoint {
-            class: (*class).to_owned(),
-            alpha_deg: alphas.to_vec(),
-            scale: 1.0,
-        };
-        shipped.cards.next.candidates = points.iter().map(point).collect();
-        shipped.cards.seed = seed;
-        let mut config = shipped.config.clone();
-        config.tunnel = wrong(&shipped);
-        let instruments = instruments(&shipped.cards.instruments, &[]);
-        World {
-            shipped,
-            config,
-            instruments,
-            seed,
-        }
-    }
-
-    fn candidates(&self) -> Vec<Candidate> {
-        candidates(&self.shipped.cards, &self.config)
-    }
-
-    /// Flies cards of one flight with the truth, and estimates them.
-    fn fly(&self, flight: &str, cards: &[Candidate]) -> Vec<FlownCard> {
-        let fly = |(i, candidate): (usize, &Candidate)| {
-            let flown = self.shipped.simulator.fly(&candidate.card).unwrap();
-            let seed = derived_seed(self.seed, &format!("{flight} {i}"));
-            let record = flown.recorded(&self.instruments, seed);
-            let maneuver = Maneuver {
-                maneuver_id: format!("{flight}_{i:03}"),
-                flight_id: flight.to_owned(),
-                ..flown.maneuver
-            };
-            let estimated = estimate_maneuver(&self.config, &record, &maneuver, &[]);
-            (maneuver, estimated)
-        };
-        cards.par_iter().enumerate().map(fly).collect()
-    }
-
-    fn model(&self, evidence: &[Evidence]) -> Model {
-        let Config {
-            buildup,
-            tunnel,
-            model: settings,
-            ..
-        } = &self.config;
-        model(evidence, buildup, tunnel, settings)
-    }
-
-    /// Plan of the next flight from what was flown.
-    fn plan(&self, flown: &[FlownCard], budget: Budget) -> Plan {
-        let evidence = evidence(flown);
-        let model = self.model(&evidence);
-        let config = &self.config;
-        let posterior = of_posterior(&model.rows.posterior, &config.tunnel.clamped());
-        let rows: Vec<_> = flown
-            .iter()
-            .flat_map(|(_, e)| e.estimates.clone())
-            .collect();
-        let settings = self.shipped.cards.aircraft.clone();
-        let derivatives = derivatives(config, posterior, &rows);
-        let simulator =
-            Simulator::new(&config.aircraft, &config.buildup, derivatives, settings).unwrap();
-        let basis = RehearsalBasis {
-            config,
-            simulator: &simulator,
-            instruments: &self.instruments,
-            delays: &[],
-            limits: &FlightLimits::default(),
-        };
-        let rehearse = |candidate: Candidate| {
-            let result = basis.rehearse(&candidate);
-            (candidate, result)
-        };
-        let rehearsals: Vec<Rehearsal> = self.candidates().into_par_iter().map(rehearse).collect();
-        let maneuvers: Vec<Maneuver> = flown.iter().map(|(m, _)| m.clone()).collect();
-        let fits: Vec<_> = flown.iter().map(|(_, e)| e.fit.clone()).collect();
-        let covariances: Vec<_> = flown.iter().map(|(_, e)| e.covariance.clone()).collect();
-        let tonight = Tonight {
-            model: &model,
-            evidence: &evidence,
-            history: CampaignHistory {
-                maneuvers: &maneuvers,
-                fits: &fits,
-                covariances: &covariances,
-                contributions: &model.rows.contributions,
-            },
-            buildup: &config.buildup,
-            tunnel: &config.tunnel,
-            settings: &config.model,
-            qualities: None,
-            matches: &BTreeMap::new(),
-        };
-        let goals: Vec<Goal> = model.quantities().map(Goal::of).collect();
-        plan(&tonight, &rehearsals, &goals, budget)
-    }
-
-    /// Cards of a plan, each as often as it is flown.
-    fn cards(&self, plan: &Plan) -> Vec<Candidate> {
-        let all = self.candidates();
-        let chosen = plan.cards.iter().filter(|row| row.place.is_some());
-        let chosen = chosen.flat_map(|row| {
-            let is_it = |c: &&Candidate| {
-                c.card.class == row.class && (c.card.alpha_deg - row.alpha_deg).abs() < 1e-9
-            };
-            let candidate = all.iter().find(is_it).unwrap().clone();
-            std::iter::repeat_n(candidate, row.times)
-        });
-        chosen.collect()
-    }
-
     /// Bounds after a planned flight over the predicted ones, where the flight changes a bound by a
     /// tenth or more.
     fn ratios(&self, mut flown: Vec<FlownCard>, budget: Budget) -> Vec<f64> {
@@ -164,36 +18,6 @@ impl World {
             .map(|goal| deviation(&after, goal) / goal.after)
             .collect()
     }
-}
-
-/// Standard deviation of a goal by a model.
-fn deviation(model: &Model, goal: &NextGoalRow) -> f64 {
-    let mut rows = model.rows.posterior.iter();
-    let is_there = |row: &&PosteriorRow| {
-        row.derivative == goal.goal && (row.alpha_deg - goal.alpha_deg).abs() < 1e-6
-    };
-    rows.find(is_there).unwrap().standard_deviation
-}
-
-fn evidence(flown: &[FlownCard]) -> Vec<Evidence<'_>> {
-    let own = flown.iter().filter_map(|(maneuver, estimated)| {
-        Some(Evidence {
-            maneuver,
-            estimates: &estimated.estimates,
-            combined: &estimated.combined,
-            covariance: estimated.covariance.as_ref()?,
-        })
-    });
-    own.collect()
-}
-
-/// The true tables with errors.
-fn wrong(shipped: &SimulatedCampaign) -> WindTunnel {
-    let mut tunnel = WindTunnel::new(shipped.config.tunnel.settings().clone());
-    for row in tunnel_rows(shipped) {
-        tunnel.insert(&row.derivative, row.point());
-    }
-    tunnel
 }
 
 /// Bounds over promised ones after a first flight of some cards and a planned second one.
