@@ -228,21 +228,31 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
         members.map(filter).collect()
     }
 
-    /// Minimum of the cost from a start; `None` where the iteration does not converge.
-    pub fn minimum(&self, filters: &[Filter<NG, G>], start: &FilterStart) -> Option<Minimum> {
+    /// Minimum of the cost from a start.
+    ///
+    /// # Errors
+    /// End of an iteration that does not converge or determines no covariance; `None` where the filter
+    /// diverges at the start.
+    pub fn minimum(
+        &self,
+        filters: &[Filter<NG, G>],
+        start: &FilterStart,
+    ) -> Result<Minimum, Option<Box<Scored>>> {
         let settings = self.task.context.settings;
         let joint = JointFilter::new(filters, &self.parameters);
         let least = |member: &GroupMember<NX, E>| member.deviations.map(|d| LEAST_SHARE * d);
         let resolutions: Vec<_> = self.members.iter().map(least).collect();
         let floors = joint.floors(&resolutions);
         let from = joint.with_noise(&start.own, &start.noise);
-        let scored = minimise(&joint, from, &floors, &settings.filter)?;
+        let scored = minimise(&joint, from, &floors, &settings.filter).ok_or(None)?;
         if !scored.converged {
-            return None;
+            return Err(Some(Box::new(scored)));
         }
         let limit = settings.iteration.max_condition_number;
-        let bounds = bounds::bounds(&joint, &scored, limit).ok()?;
-        Some(Minimum { scored, bounds })
+        match bounds::bounds(&joint, &scored, limit) {
+            Ok(bounds) => Ok(Minimum { scored, bounds }),
+            Err(_) => Err(Some(Box::new(scored))),
+        }
     }
 
     /// A fit with what is left of the slopes' effect on it.
@@ -320,7 +330,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
         };
         let filters = self.filters(&sweep, Some(&swept.filters));
         let starts = std::iter::once(near).chain(self.implied(&sweep));
-        let found = starts.filter_map(|start| self.minimum(&filters, &start));
+        let found = starts.filter_map(|start| self.minimum(&filters, &start).ok());
         let found = found.min_by(Minimum::by_cost)?;
         (found.cost() < swept.found.cost() + ALLOWED_RISE)
             .then(|| self.swept(sweep, filters, found))?
@@ -538,8 +548,13 @@ impl<const NG: usize, G: InGusts<NG>> Swept<NG, G> {
         self.effect.as_ref().filter(moves)
     }
 
+    /// End of the iteration.
+    pub fn end(&self) -> &Scored {
+        &self.found.scored
+    }
+
     fn parameters(&self) -> &[f64] {
-        &self.found.scored.parameters
+        &self.end().parameters
     }
 
     /// −log of the likelihood.
@@ -575,7 +590,7 @@ impl Minimum {
     }
 
     pub fn by_cost(&self, other: &Minimum) -> Ordering {
-        self.cost().total_cmp(&other.cost())
+        self.scored.by_cost(&other.scored)
     }
 }
 

@@ -2,8 +2,9 @@
 
 use nalgebra::{DMatrix, DVector, SVector};
 
-use super::filter_group::{FilterStart, Group, GroupMember, Minimum};
+use super::filter_group::{FilterStart, Group, GroupMember, Minimum, Swept};
 use super::prepared_case::PreparedCase;
+use super::sensor_noise;
 use super::settings::Method;
 use super::task::Task;
 use super::whiteness::{is_white, lag_one, largest, white_cost};
@@ -11,6 +12,7 @@ use crate::aero::Axis;
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
 use crate::filter_error::filter::Filter;
 use crate::filter_error::noise::Noise;
+use crate::filter_error::scoring::Scored;
 use crate::flight::signal;
 use crate::output_error::equation_error::Regression;
 use crate::output_error::{Case, Fit, Measurements, Response};
@@ -46,6 +48,16 @@ pub(super) struct Filtered {
     output_error_costs: [Option<f64>; 2],
 }
 
+/// Air of a maneuver by filter error.
+pub(super) enum Air {
+    /// It moves: the estimates are the filter's.
+    Moves(Box<Filtered>),
+    /// Noise of the sensors, with a colour of its own, explains the residuals of output error better.
+    IsStill,
+    /// The filter does not converge, and nothing shows that the noise is the sensors'.
+    Unknown,
+}
+
 impl<'a> Task<'a> {
     /// Returns true if filter error is to estimate a maneuver with this fit by output error.
     pub(super) fn needs_filter(&self, measurements: &Measurements, fit: &Fit) -> bool {
@@ -56,64 +68,32 @@ impl<'a> Task<'a> {
         }
     }
 
-    /// Estimates a maneuver by filter error, from still or from moving air as the residuals of output
-    /// error are, then from the other; `None` where neither converges or the data determine no
-    /// covariance. `wide` has the held derivatives free as well, and `implied` are the starting values by
-    /// equation error. Where rotary gusts account for the rates, both are tried: they can be taken for
-    /// the rates' own effect.
+    /// Estimates a maneuver by filter error. `wide` has the held derivatives free as well, and `implied`
+    /// are the starting values by equation error.
     pub(super) fn filtered<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
         &self,
         prepared: &PreparedCase<'a, NX, E>,
         wide: &Case<NX, E>,
         implied: Vec<f64>,
         output_error: &Fit,
-    ) -> Option<Filtered> {
-        let case = &prepared.case;
+    ) -> Air {
         let member = GroupMember::new(self, prepared, wide);
         let group: Group<NX, E, NG, G> = Group::of_one(self, member);
-        let member = group.members.first()?;
-        let start = |own: Vec<f64>, noise: Noise| FilterStart {
-            own,
-            noise: vec![noise],
-        };
-        let moving = start(implied, Noise::starting(member.deviations));
-        let still = start(
-            output_error.values.clone(),
-            Noise::slight(member.deviations),
-        );
-        let (first, second) = if is_white(&case.measurements, output_error) {
-            (still, moving)
-        } else {
-            (moving, still)
-        };
         let constant = group.constant();
         let filters = group.filters(&constant, None);
-        let from = |start: &FilterStart| group.minimum(&filters, start);
-        let found = match from(&first) {
-            None => from(&second)?,
-            Some(found) if is_mostly_air(&filters, &found, &case.motion.states) => {
-                let both = [Some(found), from(&second)];
-                both.into_iter().flatten().min_by(Minimum::by_cost)?
-            }
-            Some(found) => found,
-        };
-        let swept = group.with_slopes(group.swept(constant, filters, found)?);
-        let (mut fit, mut responses) = group.fit(&swept).with_response(Response::default());
-        fit.response = responses.pop()?;
-        let noise = group.noise(&swept).pop()?;
-        Some(Filtered {
-            information: group.information(&swept),
-            outputs_along_air: group.outputs_along_air(0, &swept),
-            second_opinion: member.second_opinion_on(&swept.sweep),
-            noise,
-            cost: swept.cost(),
-            attitude_drifts: noise.is_of_air(G::FELT_RATES.len(), case.step_s),
-            autocorrelation: lag_one(&case.measurements, &fit.response.outputs),
-            output_error_costs: [output_error.initial_cost, output_error.final_cost],
-            likelihood_gain: white_cost(&case.measurements, output_error)
-                .map(|cost| cost - swept.cost()),
-            fit,
-        })
+        let Reached { minimum, others } = reached(&group, &filters, implied, output_error);
+        let swept = minimum
+            .and_then(|found| group.swept(constant, filters, found))
+            .map(|swept| group.with_slopes(swept));
+        let end = swept.as_ref().map(Swept::end);
+        let end = end.or_else(|| others.iter().min_by(|a, b| a.by_cost(b)));
+        let filter = end.and_then(|end| end.response.members.first());
+        let measurements = &prepared.case.measurements;
+        if filter.is_some_and(|filter| sensor_noise::explains(measurements, output_error, filter)) {
+            return Air::IsStill;
+        }
+        let filtered = swept.and_then(|swept| Filtered::of_one(&group, &swept, output_error));
+        filtered.map_or(Air::Unknown, |filtered| Air::Moves(Box::new(filtered)))
     }
 
     /// Adds what the filter found of the air to the row of `fits`.
@@ -163,6 +143,88 @@ impl<'a> Task<'a> {
                 .map_or(0.0, |v| v.value)
         })
     }
+}
+
+impl Filtered {
+    /// Result of the fit of one maneuver.
+    fn of_one<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
+        group: &Group<NX, E, NG, G>,
+        swept: &Swept<NG, G>,
+        output_error: &Fit,
+    ) -> Option<Filtered> {
+        let member = group.members.first()?;
+        let case = &member.prepared.case;
+        let (mut fit, mut responses) = group.fit(swept).with_response(Response::default());
+        fit.response = responses.pop()?;
+        let noise = group.noise(swept).pop()?;
+        Some(Filtered {
+            information: group.information(swept),
+            outputs_along_air: group.outputs_along_air(0, swept),
+            second_opinion: member.second_opinion_on(&swept.sweep),
+            noise,
+            cost: swept.cost(),
+            attitude_drifts: noise.is_of_air(G::FELT_RATES.len(), case.step_s),
+            autocorrelation: lag_one(&case.measurements, &fit.response.outputs),
+            output_error_costs: [output_error.initial_cost, output_error.final_cost],
+            likelihood_gain: white_cost(&case.measurements, output_error)
+                .map(|cost| cost - swept.cost()),
+            fit,
+        })
+    }
+}
+
+/// Ends of the iterations of one maneuver's filter.
+struct Reached {
+    minimum: Option<Minimum>,
+    /// Ends that determine no estimates.
+    others: Vec<Scored>,
+}
+
+/// Iterates from still or from moving air as the residuals of output error are, and where that gives no
+/// estimates from the other. Where rotary gusts account for the rates, both are tried: they can be taken
+/// for the rates' own effect.
+fn reached<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
+    group: &Group<NX, E, NG, G>,
+    filters: &[Filter<NG, G>],
+    implied: Vec<f64>,
+    output_error: &Fit,
+) -> Reached {
+    let mut reached = Reached {
+        minimum: None,
+        others: vec![],
+    };
+    let Some(member) = group.members.first() else {
+        return reached;
+    };
+    let case = &member.prepared.case;
+    let start = |own: Vec<f64>, noise: Noise| FilterStart {
+        own,
+        noise: vec![noise],
+    };
+    let moving = start(implied, Noise::starting(member.deviations));
+    let still = start(
+        output_error.values.clone(),
+        Noise::slight(member.deviations),
+    );
+    let starts = if is_white(&case.measurements, output_error) {
+        [still, moving]
+    } else {
+        [moving, still]
+    };
+    for start in &starts {
+        match group.minimum(filters, start) {
+            Ok(found) => {
+                let both = reached.minimum.take().into_iter().chain([found]);
+                reached.minimum = both.min_by(Minimum::by_cost);
+            }
+            Err(end) => reached.others.extend(end.map(|end| *end)),
+        }
+        let found = reached.minimum.as_ref();
+        if found.is_some_and(|found| !is_mostly_air(filters, found, &case.motion.states)) {
+            break;
+        }
+    }
+    reached
 }
 
 /// True where a rotary gust is as large as a good part of the rate that it adds to, in the filter of one

@@ -17,6 +17,7 @@ mod second_opinion;
 mod alpha_slopes;
 mod whiteness;
 mod filter_group;
+mod sensor_noise;
 mod in_gusts;
 mod doubt;
 mod flown_means;

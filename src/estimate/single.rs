@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::context::Context;
 use super::doubt::Explanation;
 use super::estimated::{Covariance, Estimated};
-use super::in_gusts::Filtered;
+use super::in_gusts::{Air, Filtered};
 use super::prepared_case::PreparedCase;
 use super::second_opinion::add_second_opinion;
 use super::settings::Hold;
@@ -20,6 +20,9 @@ use crate::maneuver::{Class, Maneuver};
 use crate::output_error::equation_error::{self, Regression};
 use crate::output_error::{Fit, Measurements, Outcome, consider, cost, estimation};
 use crate::tables::StartingValues;
+
+/// Remark on a fit by output error that filter error does not improve.
+const OF_SENSORS: &str = "; the residuals are coloured noise of the sensors";
 
 /// Estimates one maneuver. The outcome has any failure.
 #[must_use]
@@ -86,14 +89,15 @@ impl Task<'_> {
         let with_held_free = self.with_held_free(&prepared);
         let uncertainties = self.held_uncertainties(&prepared.model);
         let second = equation_error::regression(case, &with_held_free, &uncertainties);
-        if self.needs_filter(&case.measurements, &fit)
-            && let Some(filtered) =
-                self.filtered::<NX, E, NG, G>(&prepared, &with_held_free, starts.implied, &fit)
-        {
-            return Ok(self.estimated_in_gusts(&prepared, &filtered, &second));
-        }
         if self.needs_filter(&case.measurements, &fit) {
-            discard_in_gusts(&case.measurements, &mut fit);
+            let implied = starts.implied;
+            match self.filtered::<NX, E, NG, G>(&prepared, &with_held_free, implied, &fit) {
+                Air::Moves(filtered) => {
+                    return Ok(self.estimated_in_gusts(&prepared, &filtered, &second));
+                }
+                Air::IsStill => fit.reason.push_str(OF_SENSORS),
+                Air::Unknown => discard_in_gusts(&case.measurements, &mut fit),
+            }
         }
         estimation::add_bounds(case, &mut fit, &self.context.settings.iteration);
         if self.context.settings.hold == Hold::Evidence {

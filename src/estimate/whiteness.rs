@@ -24,8 +24,13 @@ pub(super) fn sample_noise(measurements: &Measurements, output: usize) -> f64 {
 
 /// True for a fit by output error whose residuals show no motion of the air.
 pub(super) fn is_white(measurements: &Measurements, fit: &Fit) -> bool {
-    let correlations = lag_one(measurements, &fit.response.outputs);
-    fit.outcome == Outcome::Converged && correlations.iter().all(|r| *r < COLOURED)
+    fit.outcome == Outcome::Converged && are_white(measurements, &fit.response.outputs)
+}
+
+/// True where the residuals of every output are as white noise.
+pub(super) fn are_white(measurements: &Measurements, computed: &[[f64; OUTPUTS]]) -> bool {
+    let correlations = lag_one(measurements, computed);
+    correlations.iter().all(|r| *r < COLOURED)
 }
 
 /// Correlation of neighbouring residuals, output by output.

@@ -4,6 +4,8 @@
 //! A logarithm of a noise that is zero has no minimum. A noise at its floor whose gradient points
 //! below is fixed there; the corner and the correlation of a fixed rotary gust are fixed with it.
 
+use std::cmp::Ordering;
+
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::joint_filter::{JointFilter, JointResponse};
@@ -99,6 +101,12 @@ pub fn minimise<const NX: usize, E: InGusts<NX>>(
 }
 
 impl Scored {
+    /// Orders two ends by their cost.
+    #[must_use]
+    pub fn by_cost(&self, other: &Scored) -> Ordering {
+        self.response.cost.total_cmp(&other.response.cost)
+    }
+
     /// Fixes the parameters at their floors; returns gradient and information of the free parameters; the
     /// others have a unit diagonal.
     fn free_system<const NX: usize, E: InGusts<NX>>(

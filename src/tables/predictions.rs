@@ -78,9 +78,9 @@ table! {
     /// `share_constants`, constants are the maneuver's own: they are fitted again with the
     /// derivatives fixed, because they take up the zero errors of the flight's vanes and surfaces.
     ///
-    /// Where filter error estimated the maneuver, it also fits these, with the noise of the maneuver's own
-    /// fit. The computed outputs are those of the table `fit_outputs`, so that both compare: the angle of
-    /// the air follows the vane, and nothing else follows the measurements.
+    /// Filter error fits these where it estimated the maneuver, with the noise of the maneuver's own fit. The
+    /// computed outputs are those of the table `fit_outputs`, so that both compare: the angle of the air follows
+    /// the vane, and nothing else follows the measurements.
     pub struct AgreementRow in "predictions" per "predicted maneuver and output" {
         /// Maneuver.
         pub maneuver_id: String,

@@ -3,6 +3,7 @@
 use super::member::{Fitted, Member, is_own, starting_values};
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
 use crate::estimate::filter_group::{FilterStart, Group, GroupMember, Swept};
+use crate::estimate::in_gusts::Air;
 use crate::estimate::task::Task;
 use crate::estimate::whiteness::{lag_one, largest};
 use crate::filter_error::noise::Noise;
@@ -18,27 +19,31 @@ pub struct OwnEstimate<'m, 'a, const NX: usize, E: Equations<NX>> {
     fit: Fit,
     noise: Noise,
     /// −log of the likelihood by filter error; `None` where a maneuver alone does not determine its
-    /// derivatives.
+    /// derivatives, or flew in still air.
     pub cost: Option<f64>,
+    pub air_is_still: bool,
 }
 
 impl<'m, 'a, const NX: usize, E: Equations<NX>> OwnEstimate<'m, 'a, NX, E> {
-    /// Estimates a maneuver alone. One that does not determine its derivatives takes part from those
-    /// of output error.
+    /// Estimates a maneuver alone. One that does not determine its derivatives, or flew in still air,
+    /// takes part from those of output error.
     pub fn new<const NG: usize, G: InGusts<NG>>(
         member: &'m Member<'a, NX, E>,
     ) -> Result<Self, String> {
         let (task, prepared) = (&member.task, &member.prepared);
         let wide = task.with_held_free(prepared);
         let implied = member.starts.implied.clone();
-        let filtered = task.filtered::<NX, E, NG, G>(prepared, &wide, implied, &member.alone);
-        let (fit, noise, cost) = match filtered {
-            Some(filtered) => (filtered.fit, filtered.noise, Some(filtered.cost)),
-            None if member.alone.outcome == Outcome::Unidentifiable => {
-                let deviations = task.least_deviations(&prepared.case.measurements);
-                (member.alone.clone(), Noise::starting(deviations), None)
+        let air = task.filtered::<NX, E, NG, G>(prepared, &wide, implied, &member.alone);
+        let air_is_still = matches!(air, Air::IsStill);
+        let deviations = || task.least_deviations(&prepared.case.measurements);
+        let alone = |noise| (member.alone.clone(), noise, None);
+        let (fit, noise, cost) = match air {
+            Air::Moves(filtered) => (filtered.fit, filtered.noise, Some(filtered.cost)),
+            Air::IsStill => alone(Noise::slight(deviations())),
+            Air::Unknown if member.alone.outcome == Outcome::Unidentifiable => {
+                alone(Noise::starting(deviations()))
             }
-            None => return Err("alone: filter error does not converge".to_owned()),
+            Air::Unknown => return Err("alone: filter error does not converge".to_owned()),
         };
         Ok(OwnEstimate {
             member,
@@ -46,6 +51,7 @@ impl<'m, 'a, const NX: usize, E: Equations<NX>> OwnEstimate<'m, 'a, NX, E> {
             fit,
             noise,
             cost,
+            air_is_still,
         })
     }
 }
@@ -96,7 +102,7 @@ fn minimum<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
     let constant = group.constant();
     let filters = group.filters(&constant, None);
     let minimum = group.minimum(&filters, &found);
-    let minimum = minimum.or_else(|| group.minimum(&filters, &light))?;
+    let minimum = minimum.or_else(|_| group.minimum(&filters, &light)).ok()?;
     Some(group.with_slopes(group.swept(constant, filters, minimum)?))
 }
 

@@ -8,6 +8,7 @@ use crate::estimate::calibration_effect::NOT_COUNTED;
 use crate::estimate::task::{Task, values_by_name};
 use crate::estimate::whiteness::{lag_one, largest};
 use crate::output_error::consider::{self, Considered};
+use crate::output_error::sharing::{add_vector, values_at};
 use crate::output_error::{
     Case, Fit, Joint, Likelihood, Outcome, Response, calibration_errors, estimation,
 };
@@ -42,16 +43,7 @@ pub fn fit<'a, const NX: usize, E: Equations<NX>>(
         // From the derivatives of the maneuver that fits best alone.
         let cost = |p: &&Member<NX, E>| p.alone.final_cost.unwrap_or(f64::INFINITY);
         let best = parts.iter().min_by(|a, b| cost(a).total_cmp(&cost(b)));
-        let other = best.map(|p| {
-            from(
-                &joint
-                    .parameters()
-                    .shared()
-                    .iter()
-                    .map(|&j| p.alone.values[j])
-                    .collect::<Vec<_>>(),
-            )
-        });
+        let other = best.map(|p| from(&values_at(joint.parameters().shared(), &p.alone.values)));
         fit = other
             .filter(|f| f.outcome == Outcome::Converged)
             .unwrap_or(fit);
@@ -87,15 +79,7 @@ fn add_held_uncertainty<'a, const NX: usize, E: Equations<NX>>(
         .iter()
         .map(|p| p.task.with_held_free(&p.prepared))
         .collect();
-    let own = |i: usize| {
-        joint
-            .parameters()
-            .places(i)
-            .iter()
-            .filter_map(|&p| fit.values.get(p))
-            .copied()
-            .collect::<Vec<f64>>()
-    };
+    let own = |i: usize| values_at(joint.parameters().places(i), &fit.values);
     let considered: Vec<Considered<NX, E>> = parts
         .iter()
         .zip(&wide)
@@ -130,7 +114,7 @@ fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
     let mut errors = vec![];
     for (i, part) in parts.iter().enumerate() {
         let places = joint.parameters().places(i);
-        let own: Vec<f64> = places.iter().map(|&p| fit.values[p]).collect();
+        let own = values_at(places, &fit.values);
         errors = part.task.misreadings(&part.prepared.window);
         let Ok(shifts) = part
             .task
@@ -141,9 +125,7 @@ fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
         };
         together.resize(shifts.len(), DVector::zeros(joint.names().len()));
         for (sum, shift) in together.iter_mut().zip(shifts) {
-            for (&place, value) in places.iter().zip(shift.iter()) {
-                sum[place] += value;
-            }
+            add_vector(places, &shift, sum);
         }
     }
     calibration_errors::add_calibration_errors(joint, &errors, &together, fit);

@@ -81,8 +81,9 @@ type LeftOut<'r> = Vec<(&'r Maneuver, String)>;
 type TakingPart<'r> = (&'r Maneuver, Option<f64>);
 
 impl<'r> Request<'r> {
-    /// Estimates by filter error where a maneuver needs it, and by output error otherwise, or where
-    /// filter error does not converge and all residuals of output error are white.
+    /// Estimates by filter error where a maneuver needs it, and by output error otherwise, where the
+    /// sensors' noise explains all maneuvers, or where filter error does not converge and all residuals
+    /// of output error are white.
     fn estimate<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
         &self,
         doubtful: &[(&'r Maneuver, String)],
@@ -96,8 +97,11 @@ impl<'r> Request<'r> {
         }
         if members.iter().any(Member::needs_filter) {
             let joined = self.by_filter_error::<NX, E, NG, G>(&members, left_out.clone());
-            let converged = joined.estimated.fit.outcome == Outcome::Converged;
-            if converged || !members.iter().all(Member::is_white) {
+            let counts = |joined: &Joined| {
+                let converged = joined.estimated.fit.outcome == Outcome::Converged;
+                converged || !members.iter().all(Member::is_white)
+            };
+            if let Some(joined) = joined.filter(counts) {
                 return joined;
             }
         }
@@ -116,11 +120,12 @@ impl<'r> Request<'r> {
         }
     }
 
+    /// Estimates by filter error; `None` where no maneuver shows that the air moves.
     fn by_filter_error<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
         &self,
         members: &[Member<'r, NX, E>],
         mut left_out: LeftOut<'r>,
-    ) -> Joined {
+    ) -> Option<Joined> {
         let mut own = Vec::new();
         for member in members {
             match OwnEstimate::new::<NG, G>(member) {
@@ -128,11 +133,14 @@ impl<'r> Request<'r> {
                 Err(reason) => left_out.push((member.task.maneuver, reason)),
             }
         }
+        if !own.is_empty() && own.iter().all(|o| o.air_is_still) {
+            return None;
+        }
         let taking = own.iter().map(|o| (o.member.task.maneuver, o.cost));
         let taking: Vec<TakingPart> = taking.collect();
-        self.joined(&taking, left_out, |task| {
+        Some(self.joined(&taking, left_out, |task| {
             by_filter_error::fit::<NX, E, NG, G>(task, &own)
-        })
+        }))
     }
 
     fn by_output_error<const NX: usize, E: Equations<NX>>(

@@ -120,6 +120,29 @@ fn joint_estimates_of_white_residuals_need_no_filter() {
     assert!(fit.autocorrelation.unwrap() < 0.3, "{fit:?}");
 }
 
+#[test]
+fn coloured_noise_of_the_sensors_is_not_taken_for_gusts() {
+    let bench = bench_in_gusts(Method::FilterError);
+    let flown = |seed| bench.flown_with_colour(seed, 1.0, 0.0, 0.95);
+    let records = [flown(1), flown(2)];
+    let maneuvers = [maneuver("a", 20.0), maneuver("b", 20.4)];
+    for (record, maneuver) in records.iter().zip(&maneuvers) {
+        let alone = bench.estimate(record, maneuver);
+        assert_eq!(alone.fit.outcome, Outcome::Converged);
+        assert_eq!(alone.fit.method, Some(EstimationMethod::OutputError));
+        assert!(alone.fit.reason.contains("noise of the sensors"));
+        assert!(alone.fit.autocorrelation.unwrap() > 0.8);
+    }
+    let members = [(&records[0], &maneuvers[0]), (&records[1], &maneuvers[1])];
+    let context = bench.context();
+    let joined = joint::estimate("joint/steps/20.20", &members, &[], &bench.class, &context);
+    let fit = &joined.estimated.fit;
+    assert_eq!(fit.method, Some(EstimationMethod::OutputError));
+    let found = errors(&joined);
+    assert_eq!(found.len(), 9);
+    assert!(found.iter().all(|[z, _]| z.abs() < 3.0), "{found:?}");
+}
+
 /// Prediction, in gusts, of a maneuver whose `Cm_de` is `factor` times that of the others, beside its
 /// own estimate.
 fn predicted_in_gusts(factor: f64) -> (Estimated, Predicted) {

@@ -82,6 +82,17 @@ impl Bench {
     /// A record whose outputs are the response to the true derivatives times `factor`, with noise
     /// and a bias of an.
     fn flown(&self, seed: u64, factor: f64, an_bias_g: f64) -> Record {
+        self.flown_with_colour(seed, factor, an_bias_g, 0.0)
+    }
+
+    /// Record as of [`Bench::flown`], with noise whose neighbouring samples have this correlation.
+    fn flown_with_colour(
+        &self,
+        seed: u64,
+        factor: f64,
+        an_bias_g: f64,
+        correlation: f64,
+    ) -> Record {
         let mut record = record();
         let truth = truth(self.class.axis);
         let model = Model {
@@ -113,11 +124,14 @@ impl Bench {
         let mut noise = Noise(seed);
         for (o, output) in self.class.axis.outputs().into_iter().enumerate() {
             let bias = if output == Output::An { an_bias_g } else { 0.0 };
-            let values = response
-                .outputs
-                .iter()
-                .map(|y| y[o] + bias + NOISE[o] * noise.gaussian())
-                .collect();
+            let mut error = noise.gaussian();
+            let mut reading = |y: &[f64; OUTPUTS]| {
+                let reading = y[o] + bias + NOISE[o] * error;
+                let change = (1.0 - correlation * correlation).sqrt() * noise.gaussian();
+                error = correlation * error + change;
+                reading
+            };
+            let values = response.outputs.iter().map(&mut reading).collect();
             record.signals.insert(
                 output.signal().into(),
                 Series {

@@ -70,6 +70,12 @@ impl Autoregression {
         possible
     }
 
+    /// Log-likelihood that the process gains over white noise of the same variance, less the price of
+    /// its coefficients by the information criterion.
+    pub fn likelihood_gain(&self, variance: f64, samples: f64) -> f64 {
+        0.5 * (Autoregression::white(variance).criterion(samples) - self.criterion(samples))
+    }
+
     fn criterion(&self, samples: f64) -> f64 {
         let (n, parameters) = (samples, self.coefficients.len() as f64 + 1.0);
         n * self.innovation.max(f64::MIN_POSITIVE).ln()

@@ -13,8 +13,8 @@ use super::autoregression::Autoregression;
 use crate::numerics::matrix::{AlignedMatrix, LONGEST_LAG};
 use crate::output_error::case::blocks::{BlockSums, samples_per_block};
 
-/// Highest order of a process, blocks.
-const HIGHEST_ORDER: usize = 12;
+/// Highest order of a process.
+pub(super) const HIGHEST_ORDER: usize = 12;
 const _: () = assert!(HIGHEST_ORDER <= LONGEST_LAG);
 /// Fewest blocks per coefficient of a process.
 const BLOCKS_PER_COEFFICIENT: usize = 10;

@@ -17,7 +17,7 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 use super::autoregression::Autoregression;
-use super::block_series::BlockSeries;
+use super::block_series::{BlockSeries, HIGHEST_ORDER};
 use super::degrees_of_freedom::{ColouredPart, VarianceEstimates};
 use crate::numerics::matrix::AlignedMatrix;
 use crate::numerics::student;
@@ -105,6 +105,30 @@ pub fn slow_noise_level(values: &[f64], step_s: f64) -> f64 {
     let slow = Autoregression::fitted(&series.autocovariances(&pairs), pairs[0]);
     let level = slow.long_run_variance() * series.block_length;
     level.max(square / (counted.len() as f64).max(1.0))
+}
+
+/// Log-likelihood that an autoregressive process of these values gains over white noise, less the price of
+/// its coefficients. NaN marks values that do not count.
+#[must_use]
+pub fn likelihood_gain(values: &[f64]) -> f64 {
+    let finite: Vec<f64> = values
+        .iter()
+        .map(|v| if v.is_finite() { *v } else { 0.0 })
+        .collect();
+    let counts: Vec<f64> = values.iter().map(|v| f64::from(v.is_finite())).collect();
+    let products = |values: &[f64]| {
+        let column = AlignedMatrix::from_column(values);
+        column.lagged_products(&column, 1 + HIGHEST_ORDER)
+    };
+    let pairs = products(&counts);
+    let sums = products(&finite);
+    let autocovariances: Vec<f64> = sums
+        .iter()
+        .zip(&pairs)
+        .map(|(s, n)| s / n.max(1.0))
+        .collect();
+    let process = Autoregression::fitted(&autocovariances, pairs[0]);
+    process.likelihood_gain(autocovariances[0], pairs[0])
 }
 
 /// Sums of the values that are finite.
@@ -312,6 +336,28 @@ mod tests {
 
     use super::*;
     use crate::output_error::tests::Noise;
+
+    #[test]
+    fn the_gain_of_a_colour_is_that_of_its_innovations() {
+        const SAMPLES: usize = 20_000;
+        let (correlation, mut noise) = (0.9_f64, Noise(7));
+        let change = (1.0 - correlation * correlation).sqrt();
+        let mut value = 0.0;
+        let mut next = |_| {
+            value = correlation * value + change * noise.gaussian();
+            value
+        };
+        let mut values: Vec<f64> = (0..SAMPLES).map(&mut next).collect();
+        let exact = -(SAMPLES as f64) * change.ln();
+        assert_relative_eq!(likelihood_gain(&values), exact, max_relative = 0.02);
+        // Values that do not count gain nothing.
+        values.resize(2 * SAMPLES, f64::NAN);
+        assert_relative_eq!(likelihood_gain(&values), exact, max_relative = 0.02);
+
+        let white: Vec<f64> = (0..SAMPLES).map(|_| noise.gaussian()).collect();
+        assert!(likelihood_gain(&white).abs() < 5.0);
+        assert_relative_eq!(likelihood_gain(&[]), 0.0);
+    }
 
     /// Series of an output whose sensitivity is one wherever it counts.
     fn unit_series(weight: f64, residuals: &[f64], used: &[bool]) -> BlockSeries {
