@@ -38,7 +38,7 @@ impl Opened {
 /// read the page.
 fn open(chromium: &Path, page: &Path, options: &[&str], (makes, text): (&str, &str)) -> Opened {
     let mut said = vec![];
-    for _ in 0..STARTS {
+    loop {
         let folder = tempfile::tempdir().unwrap();
         let messages = start(chromium, folder.path(), page, options);
         let made = std::fs::read(folder.path().join(makes)).unwrap_or_default();
@@ -48,8 +48,11 @@ fn open(chromium: &Path, page: &Path, options: &[&str], (makes, text): (&str, &s
             return Opened { made, console };
         }
         said.push(messages);
+        assert!(
+            said.len() < STARTS,
+            "nothing was made of the page: {said:?}"
+        );
     }
-    panic!("{STARTS} browsers made nothing; they said {said:?}");
 }
 
 /// Runs a browser in a folder of its own and returns its messages; one that does not end is ended.
