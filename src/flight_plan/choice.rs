@@ -15,6 +15,7 @@
 
 use nalgebra::{Cholesky, DMatrix, Dyn};
 
+use crate::lab::campaign::NextFlight;
 use crate::model::PlannedRows;
 use crate::numerics::triangular::solve_lower;
 
@@ -75,6 +76,18 @@ pub struct Budget {
     pub minutes_per_deg: f64,
     /// Most times that one card is flown.
     pub repeats: usize,
+}
+
+impl Budget {
+    /// Budget of a flight of some minutes at the prices of the cards.
+    #[must_use]
+    pub fn of(next: &NextFlight, minutes: f64) -> Budget {
+        Budget {
+            minutes,
+            minutes_per_deg: next.change_s_per_deg / 60.0,
+            repeats: next.repeats,
+        }
+    }
 }
 
 /// Choice to be made.

@@ -102,11 +102,7 @@ pub fn plan_next_flight(
         matches: &matches,
     };
     let next = &cards.cards.next;
-    let budget = Budget {
-        minutes: request.minutes,
-        minutes_per_deg: next.change_s_per_deg / 60.0,
-        repeats: next.repeats,
-    };
+    let budget = Budget::of(next, request.minutes);
     let plan = plan(&tonight, &rehearsals, &goals, budget);
     let shelf = shelf_of_stage(folder, &campaign_lineage(&conductor), Stage::Model);
     table::publish(&shelf, &plan.cards)?;

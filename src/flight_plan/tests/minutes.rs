@@ -2,7 +2,6 @@
 
 use super::world::{FlownCard, World, evidence};
 use crate::flight_plan::candidate::{Candidate, reach_deg};
-use crate::flight_plan::choice::Budget;
 use crate::numerics::mean::finite_mean;
 use crate::numerics::order_statistics::median;
 use crate::tables::PosteriorRow;
@@ -18,10 +17,7 @@ const LIST: [&[(&str, &[f64])]; 4] = [
     &[("PYRS", UP_TO_40), ("PYRSTV", UP_TO_60)],
 ];
 
-/// Time to change the angle of attack by one degree.
-const MINUTES_PER_DEG: f64 = 1.0 / 60.0;
-
-/// Planned flights of a seed, and share of the minutes of the list that each has.
+/// Planned flights of a seed; each has this part of the list's minutes.
 const FLIGHTS: usize = 5;
 
 /// Knowledge after some flights.
@@ -57,6 +53,13 @@ impl World {
         }
     }
 
+    /// Time of a flight with these cards.
+    fn minutes(&self, cards: &[Candidate]) -> f64 {
+        let (low, high) = reach_deg(cards.iter());
+        let of_cards: f64 = cards.iter().map(|card| card.minutes).sum();
+        of_cards + (high - low) * self.budget(0.0).minutes_per_deg
+    }
+
     /// Knowledge after the flights of the list.
     fn by_list(&self) -> Knowledge {
         let all = self.candidates();
@@ -69,7 +72,7 @@ impl World {
                 })
             };
             let cards: Vec<Candidate> = all.iter().filter(is_listed).cloned().collect();
-            minutes += minutes_of(&cards);
+            minutes += self.minutes(&cards);
             flown.extend(self.fly(&format!("list {i}"), &cards));
         }
         self.knowledge(&flown, minutes)
@@ -77,27 +80,16 @@ impl World {
 
     /// Knowledge after each of the planned flights, from the tunnel alone.
     fn by_plans(&self, list_minutes: f64) -> Vec<Knowledge> {
-        let budget = Budget {
-            minutes: list_minutes / FLIGHTS as f64,
-            minutes_per_deg: MINUTES_PER_DEG,
-            repeats: self.shipped.cards.next.repeats,
-        };
+        let budget = self.budget(list_minutes / FLIGHTS as f64);
         let (mut flown, mut minutes) = (vec![], 0.0);
         let fly = |i: usize| {
             let cards = self.cards(&self.plan(&flown, budget));
-            minutes += minutes_of(&cards);
+            minutes += self.minutes(&cards);
             flown.extend(self.fly(&format!("planned {i}"), &cards));
             self.knowledge(&flown, minutes)
         };
         (0..FLIGHTS).map(fly).collect()
     }
-}
-
-/// Time of a flight with these cards.
-fn minutes_of(cards: &[Candidate]) -> f64 {
-    let (low, high) = reach_deg(cards.iter());
-    let of_cards: f64 = cards.iter().map(|card| card.minutes).sum();
-    of_cards + (high - low) * MINUTES_PER_DEG
 }
 
 /// Share of the list's minutes at which planned flights know as much; `None` where they never do.

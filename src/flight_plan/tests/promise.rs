@@ -26,12 +26,7 @@ fn ratios(seed: u64, points: &[(&str, &[f64])], first: &[usize], minutes: f64) -
     let all = world.candidates();
     let cards: Vec<Candidate> = first.iter().map(|&i| all[i].clone()).collect();
     let flown = world.fly("a", &cards);
-    let budget = Budget {
-        minutes,
-        minutes_per_deg: 1.0 / 60.0,
-        repeats: 2,
-    };
-    world.ratios(flown, budget)
+    world.ratios(flown, world.budget(minutes))
 }
 
 fn within(ratios: &[f64], low: f64, high: f64) -> f64 {

@@ -68,6 +68,11 @@ impl World {
         candidates(&self.shipped.cards, &self.config)
     }
 
+    /// Budget of a flight of some minutes.
+    pub fn budget(&self, minutes: f64) -> Budget {
+        Budget::of(&self.shipped.cards.next, minutes)
+    }
+
     /// Flies cards of one flight with the truth, and estimates them.
     pub fn fly(&self, flight: &str, cards: &[Candidate]) -> Vec<FlownCard> {
         let fly = |(i, candidate): (usize, &Candidate)| {
