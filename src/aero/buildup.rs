@@ -56,6 +56,26 @@ impl Buildup {
             .filter(move |d| d.coefficient.axis() == axis)
     }
 
+    /// Derivatives along the rate of the angle of attack.
+    pub fn lags(&self) -> impl Iterator<Item = &Derivative> {
+        let derivatives = self.derivatives.iter();
+        derivatives.filter(|d| d.regressor.has_alpha_rate())
+    }
+
+    /// Sentence on what a derivative along `alpha_dot` can mean; `None` without one.
+    #[must_use]
+    pub fn lag_warning(&self) -> Option<String> {
+        let names: Vec<&str> = self.lags().map(|d| d.name.as_str()).collect();
+        (!names.is_empty()).then(|| {
+            format!(
+                "{}: a constant along `alpha_dot` stands for a lag of the flow and is right for slow motion alone; q and `alpha_dot` move \
+                 together in pulses of pitch (`correlations` says how much): without surfaces that lift and do not pitch, their sum alone \
+                 is known",
+                names.join(", ")
+            )
+        })
+    }
+
     /// The biases of one axis's outputs, in the order of the model file.
     pub fn biases_of(&self, axis: Axis) -> impl Iterator<Item = &Bias> {
         self.biases.iter().filter(move |b| b.output.axis() == axis)

@@ -22,6 +22,8 @@ pub enum Regressor {
     PitchRate,
     /// r b/2V, rad.
     YawRate,
+    /// α̇ c̄/2V, rad, as the measured motion implies it: the lag of the flow at the tail.
+    AlphaRate,
     /// A control surface or any other recorded signal, in its own unit.
     Surface(String),
     /// A thrust-vectoring vane, deg; the derivative is a force in lbf/deg over q̄S or a moment in
@@ -49,12 +51,36 @@ impl Regressor {
             Err(mut factors) if factors.len() == 1 => factors.remove(0),
             Err(_) => return Err("a regressor has at most two factors".to_owned()),
         };
+        if !regressor.is_linear_in_alpha_rate() {
+            return Err(format!(
+                "`{written}` is not linear in `alpha_dot`, which stands for a lag; `alpha_dot` alone and its product with another factor are"
+            ));
+        }
         match regressor.unit() {
             Some(_) => Ok(regressor),
             None => Err(format!(
                 "`{written}` is in no unit of a derivative; angles, reduced rates, Mach number, airspeed and products of two of them are"
             )),
         }
+    }
+
+    /// True where one factor at most is α̇, and it is no magnitude: the motion then follows from the loads
+    /// by a linear equation.
+    fn is_linear_in_alpha_rate(&self) -> bool {
+        match self {
+            Regressor::Magnitude(of) => !of.has_alpha_rate(),
+            Regressor::Product(both) => {
+                both.iter().all(Regressor::is_linear_in_alpha_rate)
+                    && !both.iter().all(Regressor::has_alpha_rate)
+            }
+            _ => true,
+        }
+    }
+
+    /// True where a part is α̇.
+    #[must_use]
+    pub fn has_alpha_rate(&self) -> bool {
+        self.leaves().contains(&&Regressor::AlphaRate)
     }
 
     /// Signal of the surface or vane that the regressor is; `None` for other regressors.
@@ -151,7 +177,10 @@ impl Regressor {
         match self {
             Regressor::Constant => Some([0; 3]),
             Regressor::Alpha | Regressor::Beta | Regressor::Vane(_) => Some([1, 0, 0]),
-            Regressor::RollRate | Regressor::PitchRate | Regressor::YawRate => Some([0, 1, 0]),
+            Regressor::RollRate
+            | Regressor::PitchRate
+            | Regressor::YawRate
+            | Regressor::AlphaRate => Some([0, 1, 0]),
             Regressor::Surface(name) => match Unit::of_signal(name).quantity {
                 Quantity::Number => Some([0; 3]),
                 Quantity::Angle => Some([1, 0, 0]),
@@ -199,6 +228,7 @@ fn part(written: &str) -> Result<Regressor, String> {
         "p" => Regressor::RollRate,
         "q" => Regressor::PitchRate,
         "r" => Regressor::YawRate,
+        "alpha_dot" => Regressor::AlphaRate,
         signal => Regressor::Surface(signal.to_owned()),
     })
 }
@@ -212,6 +242,7 @@ impl fmt::Display for Regressor {
             Regressor::RollRate => f.write_str("p"),
             Regressor::PitchRate => f.write_str("q"),
             Regressor::YawRate => f.write_str("r"),
+            Regressor::AlphaRate => f.write_str("alpha_dot"),
             Regressor::Surface(signal) | Regressor::Vane(signal) => f.write_str(signal),
             Regressor::Magnitude(of) => write!(f, "abs({of})"),
             Regressor::Product(both) => write!(f, "{} * {}", both[0], both[1]),
@@ -236,6 +267,8 @@ mod tests {
             ("q * alpha", DerivativeUnit::PerDegRad),
             ("velocity_ft_s", DerivativeUnit::PerFtS),
             ("mach * alpha", DerivativeUnit::PerDeg),
+            ("alpha_dot", DerivativeUnit::PerRad),
+            ("alpha_dot * mach", DerivativeUnit::PerRad),
         ] {
             let regressor = Regressor::parse(written).expect(written);
             assert_eq!(regressor.unit(), Some(unit), "{written}");
@@ -246,6 +279,8 @@ mod tests {
             "abs(abs(beta))",
             "alpha^2",
             "qbar_psf",
+            "abs(alpha_dot)",
+            "alpha_dot * alpha_dot",
         ] {
             assert!(Regressor::parse(refused).is_err(), "{refused}");
         }

@@ -59,7 +59,8 @@ pub fn check(options: &Options) -> anyhow::Result<ExitCode> {
     for absence in config.absences() {
         out!("without    {absence}");
     }
-    if let Some(warning) = config.estimate.hold.warning() {
+    let of_hold = config.estimate.hold.warning().map(str::to_owned);
+    for warning in of_hold.into_iter().chain(config.buildup.lag_warning()) {
         out!("note       {warning}");
     }
     let doubts = doubts(&config);

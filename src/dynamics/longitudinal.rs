@@ -80,6 +80,18 @@ const NORMAL_FORCE: usize = 0;
 const PITCHING_MOMENT: usize = 1;
 const AXIAL_FORCE: usize = 2;
 
+impl Longitudinal {
+    /// α̇ that a measured motion implies, rad/s: 2.1 with the measured specific forces. A gust's own rate has
+    /// no part in it.
+    #[must_use]
+    pub fn alpha_rate(aircraft: &Aircraft, motion: &Motion) -> f64 {
+        let inputs = Longitudinal::rate_inputs(aircraft, motion);
+        let implied = Longitudinal::implied_coefficients(aircraft, motion, &inputs);
+        let state = Longitudinal::measured_state(motion);
+        Longitudinal::rates(&inputs, &state, &implied).rates[ALPHA]
+    }
+}
+
 impl Equations<3> for Longitudinal {
     type RateInputs = RateInputs;
     type SensorInputs = SensorInputs;

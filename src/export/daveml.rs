@@ -16,7 +16,7 @@ const DECLARATION: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\" standalone=\
     \"http://daveml.org/DTDs/2p0/DAVEfunc.dtd\">";
 
 /// Rates over twice the speed: identifier, description.
-const RATES: [(Regressor, &str, &str); 3] = [
+const RATES: [(Regressor, &str, &str); 4] = [
     (
         Regressor::RollRate,
         "pb_2V",
@@ -31,6 +31,11 @@ const RATES: [(Regressor, &str, &str); 3] = [
         Regressor::YawRate,
         "rb_2V",
         "yaw rate r b/2V, positive nose right",
+    ),
+    (
+        Regressor::AlphaRate,
+        "alphadot_c_2V",
+        "rate of the angle of attack times c/2V",
     ),
 ];
 
@@ -154,7 +159,9 @@ fn inputs(contents: &Contents, tables: &[DerivativeTable], xml: &mut Xml) {
             Mark::Input,
         );
     }
-    for (_, id, words) in RATES {
+    let has_lag = contents.buildup.lags().next().is_some();
+    let is_used = |rate: &Regressor| *rate != Regressor::AlphaRate || has_lag;
+    for (_, id, words) in RATES.iter().filter(|(rate, ..)| is_used(rate)) {
         variable(xml, id, id, "rad", words, Mark::Input);
     }
     let mut surfaces: Vec<&str> = contents

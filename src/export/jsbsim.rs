@@ -145,6 +145,7 @@ fn regressor_factors(contents: &Contents, regressor: &Regressor) -> Vec<Factor> 
         Regressor::RollRate => all(&["velocities/p-aero-rad_sec", "aero/bi2vel"]),
         Regressor::PitchRate => all(&["velocities/q-aero-rad_sec", "aero/ci2vel"]),
         Regressor::YawRate => all(&["velocities/r-aero-rad_sec", "aero/bi2vel"]),
+        Regressor::AlphaRate => all(&["aero/alphadot-rad_sec", "aero/ci2vel"]),
         Regressor::Surface(signal) | Regressor::Vane(signal) => {
             vec![Factor::of(property(contents, signal))]
         }

@@ -38,6 +38,7 @@ pub struct Flow {
     pub velocity: f64,
     pub mach: f64,
     pub rates: [f64; 3],
+    pub alpha_rate: f64,
     pub qbar: f64,
 }
 
@@ -52,6 +53,10 @@ enum Factor {
     /// Rate of an axis times half this length over the airspeed.
     Rate {
         axis: usize,
+        half_length: f64,
+    },
+    /// Rate of the angle of attack times half this length over the airspeed.
+    AlphaRate {
         half_length: f64,
     },
     /// Recorded signal with this place.
@@ -71,6 +76,7 @@ pub struct Aerodynamics<'a> {
     aircraft: &'a Aircraft,
     /// Coefficient and factor of each derivative, in the order of the build-up.
     terms: Vec<(usize, Factor)>,
+    has_lag: bool,
     pub table: DerivativeTable,
 }
 
@@ -103,6 +109,7 @@ impl<'a> Aerodynamics<'a> {
         Aerodynamics {
             aircraft,
             terms: derivatives.map(term).collect(),
+            has_lag: buildup.lags().next().is_some(),
             table,
         }
     }
@@ -145,6 +152,7 @@ pub struct AboutTrim<'a> {
     factors: Vec<&'a Factor>,
     /// Values of the factors at the present instant.
     values: Vec<f64>,
+    has_lag: bool,
 }
 
 /// Term of a build-up about a trim.
@@ -190,8 +198,15 @@ impl<'a> AboutTrim<'a> {
             table,
             terms,
             values: vec![0.0; factors.len()],
+            has_lag: aerodynamics.has_lag,
             factors,
         }
+    }
+
+    /// True where the coefficients depend on the rate of the angle of attack.
+    #[must_use]
+    pub fn have_lag(&self) -> bool {
+        self.has_lag
     }
 
     /// Change of the coefficients from the trim.
@@ -244,6 +259,9 @@ impl Factors<'_> {
             Regressor::RollRate => rate(0, self.aircraft.span_ft),
             Regressor::PitchRate => rate(1, self.aircraft.chord_ft),
             Regressor::YawRate => rate(2, self.aircraft.span_ft),
+            Regressor::AlphaRate => Factor::AlphaRate {
+                half_length: 0.5 * self.aircraft.chord_ft,
+            },
             Regressor::Surface(name) if name == signal::VELOCITY => Factor::Velocity,
             Regressor::Surface(name) if name == signal::MACH => Factor::Mach,
             Regressor::Surface(name) => Factor::Recorded(self.place(name)),
@@ -276,6 +294,7 @@ impl Factor {
             Factor::Velocity => flow.velocity,
             Factor::Mach => flow.mach,
             Factor::Rate { axis, half_length } => flow.rates[*axis] * half_length / flow.velocity,
+            Factor::AlphaRate { half_length } => flow.alpha_rate * half_length / flow.velocity,
             Factor::Recorded(place) => at(place),
             Factor::Vane { place, size } => at(place) / (flow.qbar * size),
             Factor::Magnitude(of) => of.value(flow, recorded).abs(),

@@ -126,11 +126,24 @@ struct RunEquations<'a> {
 impl RunEquations<'_> {
     /// Motion at a state and a point of the recording.
     fn instant(&mut self, state: &BodyState, point: usize) -> Instant {
+        if !self.aerodynamics.have_lag() {
+            return self.instant_at(0.0, state, point);
+        }
+        let implied = |alpha_rate: f64| {
+            let instant = self.instant_at(alpha_rate, state, point);
+            AirData::alpha_rate(&state.velocity, &instant.rate.velocity)
+        };
+        let alpha_rate = AirData::alpha_rate_in_balance(implied);
+        self.instant_at(alpha_rate, state, point)
+    }
+
+    /// Motion where the loads see this α̇, rad/s.
+    fn instant_at(&mut self, alpha_rate: f64, state: &BodyState, point: usize) -> Instant {
         let recording = self.simulation.recording;
         let inputs = recording.inputs(point);
         let mut air = AirData::new(&state.velocity, state.position.z);
         air.qbar_psf *= self.start.density_ratio;
-        let flow = flow(&air, state.rates.into());
+        let flow = flow(&air, state.rates.into(), alpha_rate);
         let change = self.aerodynamics.change(&flow, recording.signals(point));
         let level = self.start.trim.coefficients;
         let coefficients: [f64; COEFFICIENTS] = std::array::from_fn(|i| level[i] + change[i]);
@@ -157,13 +170,14 @@ impl RunEquations<'_> {
     }
 }
 
-fn flow(air: &AirData, rates: [f64; 3]) -> Flow {
+fn flow(air: &AirData, rates: [f64; 3], alpha_rate: f64) -> Flow {
     Flow {
         alpha_deg: DEG * air.alpha,
         beta_deg: DEG * air.beta,
         velocity: air.velocity_ft_s,
         mach: air.mach,
         rates,
+        alpha_rate,
         qbar: air.qbar_psf,
     }
 }

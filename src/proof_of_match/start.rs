@@ -129,7 +129,7 @@ fn as_measured(simulation: &Simulation) -> Start {
         .enumerate()
         .map(|(sample, motion)| {
             let recorded = recording.signals(2 * sample);
-            let change = about_trim.change(&flow(motion, recording.altitude_ft), recorded);
+            let change = about_trim.change(&flow(simulation, motion), recorded);
             let implied = implied(simulation, motion);
             std::array::from_fn(|i| implied[i] - change[i])
         })
@@ -162,13 +162,14 @@ fn state(motion: &Motion) -> [f64; STATES] {
 }
 
 /// Flow of a measured motion, with the Mach number of the standard atmosphere.
-fn flow(motion: &Motion, altitude_ft: f64) -> Flow {
+fn flow(simulation: &Simulation, motion: &Motion) -> Flow {
     Flow {
-        mach: motion.velocity / air(altitude_ft).sound_ft_s,
+        mach: motion.velocity / air(simulation.recording.altitude_ft).sound_ft_s,
         alpha_deg: DEG * motion.alpha,
         beta_deg: DEG * motion.beta,
         velocity: motion.velocity,
         rates: motion.rates,
+        alpha_rate: Longitudinal::alpha_rate(simulation.aircraft, motion),
         qbar: motion.qbar,
     }
 }
@@ -179,7 +180,7 @@ fn mean_factors(simulation: &Simulation) -> Vec<f64> {
     let share = 1.0 / recording.motions.len().max(1) as f64;
     let mut sums: Vec<f64> = vec![];
     for (sample, motion) in recording.motions.iter().enumerate() {
-        let flow = flow(motion, recording.altitude_ft);
+        let flow = flow(simulation, motion);
         let recorded = recording.signals(2 * sample);
         let factors = simulation.aerodynamics.factors(&flow, recorded);
         if sums.is_empty() {

@@ -6,8 +6,9 @@ use nalgebra::{DMatrix, DVector};
 
 use super::basis::Basis;
 use super::levels;
+use super::linear::Differentiation;
 use super::linear::{Controls, Flight, LinearModel};
-use super::quantities::{AxisQuantities, Differentiation};
+use super::quantities::AxisQuantities;
 use super::specification::Specification;
 use super::trim::Trim;
 use crate::aero::Axis;

@@ -42,6 +42,7 @@ impl Flight<'_> {
         LinearModel {
             rigid: rates.by_state,
             control_slopes: vec![Vector::zeros(); effects.len()],
+            lag: None,
             slopes: effects.into_iter().map(slope).collect(),
             velocity: trim.velocity,
             gravity: trim.gravity,

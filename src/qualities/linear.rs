@@ -20,32 +20,95 @@ pub type Matrix = SMatrix<f64, STATES, STATES>;
 pub type Vector = SVector<f64, STATES>;
 pub type ByCoefficient = SMatrix<f64, STATES, COEFFICIENTS>;
 
-/// Matrix A of the states' rates and vector B of the pitch control, with their slopes along each value
-/// of the posterior.
+/// Equations of an axis with their slopes along each value of the posterior: rates A x + B u of the states
+/// and the pitch control, and with a lag A x + B u + m α̇.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearModel {
     /// A without aerodynamics.
     pub rigid: Matrix,
     pub slopes: Vec<Matrix>,
     pub control_slopes: Vec<Vector>,
+    /// `None` where no derivative is along α̇.
+    pub lag: Option<Lag>,
     pub velocity: f64,
     pub gravity: f64,
 }
 
-impl LinearModel {
-    /// A at values of the derivatives.
-    #[must_use]
-    pub fn matrix(&self, values: &DVector<f64>) -> Matrix {
-        let terms = self.slopes.iter().zip(values.iter());
-        terms.fold(self.rigid, |sum, (slope, value)| sum + slope * *value)
-    }
+/// Effect of α̇ on the rates of the states.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lag {
+    /// Place of α among the states.
+    pub alpha: usize,
+    /// Slopes of m.
+    pub slopes: Vec<Vector>,
+}
 
-    /// B at values of the derivatives.
+/// Equations solved for the rates of the states, ẋ = A x + B u.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solved {
+    pub matrix: Matrix,
+    pub control: Vector,
+    /// Slopes of A and B along each value; empty where they are not asked for.
+    pub slopes: Vec<Matrix>,
+    pub control_slopes: Vec<Vector>,
+}
+
+impl LinearModel {
+    /// Equations at values of the derivatives, solved for the rates.
     #[must_use]
-    pub fn control(&self, values: &DVector<f64>) -> Vector {
-        let terms = self.control_slopes.iter().zip(values.iter());
-        terms.fold(Vector::zeros(), |sum, (slope, value)| sum + slope * *value)
+    pub fn solved(&self, values: &DVector<f64>, differentiation: Differentiation) -> Solved {
+        let terms = self.slopes.iter().zip(values.iter());
+        let matrix = terms.fold(self.rigid, |sum, (slope, value)| sum + slope * *value);
+        let control = weighted_sum(&self.control_slopes, values);
+        let has_slopes = differentiation == Differentiation::Slopes;
+        let count = if has_slopes { self.slopes.len() } else { 0 };
+        let explicit = Solved {
+            matrix,
+            control,
+            slopes: self.slopes[..count].to_vec(),
+            control_slopes: self.control_slopes[..count].to_vec(),
+        };
+        match &self.lag {
+            None => explicit,
+            Some(lag) => lag.solved(&explicit, values),
+        }
     }
+}
+
+impl Lag {
+    /// Solves for the rates. With e the unit vector of α, ẋ = (I − m eᵀ)⁻¹ (A x + B u), and the inverse is
+    /// I + m eᵀ/(1 − eᵀm). The slopes follow from those of (I − m eᵀ) A.
+    fn solved(&self, explicit: &Solved, values: &DVector<f64>) -> Solved {
+        let effect = weighted_sum(&self.slopes, values);
+        let share = effect / (1.0 - effect[self.alpha]);
+        let solve = |matrix: Matrix| matrix + share * matrix.row(self.alpha);
+        let solve_vector = |vector: Vector| vector + share * vector[self.alpha];
+        let matrix = solve(explicit.matrix);
+        let control = solve_vector(explicit.control);
+        let of_matrix = explicit.slopes.iter().zip(&self.slopes);
+        let of_control = explicit.control_slopes.iter().zip(&self.slopes);
+        let slope = |(own, lag): (&Matrix, &Vector)| solve(own + lag * matrix.row(self.alpha));
+        let control_slope =
+            |(own, lag): (&Vector, &Vector)| solve_vector(own + lag * control[self.alpha]);
+        Solved {
+            matrix,
+            control,
+            slopes: of_matrix.map(slope).collect(),
+            control_slopes: of_control.map(control_slope).collect(),
+        }
+    }
+}
+
+fn weighted_sum(slopes: &[Vector], values: &DVector<f64>) -> Vector {
+    let terms = slopes.iter().zip(values.iter());
+    terms.fold(Vector::zeros(), |sum, (slope, value)| sum + slope * *value)
+}
+
+/// Slopes along the derivatives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Differentiation {
+    Slopes,
+    ValuesAlone,
 }
 
 /// Effect of one value of the posterior on its coefficient.
@@ -57,6 +120,8 @@ pub struct Effect {
     pub by_state: [f64; STATES],
     /// Change with the pitch control, rad.
     pub by_control: f64,
+    /// Change with α̇, s.
+    pub by_alpha_rate: f64,
     /// Share of the coefficient at trim.
     pub at_trim: f64,
 }
@@ -73,6 +138,7 @@ impl Effect {
         Effect {
             by_state: self.by_state.map(|slope| slope * factor),
             by_control: self.by_control * factor,
+            by_alpha_rate: self.by_alpha_rate * factor,
             at_trim: self.at_trim * factor,
             ..self
         }
@@ -179,6 +245,7 @@ impl Flight<'_> {
                 Effect {
                     at_trim: by_first.at_trim,
                     by_control: by_first.by_control + by_second.by_control,
+                    by_alpha_rate: by_first.by_alpha_rate + by_second.by_alpha_rate,
                     by_state: std::array::from_fn(|i| by_first.by_state[i] + by_second.by_state[i]),
                     ..Effect::default()
                 }
@@ -199,6 +266,9 @@ impl Flight<'_> {
             }
             _ => 0.0,
         });
+        if *regressor == Regressor::AlphaRate {
+            effect.by_alpha_rate = self.aircraft.chord_ft / (2.0 * trim.velocity);
+        }
         if let Some((state, factor)) = (states.of_regressor)(regressor) {
             effect.by_state[state] = factor;
         }

@@ -8,7 +8,7 @@
 //!
 //! The pitch control balances the moment M of the thrust, which does not grow with V as its own does.
 
-use super::linear::{AxisStates, ByCoefficient, Flight, LinearModel, Matrix, Vector};
+use super::linear::{AxisStates, ByCoefficient, Flight, Lag, LinearModel, Matrix, Vector};
 use super::trim::Trim;
 use crate::aircraft::Aircraft;
 use crate::dynamics::{Equations, Longitudinal};
@@ -93,6 +93,10 @@ impl Flight<'_> {
             rigid: without.by_state,
             slopes: vec![],
             control_slopes: vec![],
+            lag: self.buildup.lags().next().map(|_| Lag {
+                alpha: ALPHA,
+                slopes: vec![],
+            }),
             velocity: trim.velocity,
             gravity: trim.gravity,
         };
@@ -105,6 +109,9 @@ impl Flight<'_> {
             }
             linear.slopes.push(slope);
             linear.control_slopes.push(column * effect.by_control);
+            if let Some(lag) = &mut linear.lag {
+                lag.slopes.push(column * effect.by_alpha_rate);
+            }
         }
         linear
     }

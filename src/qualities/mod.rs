@@ -31,8 +31,7 @@ use analysis::Analysis;
 
 pub use basis::Basis;
 pub use judged_quantity::judged_quantity;
-pub use linear::{Controls, Flight, LinearModel};
-pub use quantities::Differentiation;
+pub use linear::{Controls, Differentiation, Flight, LinearModel};
 pub use specification::{Range, Specification};
 pub use trim::FlownConditions;
 

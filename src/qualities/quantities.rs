@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use super::linear::{LinearModel, Matrix, Vector};
+use super::linear::{Differentiation, LinearModel, Solved};
 use super::modes::Modes;
 use crate::aero::Axis;
 use crate::numerics::dual::Dual;
@@ -16,13 +16,6 @@ pub struct AxisQuantities {
     pub modes: Modes,
 }
 
-/// Slopes along the derivatives.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Differentiation {
-    Slopes,
-    ValuesAlone,
-}
-
 impl LinearModel {
     /// Quantities at values of the derivatives; `None` where a value is not finite.
     #[must_use]
@@ -32,44 +25,25 @@ impl LinearModel {
         values: &DVector<f64>,
         differentiation: Differentiation,
     ) -> Option<AxisQuantities> {
-        let along = match differentiation {
-            Differentiation::Slopes => &self.slopes[..],
-            Differentiation::ValuesAlone => &[],
-        };
-        let matrix = self.matrix(values);
-        let modes = Modes::of(axis, &matrix, along)?;
+        let solved = self.solved(values, differentiation);
+        let modes = Modes::of(axis, &solved.matrix, &solved.slopes)?;
         let quantities = match axis {
-            Axis::Longitudinal => {
-                let entries = Entries {
-                    matrix,
-                    control: self.control(values),
-                    along,
-                    control_along: &self.control_slopes[..along.len()],
-                };
-                longitudinal(&modes, &entries, self.velocity / self.gravity)
-            }
+            Axis::Longitudinal => longitudinal(&modes, &solved, self.velocity / self.gravity),
             Axis::Lateral => lateral(&modes),
         };
         Some(AxisQuantities { quantities, modes })
     }
 }
 
-/// Entries of A and B with their slopes.
-struct Entries<'a> {
-    matrix: Matrix,
-    control: Vector,
-    along: &'a [Matrix],
-    control_along: &'a [Vector],
-}
-
-impl Entries<'_> {
+impl Solved {
+    /// Entry of A with its slopes.
     fn a(&self, i: usize, j: usize) -> Dual {
-        let slopes = self.along.iter().map(|m| m[(i, j)]);
+        let slopes = self.slopes.iter().map(|m| m[(i, j)]);
         Dual::new(self.matrix[(i, j)], slopes.collect())
     }
 
     fn b(&self, i: usize) -> Dual {
-        let slopes = self.control_along.iter().map(|m| m[i]);
+        let slopes = self.control_slopes.iter().map(|m| m[i]);
         Dual::new(self.control[i], slopes.collect())
     }
 
@@ -96,7 +70,7 @@ impl Entries<'_> {
 
 fn longitudinal(
     modes: &Modes,
-    entries: &Entries,
+    entries: &Solved,
     velocity_over_gravity: f64,
 ) -> Vec<(Quantity, Dual)> {
     let (fast, slow) = (modes.fast_pair(), modes.slow_pair());

@@ -30,6 +30,22 @@ impl AirData {
         }
     }
 
+    /// α̇, rad/s, of a velocity relative to still air that changes by this rate, both in body axes.
+    #[must_use]
+    pub fn alpha_rate(relative: &Vector3<f64>, rate: &Vector3<f64>) -> f64 {
+        let (u, w) = (relative.x, relative.z);
+        (u * rate.z - w * rate.x) / (u * u + w * w).max(f64::MIN_POSITIVE)
+    }
+
+    /// α̇, rad/s, where the loads depend on it: `implied` is the α̇ of the motion under the loads at another
+    /// one, on a straight line.
+    #[must_use]
+    pub fn alpha_rate_in_balance(mut implied: impl FnMut(f64) -> f64) -> f64 {
+        let at_zero = implied(0.0);
+        let slope = implied(1.0) - at_zero;
+        at_zero / (1.0 - slope)
+    }
+
     /// Velocity relative to the air in body axes from speed and flow angles, rad.
     #[must_use]
     pub fn velocity(speed_ft_s: f64, alpha: f64, beta: f64) -> Vector3<f64> {

@@ -124,6 +124,7 @@ impl Flown {
             ("Cn_abs_beta", Coefficient::Cn, "abs(beta)", 3e-4),
             ("Cl_mach_r", Coefficient::Cl, "mach * r", 0.2),
             ("CA_V", Coefficient::CA, "velocity_ft_s", 1e-5),
+            ("Cm_alpha_dot", Coefficient::Cm, "alpha_dot", -4.0),
         ] {
             self.config.buildup.derivatives.push(Derivative {
                 name: name.into(),
@@ -348,7 +349,10 @@ fn the_grammar_sees_what_is_out_of_order() {
     }
 }
 
-/// A state of flight with every regressor at work.
+/// Rate of the angle of attack in every state, rad/s.
+const ALPHA_DOT: f64 = 0.17;
+
+/// States of flight with every regressor at work.
 fn states() -> Vec<(f64, f64, Vector3<f64>)> {
     vec![
         (12.3, 2.0, Vector3::new(0.3, -0.1, 0.05)),
@@ -389,8 +393,13 @@ fn the_jsbsim_section_gives_the_forces_and_moments_of_the_build_up() {
             mach: 0.3,
             qbar_psf: 55.0,
         };
-        let (force, moment) =
-            truth.loads(a, &truth.values(alpha_deg, 0.3), &air, &rates, &deflections);
+        let (force, moment) = truth.loads(
+            a,
+            &truth.values(alpha_deg, 0.3),
+            &air,
+            (&rates, ALPHA_DOT),
+            &deflections,
+        );
         let mut properties: BTreeMap<&str, f64> = BTreeMap::from([
             ("aero/alpha-deg", alpha_deg),
             ("aero/beta-deg", beta_deg),
@@ -399,6 +408,7 @@ fn the_jsbsim_section_gives_the_forces_and_moments_of_the_build_up() {
             ("velocities/p-aero-rad_sec", rates.x),
             ("velocities/q-aero-rad_sec", rates.y),
             ("velocities/r-aero-rad_sec", rates.z),
+            ("aero/alphadot-rad_sec", ALPHA_DOT),
             ("velocities/mach", 0.3),
             ("velocities/vt-fps", 310.0),
             ("aero/qbar-psf", 55.0),

@@ -65,14 +65,21 @@ impl Aerodynamics {
         self.buildup.derivatives.iter().map(value).collect()
     }
 
-    /// Force, lbf, and moment about the c.g., ft lbf, in body axes, at rates relative to the air.
+    /// True where the loads depend on the rate of the angle of attack.
+    #[must_use]
+    pub fn have_lag(&self) -> bool {
+        self.buildup.lags().next().is_some()
+    }
+
+    /// Force, lbf, and moment about the c.g., ft lbf, in body axes, at rates relative to the air, and at a
+    /// rate of the angle of attack, rad/s.
     #[must_use]
     pub fn loads(
         &self,
         aircraft: &Aircraft,
         values: &[f64],
         air: &AirData,
-        rates: &Vector3<f64>,
+        (rates, alpha_rate): (&Vector3<f64>, f64),
         surfaces: &[f64],
     ) -> (Vector3<f64>, Vector3<f64>) {
         let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
@@ -93,6 +100,7 @@ impl Aerodynamics {
             Regressor::RollRate => rates.x * span * per_speed,
             Regressor::PitchRate => rates.y * chord * per_speed,
             Regressor::YawRate => rates.z * span * per_speed,
+            Regressor::AlphaRate => alpha_rate * chord * per_speed,
             Regressor::Surface(name) | Regressor::Vane(name) => signal(name),
             _ => 1.0,
         };

@@ -88,4 +88,4 @@ impl Simulator {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -71,6 +71,26 @@ impl Plant {
         inputs: &PlantInputs,
         frozen: Option<&[f64]>,
     ) -> PlantOutputs {
+        let at = |alpha_rate: f64| self.evaluate_at(alpha_rate, state, inputs, frozen);
+        if !self.aerodynamics.have_lag() {
+            return at(0.0);
+        }
+        let gust = inputs.gust.velocity;
+        let implied = |alpha_rate: f64| {
+            let rate = at(alpha_rate).rate.velocity + state.rates.cross(&gust);
+            AirData::alpha_rate(&(state.velocity - gust), &rate)
+        };
+        at(AirData::alpha_rate_in_balance(implied))
+    }
+
+    /// Plant where the loads see this α̇, rad/s.
+    fn evaluate_at(
+        &self,
+        alpha_rate: f64,
+        state: &BodyState,
+        inputs: &PlantInputs,
+        frozen: Option<&[f64]>,
+    ) -> PlantOutputs {
         let loading = Loading::at_mass(&self.loadings, inputs.mass_slug);
         let air = AirData::new(&(state.velocity - inputs.gust.velocity), state.position.z);
         let values = frozen.map_or_else(
@@ -81,7 +101,7 @@ impl Plant {
             &self.aircraft,
             &values,
             &air,
-            &(state.rates - inputs.gust.rates),
+            (&(state.rates - inputs.gust.rates), alpha_rate),
             &inputs.surfaces,
         );
         let thrust = self.aircraft.thrust(inputs.thrust_lbf, loading.cg());

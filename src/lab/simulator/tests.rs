@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use approx::assert_abs_diff_eq;
+use approx::{assert_abs_diff_eq, assert_relative_eq};
 use nalgebra::{SVector, Vector3};
 
 use super::gust::Gust;
@@ -13,20 +13,22 @@ use super::{
     Card, FlownManeuver, Instrument, Instruments, Program, Simulator, Turbulence, TurbulenceModel,
     sensors,
 };
+use crate::aero::wind_tunnel::TunnelPoint;
+use crate::aero::{Coefficient, Derivative, Regressor};
 use crate::aircraft::ThrustLine;
 use crate::dynamics::{Equations, Lateral, Longitudinal, Motion};
 use crate::earth::gravity_ft_s2;
 use crate::estimate::{self, Context, Estimated, Method};
 use crate::flight::{Record, signal};
 use crate::lab::campaign::SimulatedCampaign;
-use crate::maneuver::Maneuver;
+use crate::maneuver::{Maneuver, Status};
 use crate::numerics::random::RandomStream;
 use crate::rigid_body::{AirData, BodyState, Euler};
 use crate::surfaces::{self, Basis};
 use crate::tables::Outcome;
 use crate::units::DEG;
 
-fn shipped_campaign() -> SimulatedCampaign {
+pub(crate) fn shipped_campaign() -> SimulatedCampaign {
     SimulatedCampaign::load(Path::new("pipelines/harv/cards.yaml")).unwrap()
 }
 
@@ -104,11 +106,12 @@ fn disagreement(campaign: &SimulatedCampaign, random: &mut RandomStream) -> (f64
     let values = plant
         .aerodynamics
         .values(outputs.air.alpha * DEG, outputs.air.mach);
+    let alpha_rate = AirData::alpha_rate(&state.velocity, &outputs.rate.velocity);
     let (force, moment) = plant.aerodynamics.loads(
         aircraft,
         &values,
         &outputs.air,
-        &state.rates,
+        (&state.rates, alpha_rate),
         &inputs.surfaces,
     );
     let area = outputs.air.qbar_psf * aircraft.wing_area_ft2;
@@ -137,6 +140,7 @@ fn disagreement(campaign: &SimulatedCampaign, random: &mut RandomStream) -> (f64
     let speed = v.norm();
     let across = v.x.hypot(v.z);
     let alpha_dot = (v.x * v_dot.z - v.z * v_dot.x) / across.powi(2);
+    let implied = Longitudinal::alpha_rate(aircraft, &motion);
     let beta_dot = (v_dot.y * speed - v.y * v.dot(&v_dot) / speed) / (speed * across);
     let (phi_dot, theta_dot) = state.euler_rates(&outputs.rate);
     let rates = [
@@ -146,7 +150,7 @@ fn disagreement(campaign: &SimulatedCampaign, random: &mut RandomStream) -> (f64
             lateral[1] - w_dot.x,
             lateral[2] - w_dot.z,
         ]),
-        SVector::from([lateral[3] - phi_dot, 0.0, 0.0]),
+        SVector::from([lateral[3] - phi_dot, implied - alpha_dot, 0.0]),
     ];
     let readings = sensors::readings(aircraft, &state, &inputs, &outputs);
     let signal = |name: &str| readings.iter().find(|(n, _)| *n == name).unwrap().1;
@@ -182,14 +186,17 @@ fn disagreement(campaign: &SimulatedCampaign, random: &mut RandomStream) -> (f64
 fn the_equations_of_simulator_and_estimator_agree_to_twelve_digits() {
     // Typically 2e-15: both include sideslip, rotation about all axes, the engines' angular momentum, the
     // thrust's line, I_xz and the sensors' arms without approximation.
-    let mut campaign = shipped_campaign();
     let mut random = RandomStream::new(5, "agreement");
     let inclined = ThrustLine {
         x_ft: 55.0,
         z_ft: 4.0,
         inclination_deg: 6.0,
     };
-    for line in [None, Some(inclined)] {
+    for (line, mut campaign) in [
+        (None, shipped_campaign()),
+        (Some(inclined), shipped_campaign()),
+        (Some(inclined), with_lag(shipped_campaign())),
+    ] {
         campaign.config.aircraft.thrust_line = line;
         campaign.simulator.plant.aircraft.thrust_line = line;
         for _ in 0..500 {
@@ -467,16 +474,20 @@ fn estimated(campaign: &SimulatedCampaign, flown: &FlownManeuver) -> Estimated {
     )
 }
 
-#[test]
-fn without_noise_the_estimates_are_the_derivatives_that_were_flown() {
-    // The estimator interpolates surfaces linearly between samples. Control steps at the sampling
-    // rate make that exact, and the derivatives return to 0.1%.
+/// A campaign whose surfaces are linear between samples, as the estimator takes them: control steps are at
+/// the sampling rate.
+fn with_linear_surfaces() -> SimulatedCampaign {
     let folder = tempfile::tempdir().unwrap();
     let cards = folder.path().join("cards.yaml");
     let text = fs::read_to_string("pipelines/harv/cards.yaml").unwrap();
     assert!(text.contains("control_hz: 80"));
     fs::write(&cards, text.replace("control_hz: 80", "control_hz: 40")).unwrap();
-    let campaign = SimulatedCampaign::load(&cards).unwrap();
+    SimulatedCampaign::load(&cards).unwrap()
+}
+
+#[test]
+fn without_noise_the_estimates_are_the_derivatives_that_were_flown() {
+    let campaign = with_linear_surfaces();
     for (class, alpha, derivatives) in [
         (
             "SSIMD_LON",
@@ -535,6 +546,57 @@ fn without_noise_the_estimates_are_the_derivatives_that_were_flown() {
             );
         }
     }
+}
+
+/// Derivatives along α̇ of a campaign with lag.
+const LAG: [(&str, Coefficient, f64); 2] = [
+    ("CN_alpha_dot", Coefficient::CN, 4.0),
+    ("Cm_alpha_dot", Coefficient::Cm, -6.0),
+];
+
+/// A campaign whose aircraft has derivatives along α̇, estimated in every longitudinal class.
+pub(crate) fn with_lag(mut campaign: SimulatedCampaign) -> SimulatedCampaign {
+    let config = &mut campaign.config;
+    for (name, coefficient, value) in LAG {
+        config.buildup.derivatives.push(Derivative {
+            name: name.into(),
+            coefficient,
+            regressor: Regressor::AlphaRate,
+        });
+        for alpha_deg in [0.0, 70.0] {
+            let point = TunnelPoint::new(alpha_deg, value);
+            config.tunnel.insert(name, point);
+        }
+        for class in &mut config.classes {
+            class.statuses.insert(name.into(), Status::Estimated);
+        }
+    }
+    let settings = campaign.simulator.settings().clone();
+    let truth = config.tunnel.clamped();
+    campaign.simulator =
+        Simulator::new(&config.aircraft, &config.buildup, truth, settings).unwrap();
+    campaign
+}
+
+#[test]
+fn a_lag_is_told_from_the_damping_in_pitch() {
+    let campaign = with_lag(with_linear_surfaces());
+    let card = campaign.card("SSIMD_LON", 20.0).unwrap();
+    let flown = campaign.simulator.fly(&card).unwrap();
+    let estimated = estimated(&campaign, &flown);
+    assert_eq!(estimated.fit.outcome, Outcome::Converged);
+    let truths = flown.truth.iter();
+    for truth in truths.filter(|t| ["Cm_q", "Cm_alpha_dot"].contains(&t.derivative.as_str())) {
+        let mut rows = estimated.estimates.iter();
+        let row = rows.find(|e| e.derivative == truth.derivative).unwrap();
+        assert_relative_eq!(row.value.unwrap(), truth.value, max_relative = 0.01);
+    }
+    let mut pairs = estimated.correlations.iter();
+    assert!(pairs.any(|pair| {
+        [&pair.first, &pair.second]
+            .map(String::as_str)
+            .contains(&"alpha_dot")
+    }));
 }
 
 #[test]

@@ -11,7 +11,7 @@ use super::chunking::{WIDEST_STRIDE, ZERO_POINTS};
 use crate::aero::{Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
-use crate::dynamics::{COEFFICIENTS, Equations};
+use crate::dynamics::{COEFFICIENTS, Equations, Longitudinal, Motion};
 use crate::flight::signal;
 use crate::units::DEG;
 
@@ -190,6 +190,7 @@ impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
             Regressor::RollRate => self.reduced_rate(signal::P, aircraft.span_ft),
             Regressor::PitchRate => self.reduced_rate(signal::Q, aircraft.chord_ft),
             Regressor::YawRate => self.reduced_rate(signal::R, aircraft.span_ft),
+            Regressor::AlphaRate => self.reduced_alpha_rate(),
             Regressor::Constant => vec![1.0; self.window.len()],
             Regressor::Alpha => motion.flow.iter().map(|[alpha, _]| alpha * DEG).collect(),
             Regressor::Beta => motion.flow.iter().map(|[_, beta]| beta * DEG).collect(),
@@ -203,6 +204,16 @@ impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
                 product(self.measured(first, motion), &self.measured(second, motion))
             }
         }
+    }
+
+    /// α̇ c̄/2V that the measured motion implies.
+    fn reduced_alpha_rate(&self) -> Vec<f64> {
+        let aircraft = self.aircraft;
+        let reduced = |motion: Motion| {
+            let rate = Longitudinal::alpha_rate(aircraft, &motion);
+            rate * aircraft.chord_ft / (2.0 * motion.velocity)
+        };
+        self.window.motion(aircraft).points().map(reduced).collect()
     }
 
     fn reduced_rate(&self, rate: &str, length_ft: f64) -> Vec<f64> {

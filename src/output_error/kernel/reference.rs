@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use crate::aero::{Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
-use crate::dynamics::{COEFFICIENTS, Equations, Motion, OUTPUTS};
+use crate::dynamics::{COEFFICIENTS, Equations, Longitudinal, Motion, OUTPUTS};
 use crate::numerics::runge_kutta::{self, POINT};
 use crate::output_error::case::{Case, InitialState, Measurements, Model};
 use crate::units::DEG;
@@ -238,6 +238,9 @@ impl<'a, const NX: usize, E: Equations<NX>> Reference<'a, NX, E> {
             Regressor::RollRate => m.rates[0] * aircraft.span_ft / (2.0 * m.velocity),
             Regressor::PitchRate => m.rates[1] * aircraft.chord_ft / (2.0 * m.velocity),
             Regressor::YawRate => m.rates[2] * aircraft.span_ft / (2.0 * m.velocity),
+            Regressor::AlphaRate => {
+                Longitudinal::alpha_rate(aircraft, m) * aircraft.chord_ft / (2.0 * m.velocity)
+            }
             Regressor::Surface(name) | Regressor::Vane(name) => {
                 self.window.signal(name)[point] * derivative.coefficient_factor(aircraft, m.qbar)
             }
@@ -264,8 +267,8 @@ mod tests {
 
     use super::*;
     use crate::aero::Axis;
+    use crate::dynamics::Lateral;
     use crate::dynamics::tests::aircraft;
-    use crate::dynamics::{Lateral, Longitudinal};
     use crate::output_error::likelihood::cost::{Sums, sums};
     use crate::output_error::tests::{
         Noise, SAMPLES, TABLE, biases, measure, nothing_measured, truth, window, with_products,

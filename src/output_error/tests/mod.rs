@@ -83,6 +83,7 @@ pub(crate) fn with_products(axis: Axis) -> Vec<(Derivative, f64)> {
             ("alpha * alpha", Cm, -2e-5),
             ("q * alpha", Cm, -0.05),
             ("velocity_ft_s", CN, 1e-5),
+            ("alpha_dot", Cm, -3.0),
         ],
         Axis::Lateral => vec![
             ("abs(beta)", Cn, 1e-4),

@@ -5,5 +5,6 @@ mod dutch_roll;
 mod fixture;
 mod free_run;
 mod judgement;
+mod lag;
 mod repeat_flight;
 mod wrong_models;

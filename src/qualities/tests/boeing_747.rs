@@ -4,15 +4,16 @@
 //! edition, Tables 6.2 and 6.7, which are those of the report. Modes: the report's own.
 
 use approx::assert_relative_eq;
-use nalgebra::{DMatrix, SMatrix};
+use nalgebra::{DMatrix, DVector, SMatrix, Vector3};
 
 use super::fixture;
 use crate::aero::{Axis, Condition};
 use crate::aircraft::{Aircraft, Position};
 use crate::numerics::dual::Dual;
-use crate::qualities::linear::{ByCoefficient, LinearModel, Matrix, Vector};
+use crate::qualities::linear::{
+    ByCoefficient, Differentiation, Lag, LinearModel, Matrix, Solved, Vector,
+};
 use crate::qualities::modes::Modes;
-use crate::qualities::quantities::Differentiation;
 use crate::qualities::trim::Trim;
 use crate::qualities::{lateral, longitudinal};
 use crate::tables::Quantity;
@@ -62,22 +63,12 @@ const X: [f64; 4] = [-1.358e2, 2.758e2, 0.0, 0.0];
 const Z: [f64; 4] = [-1.778e3, -6.188e3, -1.017e5, 1.308e2];
 const M: [f64; 4] = [3.581e3, -3.515e4, -1.122e7, -3.826e3];
 
-/// Slopes of CN, Cm, CA along velocity, α, q, θ. Lag in ẇ is a slope along the states that move w.
+/// Slopes of CN, Cm, CA along velocity, α, q, θ.
 fn by_state() -> ByState {
     let (aircraft, trim) = (aircraft(), trim());
     let force = trim.qbar * aircraft.wing_area_ft2;
     let normal_force = trim.normal_force(&aircraft, trim.thrust(&aircraft, DRAG));
-    let apparent = MASS - Z[3];
-    let w_dot = [
-        Z[0] / apparent,
-        Z[1] * VELOCITY / apparent,
-        (Z[2] + MASS * VELOCITY) / apparent,
-        0.0,
-    ];
-    let of = |row: [f64; 4]| {
-        let plain = [row[0], row[1] * VELOCITY, row[2], 0.0];
-        std::array::from_fn::<f64, 4, _>(|i| plain[i] + row[3] * w_dot[i])
-    };
+    let of = |row: [f64; 4]| [row[0], row[1] * VELOCITY, row[2], 0.0];
     let (x, z, m) = (of(X), of(Z), of(M));
     let mut slopes = ByState::zeros();
     for i in 0..4 {
@@ -91,6 +82,29 @@ fn by_state() -> ByState {
     slopes
 }
 
+/// Longitudinal equations, in which all derivatives are times one value: one.
+fn longitudinal_equations() -> LinearModel {
+    let slopes = longitudinal::slopes(&aircraft(), &trim(), DRAG);
+    let force = trim().qbar * aircraft().wing_area_ft2;
+    let by_w_dot = Vector3::new(-Z[3], M[3] / aircraft().chord_ft, -X[3]) / force;
+    LinearModel {
+        rigid: slopes.by_state + slopes.by_coefficient * by_state(),
+        slopes: vec![Matrix::zeros()],
+        control_slopes: vec![control()],
+        lag: Some(Lag {
+            alpha: 1,
+            slopes: vec![slopes.by_coefficient * by_w_dot * VELOCITY],
+        }),
+        velocity: VELOCITY,
+        gravity: GRAVITY,
+    }
+}
+
+fn at_one(equations: &LinearModel) -> Solved {
+    let one = DVector::from_element(1, 1.0);
+    equations.solved(&one, Differentiation::ValuesAlone)
+}
+
 fn modes(axis: Axis, rigid: Matrix, by_coefficient: ByCoefficient, by_state: ByState) -> Modes {
     let matrix = rigid + by_coefficient * by_state;
     Modes::of(axis, &matrix, &[]).unwrap()
@@ -102,13 +116,8 @@ fn assert_near(found: &Dual, expected: f64, share: f64) {
 
 #[test]
 fn the_longitudinal_modes_are_those_of_the_report() {
-    let slopes = longitudinal::slopes(&aircraft(), &trim(), DRAG);
-    let modes = modes(
-        Axis::Longitudinal,
-        slopes.by_state,
-        slopes.by_coefficient,
-        by_state(),
-    );
+    let matrix = at_one(&longitudinal_equations()).matrix;
+    let modes = Modes::of(Axis::Longitudinal, &matrix, &[]).unwrap();
     let (short_period, phugoid) = (modes.fast_pair(), modes.slow_pair());
     assert_near(&short_period.frequency(), 0.964, 0.005);
     assert_near(&short_period.damping(), 0.387, 0.015);
@@ -148,31 +157,16 @@ fn the_lateral_modes_are_those_of_the_report() {
 /// Control derivatives of the elevator, per rad.
 const ELEVATOR: [f64; 3] = [-3.717, -3.551e5, -3.839e7];
 
+fn control() -> Vector {
+    let [x, z, m] = ELEVATOR;
+    Vector::from([x / MASS, z / (MASS * VELOCITY), m / trim().iy, 0.0])
+}
+
 #[test]
 fn the_zeros_and_the_load_factor_are_those_of_the_transfer_functions() {
-    let slopes = longitudinal::slopes(&aircraft(), &trim(), DRAG);
-    let apparent = MASS - Z[3];
-    let w_dot = ELEVATOR[1] / apparent;
-    let control = Vector::from([
-        ELEVATOR[0] / MASS,
-        w_dot / VELOCITY,
-        (ELEVATOR[2] + M[3] * w_dot) / 0.331e8,
-        0.0,
-    ]);
-    let linear = LinearModel {
-        rigid: slopes.by_state + slopes.by_coefficient * by_state(),
-        slopes: vec![],
-        control_slopes: vec![],
-        velocity: VELOCITY,
-        gravity: GRAVITY,
-    };
-    let steady = LinearModel {
-        control_slopes: vec![control],
-        slopes: vec![Matrix::zeros()],
-        ..linear
-    };
-    let one = nalgebra::DVector::from_element(1, 1.0);
-    let found = steady
+    let equations = longitudinal_equations();
+    let one = DVector::from_element(1, 1.0);
+    let found = equations
         .quantities(Axis::Longitudinal, &one, Differentiation::ValuesAlone)
         .unwrap();
     let value = |quantity| {
@@ -182,7 +176,9 @@ fn the_zeros_and_the_load_factor_are_those_of_the_transfer_functions() {
     // Where the transfer function is zero, the system matrix is singular.
     let zero = -value(Quantity::AttitudeZero);
     let mut system = DMatrix::<f64>::zeros(5, 5);
-    let a = steady.matrix(&one);
+    let Solved {
+        matrix: a, control, ..
+    } = at_one(&equations);
     for i in 0..4 {
         for j in 0..4 {
             system[(i, j)] = if i == j { zero } else { 0.0 } - a[(i, j)];

@@ -9,8 +9,9 @@ use super::fixture::{aircraft, linear, linear_of, linear_with, posterior, trim};
 use crate::aero::{Axis, Buildup, Coefficient, Derivative, Regressor};
 use crate::aircraft::{Aircraft, ThrustLine};
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
-use crate::qualities::linear::{AxisStates, Controls, Effect, Flight, Matrix, Vector};
-use crate::qualities::quantities::Differentiation;
+use crate::qualities::linear::{
+    AxisStates, Controls, Differentiation, Effect, Flight, Lag, LinearModel, Matrix, Vector,
+};
 use crate::tables::Quantity;
 use crate::units::DEG;
 
@@ -71,6 +72,11 @@ impl Pitching {
             q,
         ])
     }
+}
+
+fn matrix(linear: &LinearModel, posterior: &LocalPosterior) -> Matrix {
+    let solved = linear.solved(&posterior.mean, Differentiation::ValuesAlone);
+    solved.matrix
 }
 
 /// The fighter's posterior with a slope of CN along Mach number.
@@ -143,7 +149,10 @@ fn assert_matrix_is_that_of_differences(aircraft: &Aircraft) {
         (pitching.rates(&(start + step))[i] - pitching.rates(&(start - step))[i]) / (2.0 * h)
     });
     let none = BTreeMap::new();
-    let found = linear_of(aircraft, Axis::Longitudinal, &posterior, &none).matrix(&posterior.mean);
+    let found = matrix(
+        &linear_of(aircraft, Axis::Longitudinal, &posterior, &none),
+        &posterior,
+    );
     assert_relative_eq!(found, differences, epsilon = 1e-7, max_relative = 1e-6);
     // Each entry that the equations have is exercised.
     assert!((0..4).all(|i| found[(0, i)].abs() > 1e-4 || i == 2));
@@ -213,6 +222,69 @@ fn products_and_magnitudes_have_the_slopes_of_their_factors_at_trim() {
 }
 
 #[test]
+fn a_lag_acts_over_the_chord_and_its_product_with_the_factor_at_trim() {
+    let reduced = aircraft().chord_ft / (2.0 * 360.0);
+    for (regressor, expected) in [
+        ("alpha_dot", reduced),
+        ("alpha_dot * alpha", 15.0 * reduced),
+        ("q", 0.0),
+    ] {
+        let found = effect(regressor);
+        assert_relative_eq!(found.by_alpha_rate, expected, max_relative = 1e-12);
+    }
+    assert_relative_eq!(effect("alpha_dot").at_trim, 0.0);
+}
+
+#[test]
+fn equations_with_a_lag_are_solved_with_their_slopes() {
+    let posterior = posterior(Axis::Longitudinal, 0.1);
+    let explicit = linear(Axis::Longitudinal, &posterior);
+    let values = &posterior.mean;
+    // Effects of every size and sign on every rate.
+    let effect = |i: usize| {
+        let size = if values[i] == 0.0 {
+            0.03
+        } else {
+            0.03 / values[i]
+        };
+        Vector::from_fn(|state, _| size * (1.0 + i as f64 + 3.0 * state as f64).sin())
+    };
+    let alpha = 1;
+    let with_lag = LinearModel {
+        lag: Some(Lag {
+            alpha,
+            slopes: (0..values.len()).map(effect).collect(),
+        }),
+        ..explicit.clone()
+    };
+    let found = with_lag.solved(values, Differentiation::Slopes);
+    let plain = explicit.solved(values, Differentiation::ValuesAlone);
+    let lag = (0..values.len()).fold(Vector::zeros(), |sum, i| sum + effect(i) * values[i]);
+    let implied = plain.matrix + lag * found.matrix.row(alpha);
+    assert_relative_eq!(found.matrix, implied, max_relative = 1e-12, epsilon = 1e-12);
+    let implied = plain.control + lag * found.control[alpha];
+    assert_relative_eq!(found.control, implied, max_relative = 1e-12);
+    for i in 0..values.len() {
+        let step = 1e-5 * values[i].abs().max(1e-3);
+        let at = |by: f64| {
+            let mut moved = values.clone();
+            moved[i] += by;
+            with_lag.solved(&moved, Differentiation::ValuesAlone)
+        };
+        let (up, down) = (at(step), at(-step));
+        let slope = (up.matrix - down.matrix) / (2.0 * step);
+        assert_relative_eq!(found.slopes[i], slope, max_relative = 1e-6, epsilon = 1e-6);
+        let slope = (up.control - down.control) / (2.0 * step);
+        assert_relative_eq!(
+            found.control_slopes[i],
+            slope,
+            max_relative = 1e-6,
+            epsilon = 1e-6
+        );
+    }
+}
+
+#[test]
 fn feedback_is_gain_times_the_surface_s_effect() {
     let gains = BTreeMap::from([
         (
@@ -228,8 +300,8 @@ fn feedback_is_gain_times_the_surface_s_effect() {
     let pressure = trim.qbar * aircraft.wing_area_ft2;
     let change = |axis| {
         let posterior = posterior(axis, 0.1);
-        linear_with(axis, &posterior, &gains).matrix(&posterior.mean)
-            - linear(axis, &posterior).matrix(&posterior.mean)
+        matrix(&linear_with(axis, &posterior, &gains), &posterior)
+            - matrix(&linear(axis, &posterior), &posterior)
     };
     // deg per deg/s, and a moment per deg: 0.3 · (−0.012 · 57.3) · q̄Sc̄/I_y.
     let expected = 0.3 * -0.012 * DEG * pressure * aircraft.chord_ft / trim.iy;

@@ -12,7 +12,7 @@ use crate::numerics::random::RandomStream;
 use crate::numerics::root::{EXACT, root};
 use crate::qualities::analysis::AxisAnalysis;
 use crate::qualities::levels::level;
-use crate::qualities::quantities::Differentiation;
+use crate::qualities::linear::Differentiation;
 use crate::tables::{DeviationBasis, Level, Quantity};
 
 /// A draw from a Gaussian.
