@@ -68,9 +68,8 @@ impl Buildup {
         let names: Vec<&str> = self.lags().map(|d| d.name.as_str()).collect();
         (!names.is_empty()).then(|| {
             format!(
-                "{}: a constant along `alpha_dot` stands for a lag of the flow and is right for slow motion alone; q and `alpha_dot` move \
-                 together in pulses of pitch (`correlations` says how much): without surfaces that lift and do not pitch, their sum alone \
-                 is known",
+                "{}: a constant along `alpha_dot` stands for a lag of the flow and is right for slow motion alone; flight shows the sum \
+                 with the derivative along q, so what is held is as right as the tunnel",
                 names.join(", ")
             )
         })

@@ -425,6 +425,20 @@ fn statuses(config: &Config, class: &Class, source: &Source) -> Result<()> {
         .statuses
         .iter()
         .chain(class.overrides.iter().flat_map(|o| &o.statuses));
+    for (name, _) in all
+        .clone()
+        .filter(|(_, status)| **status == Status::Estimated)
+    {
+        let derivative = config.buildup.derivative(name);
+        if derivative.is_some_and(|d| d.regressor.has_alpha_rate()) {
+            let what = format!(
+                "class {}: `{name}` is estimated; a derivative along `alpha_dot` is held or inactive, since its rate is the measured one, and \
+                 noise alone tells it from the damping in pitch (docs/method.md, terms of the model)",
+                class.name
+            );
+            return Err(source.error(name, what));
+        }
+    }
     for (name, _) in all.filter(|(_, status)| **status == Status::Held) {
         if biases.contains(&name.as_str()) {
             return Err(source.error(
@@ -657,6 +671,10 @@ fn stages(config: &Config, source: &Source) -> Result<()> {
         let what = "`joint` needs `hold: table`: by evidence each maneuver chooses for itself what to hold, and \
                     maneuvers that share derivatives must hold the same";
         return Err(source.error_under("estimate", "joint", what));
+    }
+    if config.buildup.lags().next().is_some() && config.estimate.hold == Hold::Evidence {
+        let what = "`hold: evidence` frees derivatives along `alpha_dot`, which must stay held: `hold: table` holds them";
+        return Err(source.error_under("estimate", "hold", what));
     }
     segment(config, source)?;
     let angles = config

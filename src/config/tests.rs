@@ -251,6 +251,42 @@ fn a_held_derivative_without_a_tunnel_table_is_named() {
     );
 }
 
+/// Edit of the model that makes a derivative along q one along α̇.
+const LAG_OF_CA: [&str; 2] = [
+    "coefficient: CA, regressor: q }",
+    "coefficient: CA, regressor: alpha_dot }",
+];
+
+#[test]
+fn a_lag_is_not_held_by_evidence() {
+    let copy = Copy::new();
+    copy.spoil("model.yaml", LAG_OF_CA[0], LAG_OF_CA[1]);
+    for class in ["3211", "olon", "ppss", "ppsstv", "ssimd_lon"] {
+        let file = format!("maneuvers/{class}.yaml");
+        copy.spoil(&file, "CA_alpha, CA_q,", "CA_alpha,");
+        copy.spoil(&file, "held: [", "held: [CA_q, ");
+    }
+    let config = copy.load(Overrides::default()).unwrap();
+    assert!(config.buildup.lag_warning().unwrap().starts_with("CA_q: "));
+    copy.spoil("pipeline.yaml", "  hold: table\n", "  hold: evidence\n");
+    let e = copy.error();
+    assert!(
+        e.contains("derivatives along `alpha_dot`, which must stay held"),
+        "{e}"
+    );
+}
+
+#[test]
+fn a_lag_is_never_estimated() {
+    let copy = Copy::new();
+    copy.spoil("model.yaml", LAG_OF_CA[0], LAG_OF_CA[1]);
+    let e = copy.error();
+    assert!(
+        e.contains("`CA_q` is estimated; a derivative along `alpha_dot` is held or inactive"),
+        "{e}"
+    );
+}
+
 #[test]
 fn a_bias_is_never_held() {
     let copy = Copy::new();
