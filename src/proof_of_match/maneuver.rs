@@ -215,12 +215,14 @@ impl<'a> Flight<'a> {
 
     fn matched(&self) -> Matched {
         let posterior = self.trimmed(self.basis.posterior);
-        let effects = self.effects(&posterior);
+        let mean = self.simulated(&posterior);
+        let effects = self.effects(&posterior, &mean.run);
         let mut matched = Matched::default();
         for (model, database) in self.basis.models {
-            let own = (*model != ModelSource::Posterior).then(|| self.trimmed(database));
-            let simulated = self.simulated(own.as_ref().unwrap_or(&posterior));
-            self.judge(*model, &simulated, effects.as_ref(), &mut matched);
+            let is_other = *model != ModelSource::Posterior;
+            let own = is_other.then(|| self.simulated(&self.trimmed(database)));
+            let simulated = own.as_ref().unwrap_or(&mean);
+            self.judge(*model, simulated, effects.as_ref(), &mut matched);
         }
         matched
     }
@@ -240,12 +242,12 @@ impl<'a> Flight<'a> {
     }
 
     /// Effects of the posterior's deviations and of the errors of its start.
-    fn effects(&self, posterior: &Trimmed) -> Option<Effects> {
+    fn effects(&self, posterior: &Trimmed, mean: &FreeRun) -> Option<Effects> {
         let basis = self.basis;
         let model = (basis.buildup, self.maneuver.axis);
-        let Trimmed { simulation, start } = posterior;
-        let about = (self.local?, self.modes.as_ref());
-        repeat_flight::effects(simulation, start, about, model, basis.specification.draws)
+        let flown = (&posterior.simulation, &posterior.start);
+        let known = (self.local?, self.modes.as_ref());
+        repeat_flight::effects(flown, mean, known, model, basis.specification.draws)
     }
 
     /// Free run and Dutch roll of a trimmed model.

@@ -2,6 +2,10 @@
 //!
 //! An accelerometer at r from the c.g. measures f + ω̇ × r + ω × (ω × r); a vane measures the local
 //! flow, which turns about the c.g. with the aircraft's rates relative to the air.
+#![expect(
+    clippy::inline_always,
+    reason = "compiled into free runs for the processor at hand"
+)]
 
 use nalgebra::Vector3;
 
@@ -41,6 +45,7 @@ pub struct Readings {
 
 impl Instant {
     /// Readings of an aircraft's sensors.
+    #[inline(always)]
     #[must_use]
     pub fn readings(&self, aircraft: &Aircraft) -> Readings {
         let sensors = &aircraft.sensors;
