@@ -99,9 +99,12 @@ impl DiscreteGusts {
         -random.uniform().ln() / self.per_s
     }
 
-    /// Velocity and gradient of all gusts at a place.
+    /// Velocity and gradient of all gusts at a place. The edges ascend.
     fn sum(&self, edges: &[(f64, f64)], place_ft: f64) -> (f64, f64) {
-        edges
+        let length_ft = 2.0 * self.gradient_ft;
+        let first = edges.partition_point(|(edge_ft, _)| place_ft - edge_ft > length_ft);
+        let begun = edges[first..].partition_point(|(edge_ft, _)| place_ft - edge_ft >= 0.0);
+        edges[first..][..begun]
             .iter()
             .map(|(edge_ft, sign)| {
                 one_minus_cosine(sign * self.size_ft_s, self.gradient_ft, place_ft - edge_ft)
