@@ -44,20 +44,16 @@ impl DerivativeTable {
         let derivatives = buildup.derivatives.len();
         let mut values = vec![0.0; nodes * derivatives];
         for (i, derivative) in buildup.derivatives.iter().enumerate() {
-            let source = if model.has(&derivative.name) {
-                model
-            } else {
-                fallback
-            };
+            let name = &derivative.name;
+            let source = model.reader(name).or_else(|| fallback.reader(name));
             let at = |node: usize| {
                 let alpha_deg = first_deg + STEP_DEG * node as f64;
                 let condition = Condition {
                     alpha_deg,
                     ..*condition
                 };
-                source
-                    .at(&derivative.name, &condition)
-                    .map_or(0.0, |v| v.value)
+                let read = source.as_ref().and_then(|table| table.at(&condition));
+                read.map_or(0.0, |v| v.value)
             };
             let mut column: Vec<f64> = (0..nodes).map(at).collect();
             if derivative.regressor == Regressor::Alpha {

@@ -1,15 +1,16 @@
 //! Free run: the rigid body flies from a start with the recorded surfaces, thrust and mass, and nothing
 //! else of the record.
+#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use super::aerodynamics::{AboutTrim, Aerodynamics, COEFFICIENTS, Flow, Trim};
 use super::outputs::{Outputs, outputs};
 use super::recording::Recording;
 use crate::aircraft::Aircraft;
 use crate::numerics::runge_kutta::{self, POINT};
-use crate::rigid_body::{AirData, BodyState, Euler, Instant, Loads, body};
+use crate::rigid_body::{AirData, BodyState, Euler, Instant, Loads, Readings, body};
 use crate::units::DEG;
 use nalgebra::Vector3;
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 
 /// Angle of attack beyond which the aircraft has departed, deg: no build-up has a meaning there.
 const DEPARTURE_DEG: f64 = 90.0;
@@ -98,8 +99,10 @@ impl Simulation<'_> {
                 run.has_departed = true;
                 break;
             }
-            // Without the processor's fused multiplication the vanes' angles take as long as the motion.
-            let readings = Arch::new().dispatch(|| instant.readings(self.aircraft));
+            let readings = Arch::new().dispatch(Sensing {
+                instant: &instant,
+                aircraft: self.aircraft,
+            });
             run.outputs
                 .push(outputs(&readings, instant.air.velocity_ft_s));
             if sample + stride < samples {
@@ -115,6 +118,22 @@ impl Simulation<'_> {
             }
         }
         run
+    }
+}
+
+/// Readings of the sensors, compiled for the processor at hand: without its fused multiplication the vanes'
+/// angles take as long as the motion.
+struct Sensing<'a> {
+    instant: &'a Instant,
+    aircraft: &'a Aircraft,
+}
+
+impl WithSimd for Sensing<'_> {
+    type Output = Readings;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Readings {
+        self.instant.readings(self.aircraft)
     }
 }
 
