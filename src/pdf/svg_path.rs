@@ -4,13 +4,11 @@ use std::fmt::Write;
 
 /// A number with at most two decimals, as short as possible.
 pub fn number(value: f32) -> String {
-    let text = format!("{value:.2}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text.is_empty() || text == "-0" || !value.is_finite() {
-        "0".to_owned()
-    } else {
-        text.to_owned()
+    let rounded = (100.0 * f64::from(value)).round() / 100.0;
+    if rounded == 0.0 || !rounded.is_finite() {
+        return "0".to_owned();
     }
+    rounded.to_string()
 }
 
 /// Converts the data of a path. Arcs must be half circles.
@@ -159,7 +157,13 @@ mod tests {
 
     #[test]
     fn numbers_are_as_short_as_possible() {
-        let written = [0.0, -0.001, 1.5, 12.345, f32::NAN].map(number);
-        assert_eq!(written, ["0", "0", "1.5", "12.35", "0"]);
+        let written = [0.0, -0.001, 1.5, 12.345, -3.0, f32::NAN].map(number);
+        assert_eq!(written, ["0", "0", "1.5", "12.35", "-3", "0"]);
+        for k in -300..300 {
+            let value = 0.37 * k as f32;
+            let plain = format!("{value:.2}");
+            let short = plain.trim_end_matches('0').trim_end_matches('.');
+            assert_eq!(number(value), if k == 0 { "0" } else { short });
+        }
     }
 }
