@@ -697,7 +697,7 @@ fn pilot_controls_and_actuators_of_no_signal_are_answered_with_the_one_that_was_
         "{e}"
     );
     let copy = Copy::new();
-    let line = copy.spoil("pipeline.yaml", "other_axis: 1 ", "other_axis: -1 ");
+    let line = copy.spoil("pipeline.yaml", "other_axis: 0.2 ", "other_axis: -1 ");
     assert_eq!(
         copy.error(),
         format!("pipeline.yaml:{line}: `other_axis` must not be negative, not -1")

@@ -152,8 +152,8 @@ table! {
         pub lead_in_motion: Option<f64> ["1"],
         /// Root mean square of the angle of attack about its mean.
         pub alpha_rms_deg: Option<f64> ["deg"],
-        /// Angular rates of the other axis over those of its own, root mean squares about straight
-        /// lines, so that a steady turn does not count.
+        /// Angular accelerations that the motion of the other axis makes, by the products of rates of
+        /// Euler's equations, over all those of its axis; root mean squares about their means.
         pub other_axis: Option<f64> ["1"],
         /// Root mean square of the axis's angular rate over its noise from sample to sample; the
         /// better one of roll and yaw.

@@ -10,6 +10,7 @@ use crate::flight::record::Series;
 use crate::flight::{Record, signal};
 use crate::maneuver::{Acceptance, Class, Maneuver, Quality};
 use crate::numerics::order_statistics::{SIGMA_PER_MAD, upper_median_in_place};
+use crate::units::RAD;
 
 /// Time before the first input that is left out of the lead-in, s: the detector places a step within
 /// a few samples of the input's begin.
@@ -22,6 +23,10 @@ const AT_STOP: f64 = 0.01;
 /// Share of an actuator's rate from which it counts as at its full rate: it leaves room for the noise
 /// of a difference between two samples.
 const AT_FULL_RATE: f64 = 0.9;
+
+/// Half the time over which a rate is differentiated, s: short beside the aircraft's motion, long enough
+/// that the noise of a gyro makes little of the acceleration.
+const HALF_SPAN_S: f64 = 0.1;
 
 /// Fewest samples of a mean square about a line: two determine the line.
 const FEWEST_SAMPLES: f64 = 3.0;
@@ -47,14 +52,13 @@ pub(super) fn measure(
         .unwrap_or(maneuver.end_s - class.recognition.decay_s);
     let lead_in = *whole.start()..=record.sample_at(first_s - CLEAR_OF_INPUT_S);
     let excited = record.sample_at(first_s)..=record.sample_at(last_s);
-    let (own, other) = rates(class.axis);
+    let own = rates(class.axis);
     let moved = root_mean_square(record, own, &whole, About::Line);
     let before = root_mean_square(record, own, &lead_in, About::Mean);
-    let other_moved = root_mean_square(record, other, &whole, About::Line);
     let measured = Quality {
         lead_in_motion: ratio(before, moved),
         alpha_rms_deg: root_mean_square(record, &[signal::ALPHA_VANE], &whole, About::Mean),
-        other_axis: ratio(other_moved, moved),
+        other_axis: coupling(record, class.axis, &whole),
         signal_to_noise: signal_to_noise(record, own, &whole),
         saturated_share: largest_share(record, limits, &excited, is_at_stop),
         rate_limited_share: largest_share(record, limits, &excited, is_at_full_rate),
@@ -90,13 +94,40 @@ fn outputs_not_recorded(record: &Record, axis: Axis) -> Option<String> {
     (!lacking.is_empty()).then(|| format!("{} is not recorded", lacking.join(", ")))
 }
 
-/// The angular rates of an axis and of the other axis.
-fn rates(axis: Axis) -> (&'static [&'static str], &'static [&'static str]) {
-    let (pitch, roll_and_yaw) = (&[signal::Q][..], &[signal::P, signal::R][..]);
+/// The angular rates of an axis.
+fn rates(axis: Axis) -> &'static [&'static str] {
     match axis {
-        Axis::Longitudinal => (pitch, roll_and_yaw),
-        Axis::Lateral => (roll_and_yaw, pitch),
+        Axis::Longitudinal => &[signal::Q],
+        Axis::Lateral => &[signal::P, signal::R],
     }
+}
+
+/// Angular accelerations that the motion of the other axis makes, over all those of the axis, root mean
+/// squares about their means.
+///
+/// Euler's equations couple the axes by products of rates: q̇ by p r, ṗ by q r, ṙ by p q. The moments of
+/// inertia weigh a product by at most 1 (triangle inequality), here taken as 1. Gusts roll an aircraft
+/// without much yaw and so make small products: the weather rejects no maneuver.
+fn coupling(record: &Record, axis: Axis, part: &RangeInclusive<usize>) -> Option<f64> {
+    let products: &[(&str, &str)] = match axis {
+        Axis::Longitudinal => &[(signal::P, signal::R)],
+        Axis::Lateral => &[(signal::Q, signal::R), (signal::P, signal::Q)],
+    };
+    let rate = |name: &str| record.values(name)?.get(part.clone());
+    let coupled = products.iter().map(|(a, b)| {
+        let pairs = rate(a)?.iter().zip(rate(b)?);
+        let product: Vec<f64> = pairs.map(|(a, b)| RAD * a * b).collect();
+        mean_square(&product, About::Mean)
+    });
+    let half = (record.sample_at(record.start_s + HALF_SPAN_S)).max(1);
+    let span_s = 2.0 * half as f64 * record.step_s;
+    let accelerated = rates(axis).iter().map(|name| {
+        let across = rate(name)?.windows(2 * half + 1);
+        let slopes: Vec<f64> = across.map(|w| (w[2 * half] - w[0]) / span_s).collect();
+        mean_square(&slopes, About::Mean)
+    });
+    let (coupled, all): (Option<f64>, Option<f64>) = (coupled.sum(), accelerated.sum());
+    ratio(coupled.map(f64::sqrt), all.map(f64::sqrt))
 }
 
 /// A measure, its upper limit, and the reason for which a value beyond it rejects.
@@ -115,7 +146,7 @@ fn reasons(q: &Quality, limits: &Limits) -> Vec<String> {
             format!("α strays by {v:.1} deg root mean square")
         }),
         (q.other_axis, limits.other_axis, |v| {
-            format!("the other axis moves {v:.2} times as much as its own")
+            format!("the motion of the other axis makes {v:.2} of its angular acceleration")
         }),
         (q.saturated_share, limits.saturated_share, |v| {
             let percent = 100.0 * v;

@@ -89,9 +89,9 @@ settings! {
         /// Largest root mean square of alpha about its mean, deg. The default is the spacing of the
         /// trends. Larger: maneuvers pass during which the derivatives are not constant.
         pub alpha_rms_deg: f64 = 5.0,
-        /// Largest motion of the other axis over motion of the own axis. Larger: maneuvers pass that
-        /// the other axis's measured signals, with their errors, move.
-        pub other_axis: f64 = 1.0,
+        /// Largest share of the axis's angular acceleration that the motion of the other axis makes.
+        /// Larger: maneuvers pass that errors of the other axis's gyros move.
+        pub other_axis: f64 = 0.2,
         /// Smallest signal-to-noise ratio. Smaller: maneuvers pass whose response noise hides.
         pub signal_to_noise: f64 = 5.0,
         /// Largest share of the inputs' time that a surface is at a stop, where it excites nothing.
