@@ -13,7 +13,7 @@ use super::channel::{
 use super::checks::{
     BlockAverager, BlockMeans, Check, FaultReport, FaultyChannel, Gusts, ImpossibleSignal,
     LiftPoint, check_relations, confirmed_signals, find_faulty_channels, impossible_gyration,
-    impossible_mass, impossible_signals, lift_curve, measure_gusts, report,
+    impossible_mass, impossible_signals, lift_curve, report,
 };
 use super::clock::{Clock, Stretch};
 use super::compatibility::{self, ErrorEvidence, Findings, OnFault};
@@ -104,7 +104,7 @@ pub fn assess(
         return Err(joined(&faults, flight_id));
     }
     problems.extend(faults);
-    let gusts = measure_gusts(&blocks, context.aircraft, &context.settings.checks);
+    let gusts = Gusts::of(&blocks, context.aircraft, &context.settings.checks);
     Ok(Assessment {
         flight: Some(flight_row(stretch, &gusts)),
         channels: channel_rows(

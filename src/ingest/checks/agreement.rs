@@ -26,6 +26,9 @@ const LEAST_GUST_FT_S2: f64 = 0.75;
 /// The same distance for a relation that gusts excite: from there on it holds a motion of a control.
 const MANEUVER_DEVIATIONS: f64 = 3.0;
 
+/// Standard deviations that gusts reach in a window of many.
+const GUST_DEVIATIONS: f64 = 3.0;
+
 /// Error of a relation that biases may cause, as a share of the level from which it counts as
 /// excited. The levels of [`crate::ingest::Excitation`] are twice that error.
 const BIAS_SHARE: f64 = 0.5;
@@ -71,8 +74,9 @@ pub struct Fit {
 
 /// Checks all relations whose signals the record has.
 pub fn check_relations(blocks: &BlockMeans, aircraft: &Aircraft, settings: &Checks) -> Vec<Check> {
-    let Sides { relations, windows } = Sides::of(blocks, aircraft, settings);
-    let gusts = Gusts::of(&relations, &windows, settings.window_s);
+    let relations = relations::recorded(blocks, settings);
+    let windows = window_pairs(&relations, blocks, aircraft, settings);
+    let gusts = Gusts::of(blocks, aircraft, settings);
     let windows: Vec<RelationWindows> = relations
         .into_iter()
         .zip(windows)
@@ -86,30 +90,6 @@ pub fn check_relations(blocks: &BlockMeans, aircraft: &Aircraft, settings: &Chec
         .copied()
         .collect();
     windows.iter().map(|w| w.check(&jumped, settings)).collect()
-}
-
-/// Gusts of a record.
-pub fn measure_gusts(blocks: &BlockMeans, aircraft: &Aircraft, settings: &Checks) -> Gusts {
-    let Sides { relations, windows } = Sides::of(blocks, aircraft, settings);
-    Gusts::of(&relations, &windows, settings.window_s)
-}
-
-/// Relations whose signals a record has, with their sides in every window.
-struct Sides {
-    relations: Vec<Relation>,
-    windows: Vec<Vec<WindowPair>>,
-}
-
-impl Sides {
-    fn of(blocks: &BlockMeans, aircraft: &Aircraft, settings: &Checks) -> Sides {
-        let has_signals = |r: &Relation| r.signals.iter().all(|s| blocks.has(s));
-        let relations: Vec<Relation> = relations::all(settings)
-            .into_iter()
-            .filter(has_signals)
-            .collect();
-        let windows = window_pairs(&relations, blocks, aircraft, settings);
-        Sides { relations, windows }
-    }
 }
 
 /// Signals that some relation confirms.
@@ -142,6 +122,26 @@ impl Disturbance {
     /// entirely (Cauchy and Schwarz), and no number of windows averages it out.
     fn slope_error(self, predicted_rms: f64) -> f64 {
         self.gust * self.response.min(predicted_rms) / (predicted_rms * predicted_rms)
+    }
+
+    /// Least correlation that a right relation has in gusts, where windows are selected by a level.
+    ///
+    /// The measured side is the predicted one, p, and the gust, g. With a mean c of −p g the correlation is
+    /// (p² − c)/(p √(p² − 2 c + g²)), which is least at c = g². Gusts that reach the level select the
+    /// windows in which they do.
+    fn least_correlation(self, predicted_rms: f64, level: f64) -> f64 {
+        let gust = if GUST_DEVIATIONS * self.gust > level {
+            self.gust.max(level)
+        } else {
+            self.gust
+        };
+        let square = predicted_rms * predicted_rms;
+        let common = gust * self.response.min(predicted_rms).min(gust);
+        if common < square {
+            (square - common) / (square * (square - 2.0 * common + gust * gust)).sqrt()
+        } else {
+            0.0
+        }
     }
 }
 
@@ -338,7 +338,7 @@ fn sum(pairs: &[WindowPair], term: impl Fn(f64, f64) -> f64) -> f64 {
 
 /// Verdict on a fit. It needs the slope to be wrong by several standard errors and by more than
 /// biases and gusts can make it. Correlation counts only where windows are selected by a level that
-/// neither noise nor gusts reach.
+/// noise does not reach, and as far as gusts leave it.
 fn verdict_of(
     fit: &Fit,
     relation: &Relation,
@@ -349,9 +349,13 @@ fn verdict_of(
     let gusts = disturbance.slope_error(fit.predicted_rms);
     let margin = settings.standard_errors * fit.standard_error + bias + gusts;
     let (low, high) = (fit.slope - margin, fit.slope + margin);
-    let by_level =
-        matches!(relation.selection, Selection::Above(level) if disturbance.gust < level);
-    if by_level && fit.correlation.abs() < relation.correlation {
+    let least_correlation = match relation.selection {
+        Selection::Above(level) => {
+            relation.correlation * disturbance.least_correlation(fit.predicted_rms, level)
+        }
+        Selection::Largest { .. } => 0.0,
+    };
+    if fit.correlation.abs() < least_correlation {
         CheckVerdict::DoesNotAgree
     } else if high < 0.0 {
         CheckVerdict::WrongSign
@@ -422,6 +426,28 @@ mod tests {
         assert_eq!(strong(-1.0), CheckVerdict::WrongSign);
         assert_eq!(strong(1.0), CheckVerdict::Ok);
         assert_eq!(verdict(level, 1.0, 0.01, 0.4), CheckVerdict::DoesNotAgree);
+    }
+
+    #[test]
+    fn gusts_lower_the_correlation_that_a_right_relation_has() {
+        let least = |gust, response| Disturbance { gust, response }.least_correlation(10.0, 5.0);
+        assert!((least(0.0, 0.0) - 1.0).abs() < 1e-12);
+        // Gusts beside a motion of maneuvers alone: 10/√(10² + 1).
+        assert!((least(1.0, 0.0) - 10.0 / 101.0_f64.sqrt()).abs() < 1e-12);
+        // From a third of the level on they select windows: 10/√(10² + 5²).
+        assert!((least(2.0, 0.0) - 10.0 / 125.0_f64.sqrt()).abs() < 1e-12);
+        // A response of 6 to gusts of 8: (100 − 48)/(10 √(100 − 96 + 64)).
+        assert!((least(8.0, 6.0) - 52.0 / 6800.0_f64.sqrt()).abs() < 1e-12);
+        // A response of the gusts' size leaves √(1 − 0.8²), a larger one nothing less.
+        assert!((least(8.0, 9.0) - 0.6).abs() < 1e-12);
+        assert!(least(20.0, f64::INFINITY).abs() < 1e-12);
+        // A relation without correlation is told in light gusts, not in strong ones that it answers.
+        let of = |gust, response| {
+            let disturbance = Disturbance { gust, response };
+            verdict_in(disturbance, Selection::Above(5.0), 0.9, 0.2, 0.3)
+        };
+        assert_eq!(of(2.0, 1.0), CheckVerdict::DoesNotAgree);
+        assert_eq!(of(9.0, 9.0), CheckVerdict::NotExcited);
     }
 
     #[test]

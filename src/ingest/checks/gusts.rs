@@ -10,11 +10,16 @@
 //! - gusts over a lag that is short against their scale, a random walk of a² per window: V(l) = 2 l a²
 //! - gusts over a lag that is long against their scale, of variance σ²: V = 6 σ²
 //!
-//! With lags of one and two windows, a² = (V(2) − V(1))/2 and s² = (2 V(1) − V(2))/6.
+//! With lags of one and two steps, s² = (2 V(1) − V(2))/6. With the lag of a window of the checks, gusts that
+//! change within it have V − 6 s² = 2 a² or more. A step is a block: gusts that change entirely within a step
+//! would pass for noise.
 
-use super::relations::{BODY_AXES, Relation};
-use super::windows::WindowPair;
+use super::block_means::BlockMeans;
+use super::relations::{self, BODY_AXES};
+use super::windows::{WindowPair, window_pairs};
+use crate::aircraft::Aircraft;
 use crate::ingest::sample_count::whole_steps;
+use crate::ingest::settings::Checks;
 use crate::numerics::order_statistics::quantile;
 
 /// Share of the second differences below the one from which their variance is computed. Maneuvers
@@ -39,7 +44,8 @@ const ISOTROPY: f64 = 1.5;
 /// Gusts along one body axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisGusts {
-    /// Root mean square of their velocity's change in a window, ft/s².
+    /// Root mean square of their velocity's change in a window of the checks, ft/s²; a bound where their
+    /// scale is as short as the window.
     pub change_ft_s2: f64,
     /// Root mean square of their velocity, ft/s; `None` for a short record.
     pub rms_ft_s: Option<f64>,
@@ -50,15 +56,22 @@ pub struct AxisGusts {
 pub struct Gusts(pub [Option<AxisGusts>; BODY_AXES]);
 
 impl Gusts {
-    /// Estimates the gusts from the relations that they disturb; `windows` are the sides of each
-    /// relation in every window.
-    pub fn of(relations: &[Relation], windows: &[Vec<WindowPair>], window_s: f64) -> Gusts {
+    /// Estimates the gusts of a record from the relations that they disturb.
+    pub fn of(blocks: &BlockMeans, aircraft: &Aircraft, settings: &Checks) -> Gusts {
+        let mut relations = relations::recorded(blocks, settings);
+        relations.retain(|relation| relation.disturbed_by_gusts().is_some());
+        let short = Checks {
+            window_s: blocks.block_s,
+            ..settings.clone()
+        };
+        let windows = window_pairs(&relations, blocks, aircraft, &short);
         let mut gusts = Gusts::default();
-        for (relation, pairs) in relations.iter().zip(windows) {
+        for (relation, pairs) in relations.iter().zip(&windows) {
             if let Some((axis, per_ft_s2)) = relation.disturbed_by_gusts()
                 && gusts.0[axis].is_none()
             {
-                gusts.0[axis] = of_axis(&runs(pairs, window_s / per_ft_s2), window_s);
+                let runs = runs(pairs, short.window_s / per_ft_s2);
+                gusts.0[axis] = of_axis(&runs, short.window_s, settings.window_s);
             }
         }
         gusts
@@ -96,14 +109,18 @@ fn runs(pairs: &[WindowPair], factor: f64) -> Vec<Vec<f64>> {
     runs
 }
 
-fn of_axis(runs: &[Vec<f64>], window_s: f64) -> Option<AxisGusts> {
-    let variance = |lag: usize| variance_of_second_differences(runs, lag);
-    let (one, two) = (variance(1)?, variance(2)?);
+/// Gusts of an axis from runs with `step_s` between two values.
+fn of_axis(runs: &[Vec<f64>], step_s: f64, window_s: f64) -> Option<AxisGusts> {
+    let variance = |lag_s: f64| {
+        let lag = whole_steps(lag_s, step_s).max(1);
+        variance_of_second_differences(runs, lag)
+    };
+    let (one, two) = (variance(step_s)?, variance(2.0 * step_s)?);
     let noise = ((2.0 * one - two) / 6.0).max(0.0);
-    let long = variance(whole_steps(LONG_S, window_s).max(1));
+    let without_noise = |variance: f64| (variance - 6.0 * noise).max(0.0);
     Some(AxisGusts {
-        change_ft_s2: ((two - one) / 2.0).max(0.0).sqrt() / window_s,
-        rms_ft_s: long.map(|long| (long / 6.0 - noise).max(0.0).sqrt()),
+        change_ft_s2: (without_noise(variance(window_s)?) / 2.0).sqrt() / window_s,
+        rms_ft_s: variance(LONG_S).map(|long| (without_noise(long) / 6.0).sqrt()),
     })
 }
 
@@ -164,12 +181,11 @@ mod tests {
             .zip(&noise)
             .map(|(g, n)| g + 0.3 * n)
             .collect();
-        let found = of_axis(&[run], 1.0).unwrap();
-        // V(1) and V(2) for ρ = e^(−l/4): a² = σ² (8ρ₁ − 10ρ₂ + 2ρ₄)/2.
-        let rho = |lag: f64| (-lag / 4.0).exp();
-        let change = 6.0 * (4.0 * rho(1.0) - 5.0 * rho(2.0) + rho(4.0)).sqrt();
+        let found = of_axis(&[run], 1.0, 1.0).unwrap();
+        // The change within a step of a fourth of the time constant: 2 σ² (1 − ρ), less what passes for noise.
+        let change = 6.0 * (2.0 * (1.0 - (-0.25_f64).exp())).sqrt();
         assert!(
-            (found.change_ft_s2 / change - 1.0).abs() < 0.05,
+            (1.0..1.08).contains(&(found.change_ft_s2 / change)),
             "{found:?} {change}"
         );
         assert!(
@@ -179,11 +195,20 @@ mod tests {
     }
 
     #[test]
+    fn gusts_that_change_within_a_window_of_the_checks_are_bounded() {
+        // A time constant of 0.8 s, of which the runs have values every 0.2 s.
+        let found = of_axis(&[gusts(6.0)], 0.2, 1.0).unwrap();
+        let change = 6.0 * (2.0 * (1.0 - (-1.0 / 0.8_f64).exp())).sqrt();
+        let ratio = found.change_ft_s2 / change;
+        assert!((1.0..1.25).contains(&ratio), "{found:?} {change}");
+    }
+
+    #[test]
     fn noise_of_a_vane_is_no_gust_and_a_short_record_has_none() {
-        let found = of_axis(&[normal(20_000, 5)], 1.0).unwrap();
+        let found = of_axis(&[normal(20_000, 5)], 1.0, 1.0).unwrap();
         assert!(found.change_ft_s2 < 0.2, "{found:?}");
         assert!(found.rms_ft_s.unwrap() < 0.2, "{found:?}");
-        assert_eq!(of_axis(&[normal(20, 5)], 1.0), None);
+        assert_eq!(of_axis(&[normal(20, 5)], 1.0, 1.0), None);
     }
 
     #[test]

@@ -9,7 +9,7 @@ mod mass_properties;
 mod relations;
 mod windows;
 
-pub(in crate::ingest) use agreement::{Check, check_relations, confirmed_signals, measure_gusts};
+pub(in crate::ingest) use agreement::{Check, check_relations, confirmed_signals};
 pub(in crate::ingest) use block_means::{BlockAverager, BlockMeans};
 pub(in crate::ingest) use fault_isolation::{
     FaultReport, FaultyChannel, find_faulty_channels, report,

@@ -15,6 +15,7 @@
 //! One relation is not kinematic, because a fighter's lateral acceleration is lost among gusts: the
 //! side force that a gust causes opposes the sideslip that it makes.
 
+use super::block_means::BlockMeans;
 use super::block_motion::BlockMotion;
 use crate::flight::signal as s;
 use crate::ingest::settings::Checks;
@@ -121,6 +122,13 @@ const fn both(state: Term, rate: Term) -> Side {
         state: Some(state),
         rate: Some(rate),
     }
+}
+
+/// Relations whose signals a record has.
+pub fn recorded(blocks: &BlockMeans, settings: &Checks) -> Vec<Relation> {
+    let mut relations = all(settings);
+    relations.retain(|relation| relation.signals.iter().all(|s| blocks.has(s)));
+    relations
 }
 
 /// Returns all relations, attitudes first.
