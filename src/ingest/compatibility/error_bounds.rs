@@ -6,15 +6,16 @@ use nalgebra::{DMatrix, DVector};
 use super::joint_state::JointState;
 use super::parameters::{INPUTS, Kind, OUTPUTS, PARAMETERS, Parameters, place};
 use super::window::{Window, input_factor};
-use super::window_fit::squares_about_mean;
+use super::window_fit::{Squares, squares_about_mean};
 use crate::numerics::student;
 
 /// Relative error of the equations themselves: gravity, arms and positions are not known more
 /// closely.
 pub const MODEL_SCALE: f64 = 0.002;
 
-/// Share of a vane's unexplained motion that goes with the explained motion. The aircraft turns
-/// into a gust, so this share is taken for a scale error.
+/// Share of a vane's unexplained motion that goes with the explained motion, and with its rate. The
+/// aircraft turns into a gust, and some time after it: the shares are taken for errors of scale and for
+/// delays.
 const GUST_RESPONSE: f64 = 0.5;
 
 /// Standard deviations of the shared parameters.
@@ -52,33 +53,36 @@ impl JointState<'_> {
     /// Adds the variances that [`Self::gust_errors`] cause. An error of one parameter moves the
     /// others by their regression on it.
     fn add_gust_errors(&self, inverse: &DMatrix<f64>, variances: &mut Parameters) {
-        for (scale, error) in self.gust_errors().into_iter().enumerate() {
-            let own = inverse[(scale, scale)];
+        for (source, error) in self.gust_errors().into_iter().enumerate() {
+            let own = inverse[(source, source)];
             if error > 0.0 && own > 0.0 {
                 // The prior holds the rest of the error back.
-                let data_share = 1.0 - own / self.prior[scale].powi(2);
+                let data_share = 1.0 - own / self.prior[source].powi(2);
                 for (j, variance) in variances.iter_mut().enumerate() {
-                    *variance += (data_share * error * inverse[(j, scale)] / own).powi(2);
+                    *variance += (data_share * error * inverse[(j, source)] / own).powi(2);
                 }
             }
         }
     }
 
-    /// Errors of the outputs' scales that gusts cause; zero for the other parameters. The aircraft
-    /// turns into a gust, so the gusts correlate with the motion, and no number of windows averages
-    /// that out.
+    /// Errors of the outputs' scales and delays that gusts cause; zero for the other parameters. The
+    /// aircraft turns into a gust, so the gusts correlate with the motion, and no number of windows
+    /// averages that out.
     pub fn gust_errors(&self) -> Parameters {
         let mut errors = [0.0; PARAMETERS];
         for output in 0..OUTPUTS {
-            let (mut residuals, mut motion) = (0.0, 0.0);
+            let mut all = Squares::default();
             for window in &self.windows {
-                let (slow, moved) = window.residuals_and_motion(&self.context, output);
-                residuals += slow;
-                motion += moved;
+                let own = window.residuals_and_motion(&self.context, output);
+                all.residuals += own.residuals;
+                all.motion += own.motion;
+                all.rate += own.rate;
             }
-            if motion > 0.0 {
-                let j = place(INPUTS + output, Kind::Scale);
-                errors[j] = GUST_RESPONSE * (residuals / motion).sqrt();
+            for (kind, explained) in [(Kind::Scale, all.motion), (Kind::Delay, all.rate)] {
+                if explained > 0.0 {
+                    let j = place(INPUTS + output, kind);
+                    errors[j] = GUST_RESPONSE * (all.residuals / explained).sqrt();
+                }
             }
         }
         errors

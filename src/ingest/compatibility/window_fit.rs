@@ -248,8 +248,8 @@ impl<'a> WindowFit<'a> {
         }));
     }
 
-    /// Sums of squares of an output's slow residuals and of its reconstructed motion.
-    pub fn residuals_and_motion(&self, context: &FitContext, output: usize) -> (f64, f64) {
+    /// Sums of squares of an output's slow residuals, of its reconstructed motion and of the motion's rate.
+    pub fn residuals_and_motion(&self, context: &FitContext, output: usize) -> Squares {
         let measured = &self.window.outputs[output];
         let counted = context
             .compared(self.window)
@@ -260,8 +260,22 @@ impl<'a> WindowFit<'a> {
                 (residual, measured[k] - residual)
             })
             .unzip();
-        (slow_squares(&residuals), squares_about_mean(&motion))
+        let rate = |w: &[f64]| (w[1] - w[0]) / self.window.step_s;
+        Squares {
+            residuals: slow_squares(&residuals),
+            motion: squares_about_mean(&motion),
+            rate: motion.windows(2).map(|w| rate(w).powi(2)).sum(),
+        }
     }
+}
+
+/// Sums of squares of an output.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Squares {
+    pub residuals: f64,
+    pub motion: f64,
+    /// The motion's change per second.
+    pub rate: f64,
 }
 
 fn weights(variances: &[f64; OUTPUTS]) -> [f64; OUTPUTS] {

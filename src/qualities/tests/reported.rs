@@ -118,13 +118,13 @@ pub fn longitudinal_modes(equations: &LinearModel) -> Modes {
     Modes::of(Axis::Longitudinal, &at_one(equations).matrix, &[]).unwrap()
 }
 
-/// Within 0.5 % in frequency and 1.5 % in damping.
+/// Asserts the frequency within 0.5 % and the damping within 1.5 %.
 pub fn assert_pair(pair: &Pair, frequency: f64, damping: f64) {
     assert_near(&pair.frequency(), frequency, 0.005);
     assert_near(&pair.damping(), damping, 0.015);
 }
 
-/// Roots of roll and spiral within 0.5 %, 1/s.
+/// Asserts the roots of roll and spiral within 0.5 %, 1/s.
 pub fn assert_roll_and_spiral(modes: &Modes, roll: f64, spiral: f64) {
     let found = modes.slow.map(|i| modes.roots[i].real());
     assert_near(&-found[0].clone(), roll, 0.005);
