@@ -4,9 +4,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::joint_state::JointState;
-use super::parameters::{INPUTS, Kind, OUTPUTS, PARAMETERS, Parameters, place};
+use super::parameters::{INPUTS, Kind, OUTPUTS, PARAMETERS, Parameters, SIGNALS, place};
 use super::window::{Window, input_factor};
 use super::window_fit::{Squares, squares_about_mean};
+use crate::flight::signal;
 use crate::numerics::student;
 
 /// Relative error of the equations themselves: gravity, arms and positions are not known more
@@ -17,6 +18,9 @@ pub const MODEL_SCALE: f64 = 0.002;
 /// aircraft turns into a gust, and some time after it: the shares are taken for errors of scale and for
 /// delays.
 const GUST_RESPONSE: f64 = 0.5;
+
+/// Outputs that feel the gusts into which the aircraft turns.
+const VANES: [&str; 2] = [signal::ALPHA_VANE, signal::BETA_VANE];
 
 /// Standard deviations of the shared parameters.
 #[derive(Clone, Copy, Debug)]
@@ -65,8 +69,8 @@ impl JointState<'_> {
         }
     }
 
-    /// Errors of the outputs' scales and delays that gusts cause; zero for the other parameters. The
-    /// aircraft turns into a gust, so the gusts correlate with the motion, and no number of windows
+    /// Errors of the outputs' scales and the vanes' delays that gusts cause; zero for the other parameters.
+    /// The aircraft turns into a gust, so the gusts correlate with the motion, and no number of windows
     /// averages that out.
     pub fn gust_errors(&self) -> Parameters {
         let mut errors = [0.0; PARAMETERS];
@@ -78,11 +82,15 @@ impl JointState<'_> {
                 all.motion += own.motion;
                 all.rate += own.rate;
             }
-            for (kind, explained) in [(Kind::Scale, all.motion), (Kind::Delay, all.rate)] {
+            let mut set = |kind, explained: f64| {
                 if explained > 0.0 {
                     let j = place(INPUTS + output, kind);
                     errors[j] = GUST_RESPONSE * (all.residuals / explained).sqrt();
                 }
+            };
+            set(Kind::Scale, all.motion);
+            if VANES.contains(&SIGNALS[INPUTS + output]) {
+                set(Kind::Delay, all.rate);
             }
         }
         errors
