@@ -15,7 +15,6 @@ pub mod compatibility;
 mod context;
 mod in_memory;
 mod refusal;
-mod sample_count;
 mod settings;
 mod column_source;
 mod computed_columns;

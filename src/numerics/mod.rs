@@ -1,6 +1,6 @@
 //! Numerical methods that several rooms share: vectors of the processor, aligned matrices, small
 //! matrices, the inverse of a symmetric matrix, dual numbers, Fourier sums, one Runge-Kutta step, a running integral,
-//! Student's t, χ².
+//! durations as numbers of samples, Student's t, χ².
 
 pub mod chi_squared;
 pub(crate) mod digits;
@@ -16,6 +16,7 @@ pub mod random_effects;
 pub mod root;
 pub(crate) mod row_products;
 pub mod runge_kutta;
+pub(crate) mod sample_count;
 pub(crate) mod simd;
 pub(crate) mod small;
 pub mod student;

@@ -21,6 +21,7 @@ use crate::aero::{Axis, Buildup, Regressor};
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
 use crate::numerics::normal;
 use crate::numerics::random::RandomStream;
+use crate::numerics::sample_count::whole_steps;
 
 /// Seed of the draws.
 const SEED: u64 = 60;
@@ -73,10 +74,9 @@ impl Probabilities {
 
 /// Samples in a step of the effects' free runs.
 fn stride(recording: &Recording) -> usize {
-    // A recorder's step can be longer than its name says by a rounding error.
-    let longest_s = (1.0 + 1e-6) * LONGEST_STEP_S;
-    let fits = |stride: &usize| *stride as f64 * recording.step_s <= longest_s;
-    (1..=recording.samples).take_while(fits).last().unwrap_or(1)
+    whole_steps(LONGEST_STEP_S, recording.step_s)
+        .min(recording.samples)
+        .max(1)
 }
 
 /// Free runs about that of the posterior's mean.

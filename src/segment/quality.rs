@@ -10,6 +10,7 @@ use crate::flight::record::Series;
 use crate::flight::{Record, signal};
 use crate::maneuver::{Acceptance, Class, Maneuver, Quality};
 use crate::numerics::order_statistics::{SIGMA_PER_MAD, upper_median_in_place};
+use crate::numerics::sample_count::nearest;
 use crate::units::RAD;
 
 /// Time before the first input that is left out of the lead-in, s: the detector places a step within
@@ -107,7 +108,7 @@ fn rates(axis: Axis) -> &'static [&'static str] {
 ///
 /// Euler's equations couple the axes by products of rates: q̇ by p r, ṗ by q r, ṙ by p q. The moments of
 /// inertia weigh a product by at most 1 (triangle inequality), here taken as 1. Gusts roll an aircraft
-/// without much yaw and so make small products: the weather rejects no maneuver.
+/// without much yaw and so make small products.
 fn coupling(record: &Record, axis: Axis, part: &RangeInclusive<usize>) -> Option<f64> {
     let products: &[(&str, &str)] = match axis {
         Axis::Longitudinal => &[(signal::P, signal::R)],
@@ -119,7 +120,7 @@ fn coupling(record: &Record, axis: Axis, part: &RangeInclusive<usize>) -> Option
         let product: Vec<f64> = pairs.map(|(a, b)| RAD * a * b).collect();
         mean_square(&product, About::Mean)
     });
-    let half = (record.sample_at(record.start_s + HALF_SPAN_S)).max(1);
+    let half = nearest(HALF_SPAN_S / record.step_s).max(1);
     let span_s = 2.0 * half as f64 * record.step_s;
     let accelerated = rates(axis).iter().map(|name| {
         let across = rate(name)?.windows(2 * half + 1);

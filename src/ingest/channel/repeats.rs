@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use super::update_rate::neighbours;
-use crate::ingest::sample_count::nearest;
 use crate::ingest::settings::Stuck;
+use crate::numerics::sample_count::nearest;
 
 /// Fewest samples from which the repeats of a channel's noise are estimated.
 const LEAST_SAMPLES: usize = 200;

@@ -1,8 +1,8 @@
 //! Angles that wrap around made continuous.
 
 use crate::flight::Channel;
-use crate::ingest::sample_count::whole_steps;
 use crate::ingest::settings::Settings;
+use crate::numerics::sample_count::whole_steps;
 use crate::units::{Quantity, Unit};
 
 /// Jump that is a wrap of a channel whose map states the period, as a share of it: nothing turns

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use crate::earth::air;
 use crate::flight::{Correction, signal};
-use crate::ingest::sample_count::whole_steps;
 use crate::ingest::settings::Checks;
+use crate::numerics::sample_count::whole_steps;
 
 /// Signals that the relations and the checks of mass and inertias use.
 const USED: &[&str] = &[

@@ -3,24 +3,24 @@
 //!
 //! The measured side of an acceleration relation is the acceleration relative to the air, the
 //! predicted side the inertial one. Their difference is −ġ, the change of the gust's velocity in a
-//! window. Sums over windows return g without a constant and without a trend, which biases make.
+//! step. Sums over steps return g without a constant and without a trend, which biases make.
 //! Second differences of g over a lag have neither:
 //!
 //! - vanes' noise of variance s², white: V = 6 s² at any lag
-//! - gusts over a lag that is short against their scale, a random walk of a² per window: V(l) = 2 l a²
+//! - gusts over a lag that is short against their scale, a random walk of a² per step: V(l) = 2 l a²
 //! - gusts over a lag that is long against their scale, of variance σ²: V = 6 σ²
 //!
-//! With lags of one and two steps, s² = (2 V(1) − V(2))/6. With the lag of a window of the checks, gusts that
-//! change within it have V − 6 s² = 2 a² or more. A step is a block: gusts that change entirely within a step
-//! would pass for noise.
+//! A step is a block. With lags of one and two, s² = (2 V(1) − V(2))/6; gusts that change entirely within a step
+//! would pass for noise. With the lag of a window of the checks, V − 6 s² is twice the mean square of the gusts'
+//! change in it, or more.
 
 use super::block_means::BlockMeans;
 use super::relations::{self, BODY_AXES};
 use super::windows::{WindowPair, window_pairs};
 use crate::aircraft::Aircraft;
-use crate::ingest::sample_count::whole_steps;
 use crate::ingest::settings::Checks;
 use crate::numerics::order_statistics::quantile;
+use crate::numerics::sample_count::whole_steps;
 
 /// Share of the second differences below the one from which their variance is computed. Maneuvers
 /// disturb fewer than a quarter; gusts in a quarter of the flight are seen.
@@ -91,8 +91,8 @@ impl Gusts {
     }
 }
 
-/// Sums of the differences between the sides over consecutive windows, ft/s: one run between two
-/// windows that are missing.
+/// Sums of the differences between the sides over consecutive steps, ft/s: one run between two that are
+/// missing.
 fn runs(pairs: &[WindowPair], factor: f64) -> Vec<Vec<f64>> {
     let mut runs: Vec<Vec<f64>> = Vec::new();
     let mut next = None;

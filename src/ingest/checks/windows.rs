@@ -4,8 +4,8 @@ use super::block_means::BlockMeans;
 use super::block_motion::BlockMotion;
 use super::relations::{Relation, Side};
 use crate::aircraft::Aircraft;
-use crate::ingest::sample_count::whole_steps;
 use crate::ingest::settings::Checks;
+use crate::numerics::sample_count::whole_steps;
 
 /// Both sides of a relation in one window.
 #[derive(Clone, Copy, Debug, PartialEq)]

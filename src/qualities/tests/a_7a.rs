@@ -17,14 +17,11 @@ const VELOCITY: f64 = 279.0;
 
 /// Derivatives are per mass and inertia, so that sizes do not count.
 fn reported() -> Reported {
-    let mut trim = Trim {
-        alpha: ALPHA_DEG.to_radians(),
-        theta: ALPHA_DEG.to_radians(),
+    let trim = Trim {
         velocity: VELOCITY,
         qbar: 91.5,
-        ..level()
+        ..level(ALPHA_DEG)
     };
-    trim.condition.alpha_deg = ALPHA_DEG;
     Reported {
         aircraft: Aircraft {
             wing_area_ft2: 1.0,

@@ -31,7 +31,7 @@ fn reported() -> Reported {
         iy: 0.331e8,
         iz: 0.497e8,
         ixz: -0.156e7,
-        ..level()
+        ..level(0.0)
     };
     trim.condition.mach = 0.8;
     Reported {

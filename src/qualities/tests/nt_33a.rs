@@ -20,9 +20,7 @@ const ALPHA_DEG: f64 = 2.2;
 
 fn reported() -> Reported {
     let (sin, cos) = ALPHA_DEG.to_radians().sin_cos();
-    let mut trim = Trim {
-        alpha: ALPHA_DEG.to_radians(),
-        theta: ALPHA_DEG.to_radians(),
+    let trim = Trim {
         velocity: VELOCITY,
         qbar: 61.7,
         mass: 11_800.0 / 32.174,
@@ -30,9 +28,8 @@ fn reported() -> Reported {
         iy: 20_700.0,
         iz: 32_001.0,
         ixz: 480.0,
-        ..level()
+        ..level(ALPHA_DEG)
     };
-    trim.condition.alpha_deg = ALPHA_DEG;
     Reported {
         aircraft: Aircraft {
             wing_area_ft2: 234.8,

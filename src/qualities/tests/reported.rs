@@ -85,16 +85,16 @@ impl Reported {
     }
 }
 
-/// Steady level flight along the body axis, of an aircraft of mass and inertias one.
-pub fn level() -> Trim {
+/// Steady level flight at an angle of attack, of an aircraft of mass and inertias one.
+pub fn level(alpha_deg: f64) -> Trim {
     Trim {
         condition: Condition {
-            alpha_deg: 0.0,
+            alpha_deg,
             mach: 0.0,
             third: None,
         },
-        alpha: 0.0,
-        theta: 0.0,
+        alpha: alpha_deg.to_radians(),
+        theta: alpha_deg.to_radians(),
         velocity: 0.0,
         qbar: 0.0,
         mass: 1.0,
