@@ -16,6 +16,7 @@ use crate::error::did_you_mean;
 use crate::flight::record::Series;
 use crate::flight::{Mark, Record, signal};
 use crate::maneuver::{Maneuver, ManeuverOrigin, Quality, Recognised};
+use crate::numerics::sample_count::nearest;
 use crate::rigid_body::BodyState;
 use crate::units::DEG;
 
@@ -51,7 +52,7 @@ struct CardFlight<'a> {
 pub fn fly(plant: &Plant, settings: &Settings, card: &Card) -> Result<FlownManeuver, String> {
     let flight = CardFlight::new(plant, settings, card)?;
     let per_sample = settings.steps_per_sample();
-    let samples = rounded_count(card.program.duration_s * settings.rate_hz) + 1;
+    let samples = nearest(card.program.duration_s * settings.rate_hz) + 1;
     let mut state = flight.initial_state();
     let mut signals: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     let mut alphas_deg = Vec::with_capacity(samples);
@@ -96,17 +97,6 @@ fn gusts(
     sum
 }
 
-/// Rounds a non-negative count that is whole but for rounding errors.
-fn rounded_count(count: f64) -> usize {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "rounded and not negative"
-    )]
-    let count = count.round().max(0.0) as usize;
-    count
-}
-
 fn has_departed(state: &AircraftState, outputs: &PlantOutputs) -> bool {
     let limit = DEPARTURE_DEG / DEG;
     let within = outputs.air.alpha.abs() < limit && outputs.air.beta.abs() < limit;
@@ -147,8 +137,8 @@ impl<'a> CardFlight<'a> {
         let at_trim = plant.aerodynamics.values(card.alpha_deg, trim.air.mach);
         let feedback = Feedback::new(plant, settings, law, &trim, &at_trim)?;
         let step_s = 1.0 / settings.control_hz;
-        let steps = (rounded_count(card.program.duration_s * settings.rate_hz) + 2)
-            * settings.steps_per_sample();
+        let steps =
+            (nearest(card.program.duration_s * settings.rate_hz) + 2) * settings.steps_per_sample();
         let flow = (trim.air.velocity_ft_s, plant.aircraft.span_ft);
         let gusts = gusts(&card.condition, flow, (step_s, steps), card.seed);
         let frozen = (card.condition.derivatives == DerivativeLookup::Frozen).then_some(at_trim);
