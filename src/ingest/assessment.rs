@@ -104,9 +104,8 @@ pub fn assess(
         return Err(joined(&faults, flight_id));
     }
     problems.extend(faults);
-    let gusts = Gusts::of(&blocks, context.aircraft, &context.settings.checks);
     Ok(Assessment {
-        flight: Some(flight_row(stretch, &gusts)),
+        flight: Some(flight_row(stretch, &relations.gusts)),
         channels: channel_rows(
             stretch,
             context.channels,
@@ -220,8 +219,6 @@ impl Examination<'_> {
         BlockMeans::of(means, clock.samples, clock.step_s, checks)
     }
 
-    /// Reconciles gross faults with instrument errors.
-    ///
     /// Reconciles the relations between channels with the errors of the instruments.
     ///
     /// With a wrong sign or unit, the errors of the other instruments are estimated with that
@@ -292,7 +289,7 @@ impl Examination<'_> {
             settings,
             ..
         } = *self.context;
-        let checks = check_relations(blocks, aircraft, &settings.checks);
+        let (checks, gusts) = check_relations(blocks, aircraft, &settings.checks);
         let faulty = find_faulty_channels(
             blocks,
             &checks,
@@ -305,6 +302,7 @@ impl Examination<'_> {
             confirmed: confirmed_signals(&checks),
             report: report(&faulty, &checks),
             checks,
+            gusts,
             faulty,
             impossible: Vec::new(),
         }
@@ -356,6 +354,7 @@ fn leave_out(record: &mut Record, faulty: &[FaultyChannel]) {
 /// Outcome of the kinematic relations of one stretch.
 struct RelationResult {
     checks: Vec<Check>,
+    gusts: Gusts,
     faulty: Vec<FaultyChannel>,
     /// Signals that a relation confirms.
     confirmed: Vec<&'static str>,

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::block_means::BlockMeans;
 use super::gusts::Gusts;
 use super::relations::{self, GustEffect, Relation, Selection};
-use super::windows::{WindowPair, window_pairs};
+use super::windows::{WindowPair, relation_pairs};
 use crate::aircraft::Aircraft;
 use crate::ingest::settings::Checks;
 use crate::numerics::order_statistics::{SIGMA_PER_MAD, upper_median};
@@ -72,15 +72,19 @@ pub struct Fit {
     pub misfit: f64,
 }
 
-/// Checks all relations whose signals the record has.
-pub fn check_relations(blocks: &BlockMeans, aircraft: &Aircraft, settings: &Checks) -> Vec<Check> {
+/// Checks all relations whose signals the record has, with the gusts that disturb them.
+pub fn check_relations(
+    blocks: &BlockMeans,
+    aircraft: &Aircraft,
+    settings: &Checks,
+) -> (Vec<Check>, Gusts) {
     let relations = relations::recorded(blocks, settings);
-    let windows = window_pairs(&relations, blocks, aircraft, settings);
-    let gusts = Gusts::of(blocks, aircraft, settings);
+    let pairs = relation_pairs(&relations, blocks, aircraft, settings);
+    let gusts = Gusts::of(&relations, &pairs, (blocks.block_s, settings.window_s));
     let windows: Vec<RelationWindows> = relations
         .into_iter()
-        .zip(windows)
-        .map(|(relation, pairs)| RelationWindows::of(relation, pairs, &gusts, settings))
+        .zip(pairs)
+        .map(|(relation, pairs)| RelationWindows::of(relation, pairs.windows, &gusts, settings))
         .collect();
     // A relation that gusts excite takes a maneuver for a jump.
     let jumped: BTreeSet<usize> = windows
@@ -89,7 +93,8 @@ pub fn check_relations(blocks: &BlockMeans, aircraft: &Aircraft, settings: &Chec
         .flat_map(|w| &w.jumps)
         .copied()
         .collect();
-    windows.iter().map(|w| w.check(&jumped, settings)).collect()
+    let checks = windows.iter().map(|w| w.check(&jumped, settings));
+    (checks.collect(), gusts)
 }
 
 /// Signals that some relation confirms.

@@ -172,7 +172,7 @@ impl<'a> Isolation<'a> {
         for (name, channel) in self.suspects(before) {
             for (factor, cause) in corrections(channel) {
                 let corrected = blocks.with(&channel.signal, factor);
-                let checks = check_relations(&corrected, self.aircraft, self.settings);
+                let (checks, _) = check_relations(&corrected, self.aircraft, self.settings);
                 trials.push(Trial {
                     name,
                     channel,

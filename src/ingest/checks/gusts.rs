@@ -14,11 +14,8 @@
 //! would pass for noise. With the lag of a window of the checks, V − 6 s² is twice the mean square of the gusts'
 //! change in it, or more.
 
-use super::block_means::BlockMeans;
-use super::relations::{self, BODY_AXES};
-use super::windows::{WindowPair, window_pairs};
-use crate::aircraft::Aircraft;
-use crate::ingest::settings::Checks;
+use super::relations::{BODY_AXES, Relation};
+use super::windows::{RelationPairs, WindowPair};
 use crate::numerics::order_statistics::quantile;
 use crate::numerics::sample_count::whole_steps;
 
@@ -56,22 +53,19 @@ pub struct AxisGusts {
 pub struct Gusts(pub [Option<AxisGusts>; BODY_AXES]);
 
 impl Gusts {
-    /// Estimates the gusts of a record from the relations that they disturb.
-    pub fn of(blocks: &BlockMeans, aircraft: &Aircraft, settings: &Checks) -> Gusts {
-        let mut relations = relations::recorded(blocks, settings);
-        relations.retain(|relation| relation.disturbed_by_gusts().is_some());
-        let short = Checks {
-            window_s: blocks.block_s,
-            ..settings.clone()
-        };
-        let windows = window_pairs(&relations, blocks, aircraft, &short);
+    /// Estimates the gusts of a record from the relations that they disturb, in steps of `step_s`.
+    pub fn of(
+        relations: &[Relation],
+        pairs: &[RelationPairs],
+        (step_s, window_s): (f64, f64),
+    ) -> Gusts {
         let mut gusts = Gusts::default();
-        for (relation, pairs) in relations.iter().zip(&windows) {
+        for (relation, pairs) in relations.iter().zip(pairs) {
             if let Some((axis, per_ft_s2)) = relation.disturbed_by_gusts()
                 && gusts.0[axis].is_none()
             {
-                let runs = runs(pairs, short.window_s / per_ft_s2);
-                gusts.0[axis] = of_axis(&runs, short.window_s, settings.window_s);
+                let runs = runs(&pairs.steps, step_s / per_ft_s2);
+                gusts.0[axis] = of_axis(&runs, step_s, window_s);
             }
         }
         gusts

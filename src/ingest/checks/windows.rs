@@ -16,45 +16,64 @@ pub struct WindowPair {
     pub measured: f64,
 }
 
+/// Both sides of a relation in the windows of the checks, and in those of one block where gusts disturb it.
+#[derive(Clone, Debug, Default)]
+pub struct RelationPairs {
+    pub windows: Vec<WindowPair>,
+    pub steps: Vec<WindowPair>,
+}
+
 /// Computes the sides of each relation in every window in which both are defined.
 ///
-/// The motion is computed window by window: that of a whole flight would be the largest object in
-/// memory.
-pub fn window_pairs(
+/// The motion is kept for a window: that of a whole flight would be the largest object in memory.
+pub fn relation_pairs(
     relations: &[Relation],
     blocks: &BlockMeans,
     aircraft: &Aircraft,
     settings: &Checks,
-) -> Vec<Vec<WindowPair>> {
+) -> Vec<RelationPairs> {
     let length = whole_steps(settings.window_s, blocks.block_s).max(1);
-    let motion_of = |block: usize| BlockMotion::of(blocks, block, aircraft, settings);
-    let mut pairs = vec![Vec::new(); relations.len()];
-    let mut motion: Vec<Option<BlockMotion>> = Vec::new();
-    let starts = (0..blocks.count.saturating_sub(length)).step_by(length);
-    for (window, start) in starts.enumerate() {
-        // The last block of a window is the first of the next.
-        let first = motion.pop().unwrap_or_else(|| motion_of(start));
-        motion.clear();
-        motion.push(first);
-        motion.extend((start + 1..=start + length).map(motion_of));
-        let Some(motion) = motion
-            .iter()
-            .map(Option::as_ref)
-            .collect::<Option<Vec<_>>>()
-        else {
-            continue;
-        };
-        for (relation, pairs) in relations.iter().zip(&mut pairs) {
-            let side = |side: &Side| mean_rate(side, &motion, blocks.block_s);
-            let sides = side(&relation.predicted).zip(side(&relation.measured));
-            pairs.extend(sides.map(|(predicted, measured)| WindowPair {
-                window,
-                predicted: predicted * relation.unit,
-                measured: measured * relation.unit,
-            }));
+    let mut pairs = vec![RelationPairs::default(); relations.len()];
+    let mut motion: Vec<Option<BlockMotion>> = Vec::with_capacity(length + 1);
+    for block in 0..blocks.count {
+        motion.push(BlockMotion::of(blocks, block, aircraft, settings));
+        if let [.., Some(before), Some(now)] = motion.as_slice() {
+            for (relation, pairs) in relations.iter().zip(&mut pairs) {
+                if relation.disturbed_by_gusts().is_some() {
+                    let own = pair(relation, block - 1, &[before, now], blocks.block_s);
+                    pairs.steps.extend(own);
+                }
+            }
         }
+        if motion.len() <= length {
+            continue;
+        }
+        let whole: Option<Vec<&BlockMotion>> = motion.iter().map(Option::as_ref).collect();
+        if let Some(whole) = whole {
+            for (relation, pairs) in relations.iter().zip(&mut pairs) {
+                let own = pair(relation, block / length - 1, &whole, blocks.block_s);
+                pairs.windows.extend(own);
+            }
+        }
+        // The last block of a window is the first of the next.
+        motion.drain(..length);
     }
     pairs
+}
+
+/// Both sides of a relation over the blocks of a window; `None` where one is not defined.
+fn pair(
+    relation: &Relation,
+    window: usize,
+    motion: &[&BlockMotion],
+    block_s: f64,
+) -> Option<WindowPair> {
+    let side = |side: &Side| mean_rate(side, motion, block_s);
+    Some(WindowPair {
+        window,
+        predicted: side(&relation.predicted)? * relation.unit,
+        measured: side(&relation.measured)? * relation.unit,
+    })
 }
 
 /// A side over a window of blocks, per second: the change of its state plus the trapezoidal
