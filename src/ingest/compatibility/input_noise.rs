@@ -39,43 +39,51 @@ pub fn score_covariance(
     weights: &[f64; OUTPUTS],
     information: &ReducedInformation,
 ) -> Option<DMatrix<f64>> {
-    let blocks = block_products(window, linearised, weights);
     let moves = moves_of_start(window, linearised)?;
-    let mut scores = Vec::with_capacity(moves.len());
-    let mut later = DMatrix::zeros(ALL, STATES);
-    for (block, moves) in blocks.iter().zip(&moves).rev() {
-        scores.push(information.eliminated(&(&later + 0.5 * block)) * moves);
-        later += block;
+    let mut products = block_products(window, linearised, weights);
+    sum_later(&mut products);
+    let by_start = information.eliminated(&products);
+    let mut scores = DMatrix::zeros(PARAMETERS, INPUTS * moves.len());
+    for (block, moves) in moves.iter().enumerate() {
+        let by_start = by_start.columns(STATES * block, STATES);
+        let mut own = scores.columns_mut(INPUTS * block, INPUTS);
+        own.gemm(1.0, &by_start, moves, 0.0);
     }
     make_consistent(&mut scores, window, &information.shared);
-    let mut covariance = DMatrix::zeros(PARAMETERS, PARAMETERS);
-    for score in &scores {
-        covariance.gemm(1.0, score, &score.transpose(), 1.0);
-    }
-    Some(covariance)
+    Some(&scores * scores.transpose())
 }
 
-/// Adds to the scores of all blocks, from the last to the first, what they lack in the score of a bias: noise
-/// that is constant is a bias b, whose score is H b. Otherwise combinations of scores on which the outputs
-/// say next to nothing would seem to separate the two.
-fn make_consistent(scores: &mut [DMatrix<f64>], window: &Window, information: &DMatrix<f64>) {
+/// Sums of the products after the middle of each block, in their place.
+fn sum_later(products: &mut DMatrix<f64>) {
+    let mut later = vec![0.0; ALL * STATES];
+    let blocks = products.as_mut_slice().chunks_exact_mut(ALL * STATES);
+    for block in blocks.rev() {
+        for (product, later) in block.iter_mut().zip(&mut later) {
+            let own = *product;
+            *product = *later + 0.5 * own;
+            *later += own;
+        }
+    }
+}
+
+/// Adds to the scores of all blocks what they lack in the score of a bias: noise that is constant is a
+/// bias b, whose score is H b. Otherwise combinations of scores on which the outputs say next to nothing
+/// would seem to separate the two.
+fn make_consistent(scores: &mut DMatrix<f64>, window: &Window, information: &DMatrix<f64>) {
     let length = block_length(window);
     let samples = |block: usize| length.min(window.samples - block * length) as f64;
-    let last = scores.len().saturating_sub(1);
-    let roots: Vec<f64> = (0..scores.len())
-        .map(|b| samples(last - b).sqrt())
-        .collect();
-    let of_bias = DMatrix::from_fn(PARAMETERS, INPUTS, |j, input| {
+    let mut lacking = DMatrix::from_fn(PARAMETERS, INPUTS, |j, input| {
         let deviation = window.input_variances[input].sqrt();
         -input_factor(input).signum() * deviation * information[(j, place(input, Kind::Bias))]
     });
-    let found = scores.iter().zip(&roots);
-    let found = found.fold(DMatrix::zeros(PARAMETERS, INPUTS), |sum, (score, root)| {
-        sum + score * *root
-    });
-    let lacking = (of_bias - found) / window.samples as f64;
-    for (score, root) in scores.iter_mut().zip(&roots) {
-        *score += &lacking * *root;
+    let blocks = 0..scores.ncols() / INPUTS;
+    for block in blocks.clone() {
+        lacking -= scores.columns(INPUTS * block, INPUTS) * samples(block).sqrt();
+    }
+    lacking /= window.samples as f64;
+    for block in blocks {
+        let mut own = scores.columns_mut(INPUTS * block, INPUTS);
+        own += &lacking * samples(block).sqrt();
     }
 }
 
@@ -104,18 +112,19 @@ fn block_length(window: &Window) -> usize {
     (BLOCK_S / window.step_s).round().max(1.0) as usize
 }
 
-/// Sums of Sᵀ R⁻¹ C Φ block by block of samples: rows for the window's own and the shared parameters, a
-/// column for each initial state. A node stands for the samples around it.
+/// Sums of Sᵀ R⁻¹ C Φ over each block of samples, side by side: rows for the window's own and the shared
+/// parameters, a column for each initial state. A node stands for the samples around it.
 fn block_products(
     window: &Window,
     linearised: &LinearisedWindow,
     weights: &[f64; OUTPUTS],
-) -> Vec<DMatrix<f64>> {
+) -> DMatrix<f64> {
     let (length, spacing) = (block_length(window), window.samples_per_node());
-    let mut blocks = vec![DMatrix::zeros(ALL, STATES); window.samples.div_ceil(length)];
+    let mut products = DMatrix::zeros(ALL, STATES * window.samples.div_ceil(length));
+    let sums = products.as_mut_slice();
     Arch::new().dispatch(|| {
         for (node, rows) in linearised.sensitivities.rows.iter().enumerate() {
-            let block = &mut blocks[node * spacing / length];
+            let block = &mut sums[node * spacing / length * ALL * STATES..][..ALL * STATES];
             for (output, row) in rows.iter().enumerate() {
                 let count = linearised.counts[output][node];
                 if count > 0.0 {
@@ -124,16 +133,15 @@ fn block_products(
             }
         }
     });
-    blocks
+    products
 }
 
 /// Adds the products of a row with its slopes along the initial state.
 #[inline(always)]
-fn add_products(block: &mut DMatrix<f64>, row: &Row, output: usize, weight: f64) {
+fn add_products(block: &mut [f64], row: &Row, output: usize, weight: f64) {
     // Parameters of the states stand alike in a row and among all; those of the output do not.
     let own = place_among_all(DRIVING, output);
-    let columns = block.as_mut_slice().chunks_exact_mut(ALL);
-    for (column, by_start) in columns.zip(&row[..STATES]) {
+    for (column, by_start) in block.chunks_exact_mut(ALL).zip(&row[..STATES]) {
         let factor = weight * by_start;
         add_scaled(&mut column[..DRIVING], &row[..DRIVING], factor);
         add_scaled(&mut column[own..own + KINDS], &row[DRIVING..ROW], factor);
