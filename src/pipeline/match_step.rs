@@ -158,15 +158,16 @@ pub fn decisive_differences(
     };
     let databases = Databases::new(runner.config, campaign, &[model]);
     let basis = databases.basis(runner.config, specification);
+    let estimates = by_maneuver(&campaign.estimates);
     let of_flight = |flight: &Flight| {
         let record = LazyRecord::new(flight, &runner.store, &campaign.delays);
-        let own = campaign
-            .maneuvers
-            .iter()
-            .filter(|m| m.flight_id == flight.id() && m.class == class && !m.is_rejected());
+        let all = campaign.maneuvers.iter().enumerate();
+        let own =
+            all.filter(|(_, m)| m.flight_id == flight.id() && m.class == class && !m.is_rejected());
         let mut found = Vec::new();
-        for maneuver in own {
+        for (place, maneuver) in own {
             let record = record.part(maneuver)?;
+            let own = own_estimates(campaign, &estimates, place);
             let local = campaign
                 .model
                 .at(maneuver.axis, &maneuver.condition(basis.tunnel));
@@ -174,7 +175,7 @@ pub fn decisive_differences(
                 record: &record,
                 maneuver,
                 local: Some(&local),
-                own: None,
+                own: own.as_ref().map(|(means, own)| (*means, own)),
             };
             found.extend(proof_of_match::decisive_difference(&basis, &flown));
         }

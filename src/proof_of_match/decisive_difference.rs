@@ -4,16 +4,19 @@
 //! effects of the derivatives' deviations, those of the start's errors, and the sensors' noise. At one
 //! sample the difference is therefore normal, and its nearest limit is some standard deviations away. Of
 //! an alternative the sample with the smallest distance counts, of a requirement the alternative with
-//! the largest, and of the requirements the one with the smallest. Requirements of the Dutch roll are
-//! left out.
+//! the largest, and of the requirements the one with the smallest. A requirement of the Dutch roll is on
+//! one value, whose noise is the error of the repeat flight's estimates.
 
 use nalgebra::{DMatrix, DVector};
 
+use super::derivative_table::DerivativeTable;
+use super::dutch_roll::LateralModes;
 use super::free_run::FreeRun;
 use super::judgement::Judged;
 use super::outputs::place;
 use super::recording::Recording;
 use super::repeat_flight::{Histories, MovedRuns, moving};
+use super::specification::Tolerance;
 use super::start::MatchedStart;
 use crate::aero::{Axis, Buildup, Condition};
 use crate::model::{LocalPosterior, LocalValue};
@@ -46,14 +49,43 @@ pub struct LinearOutputs {
     mean: FreeRun,
 }
 
-/// Sample and tolerance.
+/// Dutch roll of repeat flights and of the model that predicts them.
 #[derive(Clone, Copy, Debug)]
-struct Place<'a> {
-    /// Distance inside the nearest limit, standard deviations.
-    distance: f64,
-    /// Number among the samples of the effects.
-    sample: usize,
-    judged: &'a Judged<'a>,
+pub struct PredictedDutchRoll<'a> {
+    pub modes: &'a LateralModes,
+    /// Derivatives of the posterior's mean.
+    pub mean: &'a DerivativeTable,
+    /// Derivatives of the model.
+    pub model: &'a DerivativeTable,
+}
+
+impl PredictedDutchRoll<'_> {
+    /// Difference of a quantity; `None` where one does not oscillate.
+    fn difference(
+        &self,
+        posterior: &LocalPosterior,
+        buildup: &Buildup,
+        tolerance: &Tolerance,
+    ) -> Option<LinearDifference> {
+        let moving = moving(posterior, buildup);
+        let deviation = |(value, derivative): &(usize, usize)| {
+            (*derivative, posterior.covariance[(*value, *value)].sqrt())
+        };
+        let deviations: Vec<(usize, f64)> = moving.iter().map(deviation).collect();
+        let quantity = tolerance.quantity;
+        let repeats = self.modes.of_repeats(quantity, self.mean, &deviations)?;
+        let model = self.modes.of_model(self.model)?.value(quantity)?;
+        let per_width = 1.0 / tolerance.width(repeats.mean);
+        let slopes = moving.iter().zip(&repeats.slopes);
+        Some(LinearDifference {
+            quantity,
+            mean: per_width * (repeats.mean - model),
+            slopes: slopes
+                .map(|((value, _), slope)| (*value, per_width * slope))
+                .collect(),
+            rest: per_width * repeats.error,
+        })
+    }
 }
 
 impl LinearOutputs {
@@ -83,48 +115,49 @@ impl LinearOutputs {
         })
     }
 
-    /// The decisive difference of the run of a model at every `stride`-th sample; `None` where a run departs or no tolerance is of
-    /// an output.
+    /// The decisive difference of the run of a model at every `stride`-th sample, and of its Dutch roll where
+    /// that is known; `None` where a run departs or no tolerance can be judged.
     #[must_use]
     pub fn decisive(
         &self,
-        recording: &Recording,
-        run: &FreeRun,
-        posterior: &LocalPosterior,
+        flown: (&Recording, &FreeRun),
+        dutch_roll: Option<PredictedDutchRoll>,
+        (posterior, buildup): (&LocalPosterior, &Buildup),
         judged: &[Judged],
     ) -> Option<LinearDifference> {
-        if run.has_departed || self.mean.has_departed {
+        if flown.1.has_departed || self.mean.has_departed {
             return None;
         }
+        let worst = |own: &Judged| {
+            if own.tolerance.quantity.is_of_dutch_roll() {
+                let difference = dutch_roll?.difference(posterior, buildup, &own.tolerance)?;
+                return Some((difference.distance(&posterior.covariance), difference));
+            }
+            self.worst(flown, posterior, own)
+        };
         let requirements = judged.chunk_by(Judged::is_alternative);
         let best = requirements.filter_map(|alternatives| {
-            let worst = alternatives
-                .iter()
-                .filter_map(|own| self.worst((recording, run), posterior, own));
-            worst.max_by(|a, b| a.distance.total_cmp(&b.distance))
+            let worst = alternatives.iter().filter_map(worst);
+            worst.max_by(|a, b| a.0.total_cmp(&b.0))
         });
-        let decisive = best.min_by(|a, b| a.distance.total_cmp(&b.distance))?;
-        self.difference((recording, run), decisive.sample, decisive.judged)
+        let decisive = best.min_by(|a, b| a.0.total_cmp(&b.0));
+        decisive.map(|(_, difference)| difference)
     }
 
-    /// Sample of a tolerance with the smallest distance inside its limit.
-    fn worst<'a>(
+    /// Difference at the sample of a tolerance with the smallest distance inside its limit, after that
+    /// distance.
+    fn worst(
         &self,
         flown: (&Recording, &FreeRun),
         posterior: &LocalPosterior,
-        judged: &'a Judged<'a>,
-    ) -> Option<Place<'a>> {
+        judged: &Judged,
+    ) -> Option<(f64, LinearDifference)> {
         let samples = 0..self.mean.outputs.len();
         let all = samples.filter_map(|sample| {
             let own = self.difference(flown, sample, judged)?;
-            let deviation = own.deviation(&posterior.covariance).hypot(own.rest);
-            Some(Place {
-                distance: (1.0 - own.mean.abs()) / deviation,
-                sample,
-                judged,
-            })
+            Some((own.distance(&posterior.covariance), own))
         });
-        all.min_by(|a, b| a.distance.total_cmp(&b.distance))
+        all.min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
     /// Difference at a sample; `None` for one that ingest has repaired, or a tolerance of no output.
@@ -155,7 +188,7 @@ impl LinearOutputs {
     }
 }
 
-/// Difference at one sample, in tolerances.
+/// Difference at one sample or of one value, in tolerances.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearDifference {
     pub quantity: MatchedQuantity,
@@ -167,6 +200,11 @@ pub struct LinearDifference {
 }
 
 impl LinearDifference {
+    /// Distance inside the nearest limit, standard deviations.
+    fn distance(&self, covariance: &DMatrix<f64>) -> f64 {
+        (1.0 - self.mean.abs()) / self.deviation(covariance).hypot(self.rest)
+    }
+
     /// Standard deviation by the derivatives.
     #[must_use]
     pub fn deviation(&self, covariance: &DMatrix<f64>) -> f64 {

@@ -50,6 +50,16 @@ impl DutchRoll {
     }
 }
 
+/// Quantity of the Dutch roll that repeat flights' estimates have, to first order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RepeatQuantity {
+    pub mean: f64,
+    /// Slopes along the deviations, in their order.
+    pub slopes: Vec<f64>,
+    /// Standard deviation by the errors of the estimates.
+    pub error: f64,
+}
+
 /// Lateral equations at a maneuver's condition, with the maneuver's own estimates.
 #[derive(Clone, Debug)]
 pub struct LateralModes {
@@ -131,8 +141,42 @@ impl LateralModes {
         DVector::from_iterator(self.own.len(), values)
     }
 
+    /// Quantity that the estimates of repeat flights have, about the mean of a posterior; `deviations` are
+    /// places in the build-up and standard deviations. `None` where the Dutch roll does not oscillate.
+    #[must_use]
+    pub fn of_repeats(
+        &self,
+        quantity: MatchedQuantity,
+        mean: &DerivativeTable,
+        deviations: &[(usize, f64)],
+    ) -> Option<RepeatQuantity> {
+        let values = self.values(mean);
+        let at = |values: DVector<f64>| self.as_estimated(values)?.value(quantity);
+        let effect = |by: &DVector<f64>| Some(0.5 * (at(&values + by)? - at(&values - by)?));
+        let slope = |(derivative, deviation): &(usize, f64)| {
+            let own = self.derivatives.iter().position(|own| own == derivative);
+            let Some(own) = own.filter(|_| *deviation > 0.0) else {
+                return Some(0.0);
+            };
+            let mut by = DVector::zeros(values.len());
+            by[own] = *deviation;
+            Some(effect(&by)? / deviation)
+        };
+        let slopes: Option<Vec<f64>> = deviations.iter().map(slope).collect();
+        let errors: Option<Vec<f64>> = self.errors.iter().map(effect).collect();
+        Some(RepeatQuantity {
+            mean: at(values.clone())?,
+            slopes: slopes?,
+            error: errors?
+                .iter()
+                .map(|error| error * error)
+                .sum::<f64>()
+                .sqrt(),
+        })
+    }
+
     /// Dutch roll that a repeat flight's estimates have: those of an aircraft that deviates from a
-    /// model, with errors of their own. What the maneuver holds stays.
+    /// model, with errors of their own.
     #[must_use]
     pub fn of_repeat(
         &self,
@@ -147,6 +191,11 @@ impl LateralModes {
         for error in &self.errors {
             values.axpy(stream.normal(), error, 1.0);
         }
+        self.as_estimated(values)
+    }
+
+    /// Dutch roll of a repeat flight's values. What the maneuver holds stays.
+    fn as_estimated(&self, mut values: DVector<f64>) -> Option<DutchRoll> {
         for ((value, own), is_estimated) in values.iter_mut().zip(&self.own).zip(&self.estimated) {
             if !is_estimated {
                 *value = *own;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::aerodynamics::Aerodynamics;
-use super::decisive_difference::{DecisiveDifference, LinearOutputs};
+use super::decisive_difference::{DecisiveDifference, LinearOutputs, PredictedDutchRoll};
 use super::derivative_table::DerivativeTable;
 use super::dutch_roll::{LateralModes, OwnEstimates};
 use super::free_run::{FreeRun, Simulation};
@@ -196,10 +196,16 @@ impl<'a> Flight<'a> {
         let own = (!follows_mean).then(|| self.trimmed(database));
         let Trimmed { simulation, start } = own.as_ref().unwrap_or(&posterior);
         let run = simulation.fly(&start.start, self.recording.samples, linear.stride);
-        let judged = judgement::judged(&self.tests, false);
+        let judged = judgement::judged(&self.tests, self.modes.is_some());
+        let dutch_roll = self.modes.as_ref().map(|modes| PredictedDutchRoll {
+            modes,
+            mean: &posterior.simulation.aerodynamics.table,
+            model: &simulation.aerodynamics.table,
+        });
+        let about = (local, basis.buildup);
         let decisive = linear
-            .decisive(&self.recording, &run, local, &judged)
-            .ok_or("its simulation departs, or no tolerance is of a time history")?;
+            .decisive((&self.recording, &run), dutch_roll, about, &judged)
+            .ok_or("its simulation departs, or no tolerance can be judged")?;
         let named = decisive.slopes.iter();
         let named = named.map(|(value, slope)| (local.values[*value].clone(), *slope));
         Ok(DecisiveDifference {

@@ -2,9 +2,12 @@
 
 use approx::assert_relative_eq;
 
-use super::fixture::{flown, noisy, recording, shipped, simulation, specification, truth};
+use super::fixture::{
+    estimated, flown, noisy, recording, shipped, simulation, specification, truth,
+};
 use super::repeat_flight::{drawn, posterior};
 use crate::aero::{Axis, WindTunnel};
+use crate::estimate;
 use crate::model::LocalPosterior;
 use crate::numerics::normal;
 use crate::numerics::random::RandomStream;
@@ -127,4 +130,49 @@ fn its_deviation_is_that_of_drawn_aircraft() {
     assert_relative_eq!(deviation, largest, max_relative = 0.12);
     let inside = normal::within(1.0, own.mean, deviation.hypot(own.rest));
     assert!((0.0..1.0).contains(&inside), "{inside}");
+}
+
+#[test]
+fn a_dutch_roll_that_is_wrong_decides_with_its_difference_in_tolerances() {
+    let flown = flown("PYRS", 10.0);
+    let config = &shipped().config;
+    let local = posterior(&flown, 1.0);
+    let mut of_period = specification();
+    of_period.tests.retain(|t| t.axis == Axis::Lateral);
+    for test in &mut of_period.tests {
+        test.all_of
+            .retain(|r| r.one_of[0].quantity == MatchedQuantity::DutchRollPeriod);
+    }
+    let means = estimate::means(&flown.record, &flown.maneuver, &config.buildup).unwrap();
+    let own = estimated(&flown, &["Cn_beta", "Cn_r"], 1.0);
+    let record = noisy(&flown, 1);
+    let mean = truth(&flown, "", 1.0);
+    let decisive = |database: WindTunnel, own| {
+        let basis = Basis {
+            aircraft: &config.aircraft,
+            buildup: &config.buildup,
+            models: &[(ModelSource::Tunnel, database)],
+            posterior: &mean,
+            tunnel: &config.tunnel,
+            specification: &of_period,
+        };
+        let flown = Flown {
+            record: &record,
+            maneuver: &flown.maneuver,
+            local: Some(&local),
+            own,
+        };
+        decisive_difference(&basis, &flown)
+    };
+    let right = decisive(truth(&flown, "", 1.0), Some((&means, &own))).unwrap();
+    assert_eq!(right.quantity, MatchedQuantity::DutchRollPeriod);
+    assert_relative_eq!(right.mean, 0.0, epsilon = 1e-9);
+    let wrong = decisive(truth(&flown, "Cn_beta", 1.02), Some((&means, &own))).unwrap();
+    let slope = wrong.slopes.iter().find(|(v, _)| v.derivative == "Cn_beta");
+    let value = flown.truth.iter().find(|d| d.derivative == "Cn_beta");
+    let expected = -0.02 * value.unwrap().value * slope.unwrap().1;
+    // Less weathercock stability than the model has: a longer period.
+    assert!(wrong.mean > 0.0);
+    assert_relative_eq!(wrong.mean, expected, max_relative = 0.05);
+    assert!(decisive(truth(&flown, "", 1.0), None).is_err());
 }

@@ -3,6 +3,8 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
+use nalgebra::{DMatrix, DVector};
+
 use crate::aero::wind_tunnel::{self, TunnelPoint};
 use crate::aero::{Buildup, Condition, WindTunnel};
 use crate::aircraft::Aircraft;
@@ -14,7 +16,7 @@ use crate::proof_of_match::aerodynamics::Aerodynamics;
 use crate::proof_of_match::derivative_table::DerivativeTable;
 use crate::proof_of_match::free_run::Simulation;
 use crate::proof_of_match::recording::Recording;
-use crate::proof_of_match::{Basis, Flown, Matched, Specification, fly_again};
+use crate::proof_of_match::{Basis, Flown, Matched, OwnEstimates, Specification, fly_again};
 use crate::tables::{MatchVerdictRow, ModelSource};
 
 pub fn shipped() -> &'static SimulatedCampaign {
@@ -43,6 +45,26 @@ pub fn flown(class: &str, alpha_deg: f64) -> FlownManeuver {
     let mut flown = shipped().simulator.fly(&card).unwrap();
     flown.maneuver.recognised.first_input_s = first;
     flown
+}
+
+/// Estimates at the truth: of some derivatives with independent errors of so many per cent, the others held.
+pub fn estimated(flown: &FlownManeuver, names: &[&str], error_pct: f64) -> OwnEstimates {
+    let error = |name: &&str| {
+        let own = flown.truth.iter().find(|d| d.derivative == **name).unwrap();
+        0.01 * error_pct * own.value
+    };
+    let errors: Vec<f64> = names.iter().map(error).collect();
+    let variances = errors.iter().map(|error| error * error);
+    let covariance = DMatrix::from_diagonal(&DVector::from_iterator(names.len(), variances));
+    OwnEstimates {
+        values: flown
+            .truth
+            .iter()
+            .map(|d| (d.derivative.clone(), d.value))
+            .collect(),
+        estimated: names.iter().map(|&name| name.to_owned()).collect(),
+        covariance: covariance.as_slice().to_vec(),
+    }
 }
 
 /// Record of a maneuver with the campaign's noise alone.
