@@ -10,7 +10,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::derivative_table::DerivativeTable;
-use super::dutch_roll::LateralModes;
+use super::dutch_roll::{DutchRoll, LateralModes};
 use super::free_run::FreeRun;
 use super::judgement::Judged;
 use super::outputs::place;
@@ -55,12 +55,11 @@ pub struct PredictedDutchRoll<'a> {
     pub modes: &'a LateralModes,
     /// Derivatives of the posterior's mean.
     pub mean: &'a DerivativeTable,
-    /// Derivatives of the model.
-    pub model: &'a DerivativeTable,
+    pub model: DutchRoll,
 }
 
 impl PredictedDutchRoll<'_> {
-    /// Difference of a quantity; `None` where one does not oscillate.
+    /// Difference of a quantity; `None` where that of the repeat flights does not oscillate.
     fn difference(
         &self,
         posterior: &LocalPosterior,
@@ -74,7 +73,7 @@ impl PredictedDutchRoll<'_> {
         let deviations: Vec<(usize, f64)> = moving.iter().map(deviation).collect();
         let quantity = tolerance.quantity;
         let repeats = self.modes.of_repeats(quantity, self.mean, &deviations)?;
-        let model = self.modes.of_model(self.model)?.value(quantity)?;
+        let model = self.model.value(quantity)?;
         let per_width = 1.0 / tolerance.width(repeats.mean);
         let slopes = moving.iter().zip(&repeats.slopes);
         Some(LinearDifference {

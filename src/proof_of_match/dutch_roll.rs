@@ -167,11 +167,7 @@ impl LateralModes {
         Some(RepeatQuantity {
             mean: at(values.clone())?,
             slopes: slopes?,
-            error: errors?
-                .iter()
-                .map(|error| error * error)
-                .sum::<f64>()
-                .sqrt(),
+            error: DVector::from_vec(errors?).norm(),
         })
     }
 

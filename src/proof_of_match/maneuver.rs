@@ -103,6 +103,23 @@ fn dutch_roll(
     LateralModes::new(model, (maneuver, means), estimates)
 }
 
+/// Dutch roll of a model beside that of repeat flights about the posterior's mean.
+///
+/// # Errors
+/// A sentence where the model does not oscillate: no repeat flight passes then.
+fn predicted_dutch_roll<'a>(
+    modes: &'a LateralModes,
+    posterior: &'a Simulation,
+    model: &Simulation,
+) -> Result<PredictedDutchRoll<'a>, String> {
+    let own = modes.of_model(&model.aerodynamics.table);
+    Ok(PredictedDutchRoll {
+        modes,
+        mean: &posterior.aerodynamics.table,
+        model: own.ok_or("its Dutch roll does not oscillate")?,
+    })
+}
+
 /// Rows of a maneuver that is not flown again.
 #[must_use]
 pub fn not_flown(basis: &Basis, maneuver: &Maneuver, reason: &str) -> Matched {
@@ -197,11 +214,8 @@ impl<'a> Flight<'a> {
         let Trimmed { simulation, start } = own.as_ref().unwrap_or(&posterior);
         let run = simulation.fly(&start.start, self.recording.samples, linear.stride);
         let judged = judgement::judged(&self.tests, self.modes.is_some());
-        let dutch_roll = self.modes.as_ref().map(|modes| PredictedDutchRoll {
-            modes,
-            mean: &posterior.simulation.aerodynamics.table,
-            model: &simulation.aerodynamics.table,
-        });
+        let predicted = |modes| predicted_dutch_roll(modes, &posterior.simulation, simulation);
+        let dutch_roll = self.modes.as_ref().map(predicted).transpose()?;
         let about = (local, basis.buildup);
         let decisive = linear
             .decisive((&self.recording, &run), dutch_roll, about, &judged)

@@ -175,4 +175,10 @@ fn a_dutch_roll_that_is_wrong_decides_with_its_difference_in_tolerances() {
     assert!(wrong.mean > 0.0);
     assert_relative_eq!(wrong.mean, expected, max_relative = 0.05);
     assert!(decisive(truth(&flown, "", 1.0), None).is_err());
+    // A model that does not oscillate fails every repeat flight: it is no goal to be decided.
+    let unstable = decisive(truth(&flown, "Cn_beta", -20.0), Some((&means, &own)));
+    assert_eq!(
+        unstable,
+        Err("its Dutch roll does not oscillate".to_owned())
+    );
 }
