@@ -6,7 +6,7 @@ use std::path::Path;
 use super::checked::Config;
 use super::instruments::Instrument;
 use super::source::{Files, Source};
-use crate::aero::{Axis, Buildup, Output, Regressor, WindTunnel, wind_tunnel};
+use crate::aero::{Axis, Buildup, DerivativeUnit, Output, Regressor, WindTunnel, wind_tunnel};
 use crate::aircraft::ThrustLine;
 use crate::error::{Error, Result, did_you_mean, similarity};
 use crate::estimate::Hold;
@@ -60,9 +60,16 @@ pub(super) fn tunnel(
         {
             let unit = derivative.unit();
             let Some(factor) = unit.factor_from(&row.unit) else {
+                let of_vane = [DerivativeUnit::LbfPerDeg, DerivativeUnit::FtLbfPerDeg];
+                let is_of_vane = of_vane.iter().any(|u| u.factor_from(&row.unit).is_some());
+                let hint = if unit == DerivativeUnit::PerDeg && is_of_vane {
+                    "; a thrust-vectoring vane has `vane: true` in model.yaml"
+                } else {
+                    ""
+                };
                 let (name, written, unit) = (&row.derivative, &row.unit, unit.name());
                 return error(format!(
-                    "`{name}` is in `{written}`, which cannot become the model's `{unit}`"
+                    "`{name}` is in `{written}`, which cannot become the model's `{unit}`{hint}"
                 ));
             };
             row.value *= factor;

@@ -884,6 +884,11 @@ fn a_tunnel_table_in_another_unit_is_named() {
         Copy::new().error_with_tunnel("CN_alpha,10,0.08,per_deg\nCN_alpha,20,2.2,lbf\n"),
         "tunnel.csv:3: `CN_alpha` is in `lbf`, which cannot become the model's `per_deg`"
     );
+    assert_eq!(
+        Copy::new().error_with_tunnel("CN_de,10,300,lbf_per_deg\n"),
+        "tunnel.csv:2: `CN_de` is in `lbf_per_deg`, which cannot become the model's `per_deg`; a thrust-vectoring vane has `vane: \
+         true` in model.yaml"
+    );
 }
 
 #[test]
