@@ -386,6 +386,13 @@ fn init_writes_a_pipeline_whose_questions_check_lists() {
     }
     let aircraft = folder.path().join("pipelines/mine/aircraft.yaml");
     let text = fs::read_to_string(&aircraft).unwrap();
+    for line in [
+        "\n  qbar_psf: { uncertainty: { scale_pct: 0.5 }, ordinary",
+        "\n  thrust_lbf: { uncertainty: { scale_pct: 1 } }\n",
+        "\n  de_deg: { uncertainty: { bias: 0.05, scale_pct: 0.2 } }\n",
+    ] {
+        assert!(text.contains(line), "`{line}` is not in\n{text}");
+    }
     fs::write(&aircraft, text.replace("FILL_IN", "10")).unwrap();
     let pipeline = folder.path().join("pipelines/mine/pipeline.yaml");
     let text = fs::read_to_string(&pipeline).unwrap();

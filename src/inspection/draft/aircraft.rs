@@ -172,9 +172,9 @@ fn constants(draft: &Draft) -> String {
 }
 
 /// Usual errors of an instrument: uncertainty after calibration, ordinary error and fault, each with bias
-/// and scale error in percent.
+/// and scale error in percent; empty where the signal has none.
 struct UsualErrors {
-    quantities: &'static [Quantity],
+    signals: &'static [&'static str],
     uncertainty: &'static str,
     ordinary: &'static str,
     fault: &'static str,
@@ -183,61 +183,100 @@ struct UsualErrors {
 /// Errors of usual flight-test instruments.
 const USUAL: &[UsualErrors] = &[
     UsualErrors {
-        quantities: &[Quantity::P, Quantity::Q, Quantity::R],
+        signals: &[signal::P, signal::Q, signal::R],
         uncertainty: "bias: 0.05, scale_pct: 0.1",
         ordinary: "bias: 0.1, scale_pct: 0.5",
         fault: "bias: 0.5, scale_pct: 5",
     },
     UsualErrors {
-        quantities: &[Quantity::An, Quantity::Ax, Quantity::Ay],
+        signals: &[signal::AN, signal::AX, signal::AY],
         uncertainty: "bias: 0.01, scale_pct: 0.1",
         ordinary: "bias: 0.01, scale_pct: 0.3",
         fault: "bias: 0.05, scale_pct: 5",
     },
     UsualErrors {
-        quantities: &[Quantity::Alpha, Quantity::Beta],
+        signals: &[signal::ALPHA_VANE, signal::BETA_VANE],
         uncertainty: "bias: 0.1",
         ordinary: "bias: 0.3, scale_pct: 2",
         fault: "bias: 2, scale_pct: 10",
     },
     UsualErrors {
-        quantities: &[Quantity::Velocity],
+        signals: &[signal::VELOCITY],
         uncertainty: "bias: 1, scale_pct: 0.2",
         ordinary: "bias: 3, scale_pct: 1",
         fault: "bias: 20, scale_pct: 5",
     },
     UsualErrors {
-        quantities: &[Quantity::Theta, Quantity::Phi, Quantity::Psi],
+        signals: &[signal::THETA, signal::PHI, signal::PSI],
         uncertainty: "bias: 0.1",
         ordinary: "bias: 0.2, scale_pct: 0.5",
         fault: "bias: 1, scale_pct: 5",
     },
+    UsualErrors {
+        signals: &[signal::QBAR],
+        uncertainty: "scale_pct: 0.5",
+        ordinary: "bias: 1, scale_pct: 3",
+        fault: "bias: 10, scale_pct: 15",
+    },
+    UsualErrors {
+        signals: &[signal::ALTITUDE],
+        uncertainty: "",
+        ordinary: "bias: 100, scale_pct: 1",
+        fault: "bias: 1000, scale_pct: 5",
+    },
+    UsualErrors {
+        signals: &[signal::MACH],
+        uncertainty: "",
+        ordinary: "bias: 0.005, scale_pct: 2",
+        fault: "bias: 0.05, scale_pct: 10",
+    },
+    UsualErrors {
+        signals: &[signal::THRUST],
+        uncertainty: "scale_pct: 1",
+        ordinary: "",
+        fault: "",
+    },
 ];
 
+/// Errors of the transducer of a surface.
+const OF_SURFACES: UsualErrors = UsualErrors {
+    signals: &[],
+    uncertainty: "bias: 0.05, scale_pct: 0.2",
+    ordinary: "",
+    fault: "",
+};
+
+impl UsualErrors {
+    /// Line of a signal.
+    fn line(&self, signal: &str) -> String {
+        let kinds = [
+            ("uncertainty", self.uncertainty),
+            ("ordinary", self.ordinary),
+            ("fault", self.fault),
+        ];
+        let given = kinds.iter().filter(|(_, sizes)| !sizes.is_empty());
+        let given: Vec<String> = given
+            .map(|(kind, sizes)| format!("{kind}: {{ {sizes} }}"))
+            .collect();
+        format!("  {signal}: {{ {} }}\n", given.join(", "))
+    }
+}
+
 fn instruments(draft: &Draft) -> String {
-    let mut text = "
+    let of_signals = USUAL.iter().flat_map(|usual| {
+        let recorded = usual.signals.iter().filter(|name| draft.has(name));
+        recorded.map(|name| usual.line(name))
+    });
+    let surfaces = draft.inputs().filter(|(_, input)| input.kind.is_surface());
+    let of_surfaces = surfaces.map(|(channel, _)| OF_SURFACES.line(&channel.signal));
+    let lines: String = of_signals.chain(of_surfaces).collect();
+    let map = if lines.is_empty() { " {}\n" } else { "\n" };
+    format!(
+        "
 # Sizes of the errors of the instruments, in the signal's unit and in percent: what calibration leaves (uncertainty), what a
-# healthy instrument has (ordinary), and what makes it faulty (fault). These are usual ones; give the recorder's own.
-instruments:
-"
-    .to_owned();
-    let before = text.len();
-    for usual in USUAL {
-        let recorded = usual.quantities.iter().filter(|q| draft.has(q.signal()));
-        for quantity in recorded {
-            let _ = writeln!(
-                text,
-                "  {}: {{ uncertainty: {{ {} }}, ordinary: {{ {} }}, fault: {{ {} }} }}",
-                quantity.signal(),
-                usual.uncertainty,
-                usual.ordinary,
-                usual.fault
-            );
-        }
-    }
-    if text.len() == before {
-        text.truncate(before - 1);
-        text += " {}\n";
-    }
-    text
+# healthy instrument has (ordinary), and what makes it faulty (fault). These are usual ones; give the recorder's own. Signals
+# without an uncertainty count as exact: a scale error of mass or of an inertia is one of all derivatives of a force or a
+# moment (mass_slug: {{ uncertainty: {{ scale_pct: 0.5 }} }}).
+instruments:{map}{lines}"
+    )
 }
