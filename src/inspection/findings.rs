@@ -96,7 +96,8 @@ pub fn inspect(recordings: &[Recording]) -> Result<Inspection, String> {
         channels: vec![time_channel(&clock, &facts)],
     };
     findings.add_motion(&search(&fine), &assignment);
-    findings.add_inputs(&inputs(&fine, &assignment, &facts), &fine);
+    let inputs = inputs((&fine, &grid), &assignment, &facts);
+    findings.add_inputs(&inputs, &grid);
     findings.add_constants();
     findings.add_flags(recordings);
     let unused = findings.unused(&candidates, &assignment);

@@ -1,5 +1,7 @@
 //! Surfaces, pilot controls and flags of a recording: their signs from the motion that they cause.
 
+use std::ops::Range;
+
 use super::assignment::Assignment;
 use super::effects::{Effect, Regression, effects};
 use super::grid::Grid;
@@ -37,9 +39,14 @@ pub struct InputColumn {
     pub evidence: String,
 }
 
-/// Signs and axes of the inputs that names tell.
+/// Signs and axes of the inputs that names tell: the signs from the `liveliest` parts, the axes of other
+/// surfaces from all of the recordings, since a flap may move in few maneuvers.
 #[must_use]
-pub fn inputs(grid: &Grid, assignment: &Assignment, facts: &[ColumnFacts]) -> Vec<InputColumn> {
+pub fn inputs(
+    (liveliest, all): (&Grid, &Grid),
+    assignment: &Assignment,
+    facts: &[ColumnFacts],
+) -> Vec<InputColumn> {
     let is_motion = |c: &&ColumnFacts| assignment.values().any(|choice| choice.column == c.name);
     let named = facts.iter().filter(|c| !is_motion(c));
     let named: Vec<(&ColumnFacts, Input)> = named.filter_map(|c| Some((c, kind_of(c)?))).collect();
@@ -49,12 +56,12 @@ pub fn inputs(grid: &Grid, assignment: &Assignment, facts: &[ColumnFacts]) -> Ve
         .iter()
         .copied()
         .partition(|(_, kind)| *kind != Input::OtherSurface);
-    let mut found = Responses::of(grid, assignment, &main, 1).inputs();
+    let mut found = Responses::of(liveliest, assignment, &main, 1).inputs();
     // A mixed surface moves with a main one, and shares its effect: the main ones are judged without the others.
-    let all = Responses::of(grid, assignment, &surfaces, 1).inputs();
+    let with_others = Responses::of(all, assignment, &surfaces, 1).inputs();
     let is_other = |input: &InputColumn| others.iter().any(|(facts, _)| facts.name == input.column);
-    found.extend(all.into_iter().filter(is_other));
-    found.extend(Responses::of(grid, assignment, &controls, CONTROL_STEPS).inputs());
+    found.extend(with_others.into_iter().filter(is_other));
+    found.extend(Responses::of(liveliest, assignment, &controls, CONTROL_STEPS).inputs());
     found
 }
 
@@ -228,14 +235,24 @@ fn slopes(grid: &Grid, values: &[f64], steps: usize) -> Vec<f64> {
     slopes
 }
 
-/// Shares of the samples beyond which an input's range does not reach: maneuvers are short.
+/// Share of the samples beyond an input's range, and of the changes beyond its quickest one.
 const RARELY: f64 = 0.002;
+/// Longest time beyond them, s: in hours of recording a single maneuver moves its surfaces for longer.
+const RARELY_S: f64 = 0.5;
 
-/// `true` for a surface or a control that moves in the liveliest parts.
+/// Share of the samples of a grid that are rare.
+fn rare_share(grid: &Grid) -> f64 {
+    let samples: usize = grid.stretches.iter().map(Range::len).sum();
+    let duration_s = samples as f64 * grid.step_s;
+    RARELY.min(RARELY_S / duration_s)
+}
+
+/// `true` for a surface or a control that moves.
 #[must_use]
 pub fn moves(grid: &Grid, facts: &ColumnFacts, kind: Input) -> bool {
     let values = || grid.columns.get(&facts.name).into_iter().flatten().copied();
-    let range = quantile(values(), 1.0 - RARELY).zip(quantile(values(), RARELY));
+    let rarely = rare_share(grid);
+    let range = quantile(values(), 1.0 - rarely).zip(quantile(values(), rarely));
     let is_in_radians = facts.unit.is_some_and(|unit| unit.name == "rad");
     let least = match (kind.is_surface(), is_in_radians) {
         (true, true) => MOVES_DEG.to_radians(),
@@ -245,8 +262,6 @@ pub fn moves(grid: &Grid, facts: &ColumnFacts, kind: Input) -> bool {
     range.is_some_and(|(high, low)| high - low > least)
 }
 
-/// Share of changes below the quickest ones: steps are rare.
-const QUICK: f64 = 0.998;
 /// Size of a step over the quickest change: the smallest of several inputs counts as well.
 const STEP_SHARE: f64 = 0.2;
 /// Steps of the grid in which a step happens.
@@ -262,6 +277,104 @@ pub fn step_size(grid: &Grid, column: &str) -> Option<f64> {
             .windows(STEP_TIME + 1)
             .map(|w| (w[STEP_TIME] - w[0]).abs())
     });
-    let size = STEP_SHARE * quantile(changes, QUICK)?;
+    let size = STEP_SHARE * quantile(changes, 1.0 - rare_share(grid))?;
     (size > 0.0).then_some(size)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inspection::assignment::Choice;
+    use crate::inspection::plausible::facts;
+    use crate::inspection::recording::{Column, Recording};
+    use crate::numerics::sample_count::whole_steps;
+
+    const STEP_S: f64 = 0.1;
+
+    /// Four hours of a surface at rest, with a doublet of 4 deg in the middle that lasts this long.
+    fn surface(doublet_s: f64) -> Vec<f64> {
+        let mut values: Vec<f64> = (0..144_000).map(|k| 0.02 * f64::from(k % 3)).collect();
+        let (middle, half) = (72_000, whole_steps(0.5 * doublet_s, STEP_S));
+        values[middle - half..middle].fill(4.0);
+        values[middle..middle + half].fill(-4.0);
+        values
+    }
+
+    fn grid(columns: &[(&str, Vec<f64>)]) -> Grid {
+        let (_, values) = columns.first().expect("a column");
+        Grid {
+            step_s: STEP_S,
+            stretches: vec![0..values.len(); 1],
+            columns: columns
+                .iter()
+                .map(|(name, values)| ((*name).to_owned(), values.clone()))
+                .collect(),
+        }
+    }
+
+    /// A grid with this surface, and what is known of its column.
+    fn of_surface(values: Vec<f64>) -> (Grid, ColumnFacts) {
+        let column = Column {
+            name: "dsa".to_owned(),
+            stated: Some("deg".to_owned()),
+            values: values.clone(),
+        };
+        let recording = Recording {
+            name: "flight".to_owned(),
+            columns: vec![column],
+        };
+        let facts = facts(&[recording]).pop().expect("a column");
+        (grid(&[("dsa", values)]), facts)
+    }
+
+    #[test]
+    fn a_surface_that_one_maneuver_of_a_campaign_steps_is_a_surface_that_moves() {
+        let (grid, dsa) = of_surface(surface(6.0));
+        assert!(moves(&grid, &dsa, Input::OtherSurface));
+        let step = step_size(&grid, "dsa").expect("a step");
+        assert!((0.7..=1.7).contains(&step), "{step}");
+    }
+
+    #[test]
+    fn a_surface_that_leaves_its_place_for_a_moment_rests() {
+        let (grid, dsa) = of_surface(surface(0.4));
+        assert!(!moves(&grid, &dsa, Input::OtherSurface));
+    }
+
+    #[test]
+    fn the_axis_of_a_flap_that_few_maneuvers_move_follows_from_all_of_the_recordings() {
+        let dsa = surface(6.0);
+        let mut q = vec![0.0; dsa.len()];
+        for k in 1..dsa.len() - 1 {
+            q[k + 1] = q[k - 1] - 2.0 * STEP_S * (2.0 * dsa[k] + 0.1 * (0.37 * k as f64).sin());
+        }
+        // The rest of the surface, without a meaning, goes with the roll rate.
+        let p = (0..dsa.len()).map(|k| if k % 3 == 1 { -0.05 } else { 0.0 });
+        let all = grid(&[("dsa", dsa.clone()), ("q", q), ("p", p.collect())]);
+        let (_, facts) = of_surface(dsa);
+        let liveliest = Grid {
+            stretches: vec![0..6_000; 1],
+            columns: all
+                .columns
+                .iter()
+                .map(|(name, values)| (name.clone(), values[..6_000].to_vec()))
+                .collect(),
+            ..all.clone()
+        };
+        let choice = |quantity, column: &str| {
+            let choice = Choice {
+                column: column.to_owned(),
+                unit: "deg/s",
+                sign: 1.0,
+            };
+            (quantity, choice)
+        };
+        let assignment = [choice(Quantity::P, "p"), choice(Quantity::Q, "q")].into();
+        let acts = |all: &Grid| {
+            let found = inputs((&liveliest, all), &assignment, std::slice::from_ref(&facts));
+            found.first().map(|input| input.acts)
+        };
+        assert_eq!(acts(&liveliest), Some(Acts::Roll));
+        assert_eq!(acts(&all), Some(Acts::Pitch));
+    }
 }
