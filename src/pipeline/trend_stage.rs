@@ -15,7 +15,7 @@ use crate::tables::EstimateRow;
 use crate::trend;
 
 /// Version of the trends.
-pub const TREND_VERSION: u32 = 4;
+pub const TREND_VERSION: u32 = 5;
 
 /// Version of the comparison.
 pub const COMPARE_VERSION: u32 = 2;

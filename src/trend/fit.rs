@@ -106,7 +106,14 @@ impl Trend {
                 }
             })?
             .clone();
-        let likelihood = |fit: &Fit| (0.5 * (best.criterion - fit.criterion)).exp();
+        // Of three maneuvers the criterion has no finite value.
+        let likelihood = |fit: &Fit| {
+            if fit.criterion.total_cmp(&best.criterion).is_eq() {
+                1.0
+            } else {
+                (0.5 * (best.criterion - fit.criterion)).exp()
+            }
+        };
         let total: f64 = fits.iter().map(likelihood).sum();
         Some(Trend {
             orders: fits
@@ -446,6 +453,23 @@ mod tests {
             for a in [5.0, 20.0, 40.0, 60.0] {
                 assert_relative_eq!(fit.at(a).0, cubic(a), epsilon = 0.01);
             }
+        }
+    }
+
+    #[test]
+    fn the_mean_of_three_maneuvers_has_at_least_the_error_that_their_bounds_leave() {
+        let data = points(|a| 0.5 + 0.02 * (a / 10.0).sin(), &[10.0, 20.0, 30.0]);
+        for criterion in [Criterion::Aicc, Criterion::Bic] {
+            let settings = Settings {
+                criterion,
+                ..Settings::default()
+            };
+            let trend = Trend::through(&data, &settings, &[]).expect("a trend");
+            let weights: Vec<f64> = trend.orders.iter().map(|(weight, _)| *weight).collect();
+            assert_eq!(weights, [1.0]);
+            let (value, error) = trend.at(20.0);
+            assert!((value - 0.5).abs() < 0.02, "{value}");
+            assert!(error >= 0.01 / 3.0_f64.sqrt(), "{error}");
         }
     }
 
