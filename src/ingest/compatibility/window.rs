@@ -111,8 +111,8 @@ pub fn margin(settings: &Compatibility, step_s: f64) -> usize {
     samples(settings.longest_delay_s, step_s) + 3
 }
 
-/// Least share of a window's length of the only window of a record.
-const ONLY_WINDOW: usize = 4;
+/// The only window of a record may be shorter than the configured length by this factor.
+const SHORTEST_ONLY: usize = 4;
 
 /// Windows of the configured length, or at least half of it, over which the equations can be
 /// integrated. Of a record too short for one its longest part is the window.
@@ -133,7 +133,7 @@ fn usable_windows(record: &Record, settings: &Compatibility) -> Vec<Range<usize>
         let runs = usable_runs(record).into_iter();
         let inner = runs.map(|run| run.start + margin..run.end.saturating_sub(margin));
         let longest = inner.max_by_key(ExactSizeIterator::len);
-        found.extend(longest.filter(|run| run.len() >= length / ONLY_WINDOW));
+        found.extend(longest.filter(|run| run.len() >= length / SHORTEST_ONLY));
     }
     found
 }
@@ -278,16 +278,18 @@ impl Window {
     }
 }
 
-/// Samples of the record that are averaged into one sample of a window, alike for all channels: 25
-/// samples a second resolve the motion of an aircraft.
+/// Samples of the record that are averaged into one sample of a window, alike for all channels: at least
+/// 25 a second remain, which resolve the motion of an aircraft.
 fn decimation(step_s: f64) -> usize {
     const SLOWEST_STEP_S: f64 = 0.04;
+    // The step is measured: at 50 and at 100 Hz the ratio is a whole number but for the clock's error.
+    const CLOCK_ERROR: f64 = 0.01;
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "a small positive number"
     )]
-    let decimation = (SLOWEST_STEP_S / step_s).floor().max(1.0) as usize;
+    let decimation = (SLOWEST_STEP_S / step_s + CLOCK_ERROR).floor().max(1.0) as usize;
     decimation
 }
 
@@ -494,3 +496,24 @@ pub fn input_factor(input: usize) -> f64 {
 }
 
 const _: () = assert!(INPUTS + OUTPUTS == INSTRUMENTS);
+
+#[cfg(test)]
+mod tests {
+    use super::decimation;
+
+    #[test]
+    fn at_least_25_samples_a_second_remain_whatever_the_error_of_the_clock() {
+        for (rate_hz, expected) in [
+            (10.0, 1),
+            (40.0, 1),
+            (50.0, 2),
+            (100.0, 4),
+            (120.0, 4),
+            (1000.0, 40),
+        ] {
+            for error in [-1e-4, 0.0, 1e-4] {
+                assert_eq!(decimation((1.0 + error) / rate_hz), expected, "{rate_hz}");
+            }
+        }
+    }
+}
