@@ -102,18 +102,6 @@ impl InterpolationKernel {
         }
     }
 
-    /// Offset of the first sample of the kernel.
-    #[must_use]
-    pub fn first_offset(&self) -> isize {
-        self.first
-    }
-
-    /// Offset of the last sample of the kernel.
-    #[must_use]
-    pub fn last_offset(&self) -> isize {
-        self.first + 3
-    }
-
     /// Samples, weights and slopes of the weights at sample `k` of `samples`. The end sample stands
     /// for samples beyond an end.
     pub fn weights_at(&self, k: usize, samples: usize) -> impl Iterator<Item = (usize, f64, f64)> {
