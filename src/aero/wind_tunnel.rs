@@ -3,7 +3,7 @@
 //!
 //! A table is read along α at the Mach numbers and third values on either side, then across Mach,
 //! then across the third variable, linearly or by a monotone cubic ([`super::interpolation`]).
-//! ExtrapolatedReading its ends a table has the value at the end (clamped) or none (refused), by the settings;
+//! Beyond its ends a table has the value at the end (clamped) or none (refused), by the settings;
 //! [`WindTunnel::extrapolations`] lists such readings.
 
 use std::collections::BTreeMap;

@@ -122,7 +122,8 @@ impl Window {
             if let Some(wrong) = wrong.filter(|_| signal::POSITIVE.contains(&name)) {
                 let (value, time_s) = (values[wrong], record.time_s(range.start + wrong));
                 return Err(format!(
-                    "signal `{name}` is {value} at {time_s:.3} s, inside the maneuver; it must be                      greater than zero"
+                    "signal `{name}` is {value} at {time_s:.3} s, inside the maneuver; it must be greater \
+                     than zero"
                 ));
             }
             let mean = mass_properties == MassProperties::Mean && MASS_PROPERTIES.contains(&name);

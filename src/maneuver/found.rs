@@ -31,7 +31,7 @@ table! {
         /// Set of equations.
         pub axis: Axis,
         /// Start: about a second of trimmed flight before the inputs. Maneuvers close together
-        /// share the pause between them (`segment: shared_lead_in:`).
+        /// share the pause between them (`segment: expert: shared_lead_in:`).
         pub start_s: f64 ["s"],
         /// End, after the decay of the response or where the pilot takes over.
         pub end_s: f64 ["s"],

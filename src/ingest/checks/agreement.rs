@@ -19,12 +19,12 @@ const LEAST_SELECTED: usize = 5;
 /// which it holds a jump of the record: far beyond noise, gusts and turbulence.
 const JUMP_DEVIATIONS: f64 = 10.0;
 
+/// Limit in its place for a relation that gusts excite: from there on it holds a motion of a control.
+const MANEUVER_DEVIATIONS: f64 = 3.0;
+
 /// Least change of the gusts' velocity with which a relation that they excite is checked, ft/s²:
 /// that of turbulence of 1 ft/s, ten times what still air appears to have.
 const LEAST_GUST_FT_S2: f64 = 0.75;
-
-/// The same distance for a relation that gusts excite: from there on it holds a motion of a control.
-const MANEUVER_DEVIATIONS: f64 = 3.0;
 
 /// Standard deviations that gusts reach in a window of many.
 const GUST_DEVIATIONS: f64 = 3.0;

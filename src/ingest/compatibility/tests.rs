@@ -1,5 +1,5 @@
 //! The equations against closed forms and finite differences, and the fit against flights whose
-//! errors are terms.
+//! errors are known.
 
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 use nalgebra::{Matrix3, Vector3};

@@ -278,7 +278,7 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    /// HoldingCandidates under white noise of unit variance and weight: the gradient's covariance is the
+    /// Candidates under white noise of unit variance and weight: the gradient's covariance is the
     /// information.
     fn candidates(information: DMatrix<f64>, uncertainty: Vec<Option<f64>>) -> HoldingCandidates {
         HoldingCandidates {
