@@ -123,27 +123,18 @@ pub fn text(draft: &Draft, class: &DraftClass) -> String {
     }
     text += "  lead_in_s: 1 # trimmed flight before the first step\n  decay_s: 2.4 # response after the last step\n\n";
     let surfaces = draft.surfaces(class.axis == Axis::Longitudinal);
-    let (own, others): (Vec<_>, Vec<_>) = surfaces
-        .into_iter()
-        .partition(|(_, input)| input.kind != Input::OtherSurface);
-    let of = |surfaces: &[(&Channel, &InputColumn)]| -> Vec<String> {
-        let names = surfaces.iter().flat_map(|(s, _)| of_surface(class.axis, s));
-        names.collect()
-    };
+    let of_surfaces = surfaces.iter().flat_map(|(s, _)| of_surface(class.axis, s));
     let estimated = [
         basic(class.axis),
-        of(&own),
+        of_surfaces.collect(),
         biased(class.axis).map(bias).collect(),
     ];
     text += "\
-# estimated: from the maneuver; held: at the wind tunnel's value; inactive: not in the model of this class. Estimate what the
-# maneuver excites: a surface that steps in it belongs under estimated, one that rests under inactive.
+# estimated: from the maneuver, where the surface moves in it; held: at the wind tunnel's value; inactive: small feedback
+# motion alone, at the tunnel's value where there is one. With a tunnel, put surfaces that only follow a schedule or feedback
+# under inactive: then the others are estimated better.
 ";
     let _ = writeln!(text, "estimated:\n  [{}]", wrapped(&estimated.concat()));
-    let others = of(&others);
-    if !others.is_empty() {
-        let _ = writeln!(text, "inactive:\n  [{}]", wrapped(&others));
-    }
     let _ = writeln!(
         text,
         "\n# The diagonal of W1, on residuals in deg, deg/s and g, for output error alone.\nweights: {}",
