@@ -9,6 +9,7 @@ mod estimated;
 mod task;
 mod prepared_case;
 mod fitting;
+mod resting_surfaces;
 mod rows;
 mod calibration_effect;
 mod diagnostics;

@@ -109,6 +109,11 @@ pub fn maneuver(
         class,
         context,
     };
+    let (class, _) = task.class_of_moving_surfaces();
+    let task = Task {
+        class: &class,
+        ..task
+    };
     let predicted = match class.axis {
         Axis::Longitudinal => {
             predict::<3, Longitudinal, 4, LongitudinalInGusts>(&task, own, others)

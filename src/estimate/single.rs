@@ -24,6 +24,9 @@ use crate::tables::StartingValues;
 /// Remark on a fit by output error that filter error does not improve.
 const OF_SENSORS: &str = "; the residuals are coloured noise of the sensors";
 
+/// Reason why a derivative that the class estimates is inactive in a maneuver.
+const RESTS: &str = "its surface rests";
+
 /// Estimates one maneuver. The outcome has any failure.
 #[must_use]
 pub fn maneuver(
@@ -42,7 +45,7 @@ pub fn maneuver(
         return task.rejected(maneuver.quality.reason.clone());
     }
     match context.settings.hold {
-        Hold::Table => task.estimate_by_class(),
+        Hold::Table => task.estimate_by_moving_surfaces(),
         Hold::Evidence => task.estimate_by_evidence(),
     }
 }
@@ -55,6 +58,21 @@ impl Task<'_> {
             Axis::Lateral => self.estimate::<4, Lateral, 6, LateralInGusts>(),
         };
         estimated.unwrap_or_else(|reason| self.rejected(reason))
+    }
+
+    /// Estimates as the class does, without the derivatives of surfaces that rest.
+    fn estimate_by_moving_surfaces(&self) -> Estimated {
+        let (class, resting) = self.class_of_moving_surfaces();
+        let task = Task {
+            class: &class,
+            ..*self
+        };
+        let mut estimated = task.estimate_by_class();
+        let rows = estimated.estimates.iter_mut();
+        for row in rows.filter(|row| resting.contains(&row.derivative)) {
+            row.held_because = Some(RESTS.to_owned());
+        }
+        estimated
     }
 
     /// Estimates with the derivatives held that the maneuver's own evidence holds.

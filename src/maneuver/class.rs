@@ -192,6 +192,20 @@ impl Class {
         class
     }
 
+    /// The class with these derivatives inactive at all angles of attack.
+    #[must_use]
+    pub fn with_inactive(&self, names: &BTreeSet<String>) -> Class {
+        let mut class = self.clone();
+        let overrides = class.overrides.iter_mut().map(|o| &mut o.statuses);
+        for statuses in std::iter::once(&mut class.statuses).chain(overrides) {
+            let named = statuses
+                .iter_mut()
+                .filter(|(name, _)| names.contains(*name));
+            named.for_each(|(_, status)| *status = Status::Inactive);
+        }
+        class
+    }
+
     /// Leaves out the derivatives that the class holds: without a wind tunnel there is no value to
     /// hold them at. Returns their number.
     pub fn hold_nothing(&mut self) -> usize {

@@ -205,7 +205,7 @@ impl<'a> Step for PredictStep<'a> {
     type Artefact = Predicted;
 
     const KIND: Kind = Kind::Predict;
-    const VERSION: u32 = 7;
+    const VERSION: u32 = 8;
 
     fn item(&self) -> &str {
         &self.member.maneuver.maneuver_id

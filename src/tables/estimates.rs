@@ -190,8 +190,8 @@ table! {
         /// over 1.96. It counts the residuals' spectrum and the uncertainty of held values, but no
         /// errors of calibration.
         pub equation_error_bound: Option<f64>,
-        /// Reason why the maneuver holds it, with `hold: evidence`; empty where the class's table
-        /// decides.
+        /// Reason why the maneuver holds it, with `hold: evidence`, or leaves it out, where its surface
+        /// rests; empty where the class's table decides.
         pub held_because: Option<String>,
     }
 }
@@ -200,6 +200,14 @@ table! {
 pub const JOINT_FLIGHT: &str = "joint";
 
 impl EstimateRow {
+    /// Reason why the maneuver's evidence holds the derivative.
+    #[must_use]
+    pub fn evidence_to_hold(&self) -> Option<&str> {
+        self.held_because
+            .as_deref()
+            .filter(|_| self.status == Status::Held)
+    }
+
     /// True for a row of maneuvers estimated together.
     #[must_use]
     pub fn is_joint(&self) -> bool {

@@ -4,6 +4,7 @@ mod calibration;
 mod doubt;
 mod evidence;
 mod gusts;
+mod resting_surfaces;
 
 use std::collections::BTreeMap;
 

@@ -150,7 +150,7 @@ fn near_dependencies(contents: &Contents) -> TableView {
 fn held_by_evidence(contents: &Contents) -> TableView {
     let mut held: BTreeMap<(usize, &str), (usize, &str)> = BTreeMap::new();
     for row in contents.estimates {
-        if let Some(reason) = &row.held_because {
+        if let Some(reason) = row.evidence_to_hold() {
             held.entry((class_position(contents, &row.class), &row.derivative))
                 .or_insert((0, reason))
                 .0 += 1;
@@ -311,6 +311,8 @@ mod tests {
         campaign.fits[0].confounded = Some("CN_0, CN_alpha; Cm_de, Cm_dpv".into());
         campaign.estimates[2].status = Status::Held;
         campaign.estimates[2].held_because = Some("de_deg did not move".into());
+        campaign.estimates[3].status = Status::Inactive;
+        campaign.estimates[3].held_because = Some("its surface rests".into());
         let tables = tables(&campaign.contents());
         let rows = |start: &str| {
             &tables

@@ -114,7 +114,10 @@ impl<'a> Page<'a> {
             predictions: prediction_table::table(contents),
             correlation_triangles: correlation_triangle::triangles(contents),
             identifiability: identifiability_tables::tables(contents),
-            is_held_by_evidence: contents.estimates.iter().any(|e| e.held_because.is_some()),
+            is_held_by_evidence: contents
+                .estimates
+                .iter()
+                .any(|e| e.evidence_to_hold().is_some()),
             failures: failures::tables(contents),
             instrument_charts: instrument_charts::charts(contents),
             maneuver_pages: maneuver_page::pages(contents, &markers),

@@ -1,0 +1,87 @@
+//! Surfaces that rest in a maneuver: it says nothing of their derivatives, which are inactive in it.
+//!
+//! A class lists what its maneuvers excite. Of a maneuver in which one of its surfaces rests all the
+//! same, the data could not tell the surface's derivatives from the constants.
+
+use std::collections::BTreeSet;
+
+use super::settings::Hold;
+use super::task::Task;
+use crate::flight::signal;
+use crate::maneuver::{Class, Status};
+use crate::output_error::identifiability::excitation;
+
+/// Largest excitation of a surface at rest, over the noise from sample to sample: both are the noise of
+/// its transducer, and differ by chance.
+const AT_REST: f64 = 1.5;
+
+impl Task<'_> {
+    /// The class without the derivatives of surfaces that rest, and the names of these. With `hold: evidence`
+    /// the maneuver's evidence decides instead.
+    pub(super) fn class_of_moving_surfaces(&self) -> (Class, BTreeSet<String>) {
+        let resting = match self.context.settings.hold {
+            Hold::Table => self.derivatives_at_rest(),
+            Hold::Evidence => BTreeSet::new(),
+        };
+        (self.class.with_inactive(&resting), resting)
+    }
+
+    /// Derivatives to be estimated whose surfaces rest.
+    fn derivatives_at_rest(&self) -> BTreeSet<String> {
+        let derivatives = self.context.buildup.derivatives_of(self.class.axis);
+        let at_rest = derivatives.filter(|derivative| {
+            let mut signals = derivative.regressor.signals();
+            self.status(&derivative.name) == Some(Status::Estimated)
+                && signals.any(|name| !signal::OF_THE_FLOW.contains(&name) && self.rests(name))
+        });
+        at_rest.map(|derivative| derivative.name.clone()).collect()
+    }
+
+    /// True for a signal that shows no more than noise in the maneuver.
+    fn rests(&self, name: &str) -> bool {
+        let samples = self.record.values(name).and_then(|v| v.get(self.range()));
+        samples.is_some_and(is_noise)
+    }
+}
+
+/// True for samples that differ from their mean as they differ from each other.
+fn is_noise(samples: &[f64]) -> bool {
+    let steps = samples.windows(2).map(|pair| (pair[1] - pair[0]).powi(2));
+    let count = samples.len().saturating_sub(1).max(1) as f64;
+    let noise = (0.5 * steps.sum::<f64>() / count).sqrt();
+    excitation(samples) <= AT_REST * noise
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numerics::random::RandomStream;
+
+    /// Ten seconds of a transducer with noise of 0.02 deg, of a surface with a doublet of this size.
+    fn transducer(doublet_deg: f64) -> Vec<f64> {
+        let mut stream = RandomStream::new(7, "a surface");
+        let surface = |k: usize| match k {
+            100..=139 => doublet_deg,
+            140..=179 => -doublet_deg,
+            _ => 0.0,
+        };
+        (0..400)
+            .map(|k| 3.0 + surface(k) + 0.02 * stream.normal())
+            .collect()
+    }
+
+    #[test]
+    fn a_surface_rests_where_its_samples_are_noise() {
+        assert!(is_noise(&transducer(0.0)));
+        assert!(is_noise(&[2.5; 400]));
+        assert!(!is_noise(&transducer(0.2)));
+        assert!(!is_noise(&transducer(5.0)));
+    }
+
+    #[test]
+    fn a_surface_that_drifts_slowly_moves() {
+        let drift = transducer(0.0).into_iter().enumerate();
+        let drift: Vec<f64> = drift.map(|(k, v)| v + 0.001 * k as f64).collect();
+        assert!(!is_noise(&drift));
+    }
+}
