@@ -1,6 +1,6 @@
 //! Posterior of one coefficient: evidence to scales, weights and a Gaussian.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::evidence::Evidence;
 use super::flight_data::{FlightData, Observed};
@@ -70,7 +70,7 @@ impl CoefficientPosterior {
             gaussian: &found,
         };
         let held = data.held(&posterior, &weights, evidence, basis.tunnel);
-        let mut whole = data.posterior(terms, scales, &weights, found, evidence)?;
+        let mut whole = data.posterior(terms, scales, &weights, found, evidence);
         add_open_scales(&touched, &whole.scales, &mut whole.gaussian);
         Some(CoefficientPosterior {
             noise_scales,
@@ -201,28 +201,22 @@ impl Data {
         weights: &[f64],
         gaussian: Gaussian,
         evidence: &[Evidence],
-    ) -> Option<CoefficientPosterior> {
+    ) -> CoefficientPosterior {
         let root = self.unknowns.root(&terms, &scales, CHECKED_VARIANCE);
         let checked = self.flight_ids.iter().zip(&self.flights);
         let flights = checked.filter_map(|(id, flight)| {
             Some((id.clone(), self_check::flight(flight, weights, &gaussian)?))
         });
-        let mut classes: BTreeMap<String, Agreement> = BTreeMap::new();
-        for &place in self.estimated.keys() {
-            let class = &evidence[place].maneuver.class;
-            if !classes.contains_key(class) {
-                let is_own = |m: usize| evidence[m].maneuver.class == *class;
-                let agreement = self_check::maneuvers(
-                    &self.flights,
-                    weights,
-                    &root,
-                    self.unknowns.count,
-                    is_own,
-                )?;
-                classes.insert(class.clone(), agreement);
-            }
-        }
-        Some(CoefficientPosterior {
+        let class = |place: &usize| evidence[*place].maneuver.class.as_str();
+        let names: BTreeSet<&str> = self.estimated.keys().map(class).collect();
+        let classes = names.into_iter().filter_map(|name| {
+            let is_own = |m: usize| evidence[m].maneuver.class == name;
+            let count = self.unknowns.count;
+            let agreement = self_check::maneuvers(&self.flights, weights, &root, count, is_own)?;
+            Some((name.to_owned(), agreement))
+        });
+        let classes: BTreeMap<String, Agreement> = classes.collect();
+        CoefficientPosterior {
             held: BTreeMap::new(),
             flights: flights.collect(),
             classes,
@@ -233,7 +227,7 @@ impl Data {
             scales,
             noise_scales: vec![],
             gaussian,
-        })
+        }
     }
 }
 
