@@ -48,6 +48,10 @@ pub fn consider<const NX: usize, E: Equations<NX>>(
     );
 }
 
+/// Remark on a fit whose bounds lack the errors of held values.
+const NOT_COUNTED: &str =
+    "; errors of held values are not in its bounds: with these free it diverges or is singular";
+
 /// Adds the consider covariance of maneuvers that share parameters. The error of a held value is
 /// common to all maneuvers that hold it, so its effects add up before they are squared.
 pub fn consider_together<const NX: usize, E: Equations<NX>, R>(
@@ -60,23 +64,10 @@ pub fn consider_together<const NX: usize, E: Equations<NX>, R>(
         return;
     };
     let n = covariance.nrows();
-    let mut blocks = InformationBlocks {
-        free: DMatrix::zeros(n, n),
-        held: vec![DVector::zeros(n); uncertainties.len()],
-    };
-    for member in members {
-        let Some(information) = member.wide_information(&fit.weights) else {
-            return;
-        };
-        blocks.add(member, &information, uncertainties);
-    }
-    let Some(inverse) = inverse(&blocks.free) else {
+    let Some(shifts) = shifts(members, uncertainties, &fit.weights, n) else {
+        fit.reason.push_str(NOT_COUNTED);
         return;
     };
-    let shifts = blocks.held.iter().zip(uncertainties.values());
-    let shifts: Vec<DVector<f64>> = shifts
-        .map(|(cross, uncertainty)| &inverse * cross * *uncertainty)
-        .collect();
     for (shift, (name, uncertainty)) in shifts.iter().zip(uncertainties) {
         let error = SharedError::Held((*name).to_owned());
         fit.shared_errors
@@ -86,6 +77,27 @@ pub fn consider_together<const NX: usize, E: Equations<NX>, R>(
     *covariance += &held;
     *corrected += &held;
     fit.covariance_held = Some(held);
+}
+
+/// Shifts of `n` estimates with one standard deviation of each held value; `None` where the integration
+/// with the held values free diverges or the information has no inverse.
+fn shifts<const NX: usize, E: Equations<NX>>(
+    members: &[Considered<NX, E>],
+    uncertainties: &BTreeMap<&str, f64>,
+    weights: &[f64; OUTPUTS],
+    n: usize,
+) -> Option<Vec<DVector<f64>>> {
+    let mut blocks = InformationBlocks {
+        free: DMatrix::zeros(n, n),
+        held: vec![DVector::zeros(n); uncertainties.len()],
+    };
+    for member in members {
+        blocks.add(member, &member.wide_information(weights)?, uncertainties);
+    }
+    let inverse = inverse(&blocks.free)?;
+    let shifts = blocks.held.iter().zip(uncertainties.values());
+    let shifts = shifts.map(|(cross, uncertainty)| &inverse * cross * *uncertainty);
+    Some(shifts.collect())
 }
 
 impl<const NX: usize, E: Equations<NX>> Considered<'_, NX, E> {
