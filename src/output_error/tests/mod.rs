@@ -372,9 +372,8 @@ fn assert_truth_is_recovered<const NX: usize, E: Equations<NX>>() {
         &settings,
     );
     assert_eq!(fit.outcome, Outcome::Converged, "{}", fit.reason);
-    for ((name, value), truth) in case.names.iter().zip(&fit.values).zip(&parameters) {
+    for (value, truth) in fit.values.iter().zip(&parameters) {
         assert_relative_eq!(*value, *truth, max_relative = 1e-4, epsilon = 1e-7);
-        assert!(name.is_ascii());
     }
 }
 
@@ -628,7 +627,7 @@ fn the_consider_covariance_is_the_effect_of_a_held_value_s_error() {
         &mut right,
     );
     let considered = right.covariance_held.unwrap();
-    for (j, name) in case.names.iter().enumerate() {
+    for j in 0..case.names.len() {
         let shift = (wrong.values[j] - right.values[j]).abs();
         assert_relative_eq!(
             considered[(j, j)].sqrt(),
@@ -636,7 +635,6 @@ fn the_consider_covariance_is_the_effect_of_a_held_value_s_error() {
             max_relative = 0.1,
             epsilon = 1e-3 * error,
         );
-        assert!(!name.is_empty());
     }
     assert!(considered.diagonal().max() > 0.0);
 }
