@@ -463,23 +463,34 @@ fn constant_mean(values: &[f64]) -> Vec<f64> {
     vec![mean; (2 * values.len()).saturating_sub(1)]
 }
 
-/// Samples on each side of the local straight line whose slope is the derivative: 0.1 s at 40 Hz.
-/// That is short against the airframe's modes, and long enough to keep the gyros' noise, at the
-/// accelerometers' arms, below that of the accelerometers.
-pub const SLOPE_REACH: usize = 4;
+/// Half the length of the local straight line whose slope is the derivative: short against the
+/// airframe's modes, and long enough to keep the gyros' noise, at the accelerometers' arms, below that
+/// of the accelerometers.
+const SLOPE_REACH_S: f64 = 0.1;
 
-/// Slope per second of a signal over a range of the record, by local least squares on nine samples.
+/// Samples on each side of the local straight line whose slope is the derivative, at least one.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a small positive number"
+)]
+#[must_use]
+pub fn slope_reach(step_s: f64) -> usize {
+    ((SLOPE_REACH_S / step_s).round() as usize).max(1)
+}
+
+/// Slope per second of a signal over a range of the record, by local least squares.
 fn slope(values: &[f64], range: &Range<usize>, step_s: f64) -> Vec<f64> {
-    const WHOLE: usize = 2 * SLOPE_REACH + 1;
+    let reach = slope_reach(step_s);
     let at = |k: usize| {
-        let first = k.checked_sub(SLOPE_REACH);
-        let Some(nine) = first.and_then(|first| values.get(first..first + WHOLE)) else {
+        let first = k.checked_sub(reach);
+        let Some(line) = first.and_then(|first| values.get(first..=k + reach)) else {
             return slope_at_gap(values, k, step_s);
         };
         let (mut up, mut norm) = (0.0, 0.0);
-        for d in 1..=SLOPE_REACH {
+        for d in 1..=reach {
             let weight = d as f64;
-            up += weight * (nine[SLOPE_REACH + d] - nine[SLOPE_REACH - d]);
+            up += weight * (line[reach + d] - line[reach - d]);
             norm += 2.0 * weight * weight;
         }
         if up.is_finite() {
@@ -493,7 +504,9 @@ fn slope(values: &[f64], range: &Range<usize>, step_s: f64) -> Vec<f64> {
 
 /// Slope where samples are missing or the record ends: least squares on the pairs that are there.
 fn slope_at_gap(values: &[f64], k: usize, step_s: f64) -> f64 {
-    let reach = SLOPE_REACH.min(k).min(values.len().saturating_sub(k + 1));
+    let reach = slope_reach(step_s)
+        .min(k)
+        .min(values.len().saturating_sub(k + 1));
     let (mut up, mut norm) = (0.0, 0.0);
     for d in 1..=reach {
         let (weight, change) = (d as f64, values[k + d] - values[k - d]);
@@ -521,6 +534,12 @@ mod tests {
             [1.0, 2.0, 3.0, 2.5, 2.0]
         );
         assert!(with_half_samples(&[]).is_empty());
+    }
+
+    #[test]
+    fn a_slope_spans_the_same_time_at_any_rate() {
+        let reaches = [10.0, 20.0, 40.0, 50.0, 2.0].map(|rate_hz| slope_reach(1.0 / rate_hz));
+        assert_eq!(reaches, [1, 2, 4, 5, 1]);
     }
 
     #[test]

@@ -9,7 +9,7 @@ use nalgebra::Complex;
 use super::fourier::{Band, Shifted, Spectrum};
 use crate::aero::{Axis, Buildup, Derivative, Regressor, WindTunnel};
 use crate::aircraft::Aircraft;
-use crate::dynamics::motion::{MassProperties, SLOPE_REACH, Window};
+use crate::dynamics::motion::{MassProperties, Window, slope_reach};
 use crate::dynamics::{COEFFICIENTS, Equations, Lateral, Longitudinal};
 use crate::flight::Record;
 use crate::maneuver::Maneuver;
@@ -169,10 +169,11 @@ fn surface_index(derivative: &Derivative, surfaces: &[String]) -> Option<usize> 
 /// Response of the local straight line's slope, over that of the exact derivative: real, since the
 /// line is symmetric about its sample, so it turns no phase.
 fn slope_response(frequencies_hz: &[f64], step_s: f64) -> Vec<f64> {
+    let reach = slope_reach(step_s);
     let response = |frequency_hz: &f64| {
         let angle = 2.0 * PI * frequency_hz * step_s;
         let (mut slope, mut norm) = (0.0, 0.0);
-        for d in 1..=SLOPE_REACH {
+        for d in 1..=reach {
             let d = d as f64;
             slope += d * (d * angle).sin();
             norm += d * d * angle;

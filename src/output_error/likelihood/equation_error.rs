@@ -22,7 +22,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::cost::add_square;
 use super::whittle;
-use crate::dynamics::motion::SLOPE_REACH;
+use crate::dynamics::motion::slope_reach;
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
 use crate::numerics::harmonics::Harmonics;
 use crate::numerics::symmetric::{scale, scaled};
@@ -221,7 +221,8 @@ impl<'a> Spectra<'a> {
         case: &Case<NX, E>,
         wide: &'a Case<NX, E>,
     ) -> Option<Spectra<'a>> {
-        let inner = SLOPE_REACH..case.samples().checked_sub(SLOPE_REACH)?;
+        let reach = slope_reach(case.step_s);
+        let inner = reach..case.samples().checked_sub(reach)?;
         let samples = inner.len();
         let duration_s = samples as f64 * case.step_s;
         let first = (BAND_HZ[0] * duration_s).ceil().max(1.0) as usize;
@@ -230,7 +231,7 @@ impl<'a> Spectra<'a> {
         let trend = Trend::of(kept.get(inner.clone())?).filter(|_| first < end)?;
         let mut series = implied_without_accelerations(case);
         let regressors = add_regressors(wide, &mut series);
-        let window = slope_window();
+        let window = slope_window(reach);
         for series in &mut series {
             *series = windowed_means(&window, series);
         }
@@ -332,8 +333,7 @@ fn windowed_means(window: &[f64], series: &[f64]) -> Vec<f64> {
 
 /// Window of the slope of a local straight line. The slope Σ d (x(k+d) − x(k−d)) / Σ 2 d² is a
 /// weighted mean of the increments, and an increment is the mean of the derivative at its ends.
-fn slope_window() -> Vec<f64> {
-    let reach = SLOPE_REACH;
+fn slope_window(reach: usize) -> Vec<f64> {
     // Increment i lies between samples i and i+1 of the window. Slopes over a distance d of at
     // least `nearest` contain it.
     let across = |i: usize| -> f64 {
@@ -353,14 +353,14 @@ fn slope_window() -> Vec<f64> {
 /// Samples outside gaps that are too long to bridge, and further from them than a slope reaches.
 fn kept_samples(measurements: &Measurements, step_s: f64) -> Vec<bool> {
     let samples = measurements.used.len();
+    let reach = slope_reach(step_s);
     let mut kept = vec![true; samples];
     for o in 0..OUTPUTS {
         let mut start = 0;
         for end in 0..=samples {
             if measurements.used.get(end).is_none_or(|used| used[o]) {
                 if (end - start) as f64 * step_s > LONGEST_BRIDGE_S {
-                    let reach = start.saturating_sub(SLOPE_REACH)..(end + SLOPE_REACH).min(samples);
-                    kept[reach].fill(false);
+                    kept[start.saturating_sub(reach)..(end + reach).min(samples)].fill(false);
                 }
                 start = end + 1;
             }
@@ -431,8 +431,8 @@ mod tests {
         // rounds an edge as the straight line does.
         let rate = |k: i32| 0.5 * f64::from(k.max(0)).powi(2);
         let derivative = |k: i32| f64::from(k.max(0));
-        let reach = i32::try_from(SLOPE_REACH).unwrap();
-        let window = slope_window();
+        let reach = 4;
+        let window = slope_window(4);
         assert_relative_eq!(window.iter().sum::<f64>(), 1.0, max_relative = 1e-12);
         let series: Vec<f64> = (-10..=10).map(derivative).collect();
         let means = windowed_means(&window, &series);
