@@ -1,13 +1,13 @@
 //! Maneuvers that filter error estimates together, or one alone: the fit, the slopes over α of the
 //! derivatives, and what held values and calibration add to its bounds.
 
-use std::cmp::Ordering;
 use std::marker::PhantomData;
 
 use nalgebra::{DMatrix, DVector};
 
 use super::alpha_slopes::AlphaSlopes;
 use super::calibration_effect::NOT_COUNTED;
+use super::filter_minimum::{Minimum, NoMinimum};
 use super::prepared_case::{PreparedCase, all_free};
 use super::task::{Task, values_by_name};
 use super::whiteness::sample_noise;
@@ -231,27 +231,27 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
     /// Minimum of the cost from a start.
     ///
     /// # Errors
-    /// End of an iteration that does not converge or determines no covariance; `None` where the filter
-    /// diverges at the start.
+    /// Why the start leads to no minimum with a covariance.
     pub fn minimum(
         &self,
         filters: &[Filter<NG, G>],
         start: &FilterStart,
-    ) -> Result<Minimum, Option<Box<Scored>>> {
+    ) -> Result<Minimum, NoMinimum> {
         let settings = self.task.context.settings;
         let joint = JointFilter::new(filters, &self.parameters);
         let least = |member: &GroupMember<NX, E>| member.deviations.map(|d| LEAST_SHARE * d);
         let resolutions: Vec<_> = self.members.iter().map(least).collect();
         let floors = joint.floors(&resolutions);
         let from = joint.with_noise(&start.own, &start.noise);
-        let scored = minimise(&joint, from, &floors, &settings.filter).ok_or(None)?;
+        let scored =
+            minimise(&joint, from, &floors, &settings.filter).ok_or(NoMinimum::Diverges)?;
         if !scored.converged {
-            return Err(Some(Box::new(scored)));
+            return Err(NoMinimum::NotConverged(Box::new(scored)));
         }
         let limit = settings.iteration.max_condition_number;
         match bounds::bounds(&joint, &scored, limit) {
             Ok(bounds) => Ok(Minimum { scored, bounds }),
-            Err(_) => Err(Some(Box::new(scored))),
+            Err(_) => Err(NoMinimum::Undetermined(Box::new(scored))),
         }
     }
 
@@ -575,23 +575,6 @@ pub(super) struct FilterStart {
     pub own: Vec<f64>,
     /// Noise of each maneuver.
     pub noise: Vec<Noise>,
-}
-
-/// Minimum of a filter's cost with its bounds.
-pub(super) struct Minimum {
-    pub scored: Scored,
-    bounds: Bounds,
-}
-
-impl Minimum {
-    /// −log of the likelihood.
-    fn cost(&self) -> f64 {
-        self.scored.response.cost
-    }
-
-    pub fn by_cost(&self, other: &Minimum) -> Ordering {
-        self.scored.by_cost(&other.scored)
-    }
 }
 
 /// Measurements as an instrument in error would have recorded them.

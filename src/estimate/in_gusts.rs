@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, DVector, SVector};
 
-use super::filter_group::{FilterStart, Group, GroupMember, Minimum, Swept};
+use super::filter_group::{FilterStart, Group, GroupMember, Swept};
+use super::filter_minimum::{Minimum, NoMinimum};
 use super::prepared_case::PreparedCase;
 use super::sensor_noise;
 use super::settings::Method;
@@ -12,7 +13,6 @@ use crate::aero::Axis;
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
 use crate::filter_error::filter::Filter;
 use crate::filter_error::noise::Noise;
-use crate::filter_error::scoring::Scored;
 use crate::flight::signal;
 use crate::output_error::equation_error::Regression;
 use crate::output_error::{Case, Fit, Measurements, Response};
@@ -54,8 +54,8 @@ pub(super) enum Air {
     Moves(Box<Filtered>),
     /// Noise of the sensors, with a colour of its own, explains the residuals of output error better.
     IsStill,
-    /// The filter does not converge, and nothing shows that the noise is the sensors'.
-    Unknown,
+    /// Filter error gives no estimates, and nothing shows that the noise is the sensors'.
+    Unknown(NoMinimum),
 }
 
 impl<'a> Task<'a> {
@@ -81,19 +81,27 @@ impl<'a> Task<'a> {
         let group: Group<NX, E, NG, G> = Group::of_one(self, member);
         let constant = group.constant();
         let filters = group.filters(&constant, None);
-        let Reached { minimum, others } = reached(&group, &filters, implied, output_error);
-        let swept = minimum
-            .and_then(|found| group.swept(constant, filters, found))
-            .map(|swept| group.with_slopes(swept));
-        let end = swept.as_ref().map(Swept::end);
-        let end = end.or_else(|| others.iter().min_by(|a, b| a.by_cost(b)));
+        let reached = reached(&group, &filters, implied, output_error);
+        let swept = reached.and_then(|found| {
+            let swept = group.swept(constant, filters, found);
+            Ok(group.with_slopes(swept.ok_or(NoMinimum::Diverges)?))
+        });
+        let end = match &swept {
+            Ok(swept) => Some(swept.end()),
+            Err(why) => why.end(),
+        };
         let filter = end.and_then(|end| end.response.members.first());
         let measurements = &prepared.case.measurements;
         if filter.is_some_and(|filter| sensor_noise::explains(measurements, output_error, filter)) {
             return Air::IsStill;
         }
-        let filtered = swept.and_then(|swept| Filtered::of_one(&group, &swept, output_error));
-        filtered.map_or(Air::Unknown, |filtered| Air::Moves(Box::new(filtered)))
+        let filtered = swept.and_then(|swept| {
+            Filtered::of_one(&group, &swept, output_error).ok_or(NoMinimum::Diverges)
+        });
+        match filtered {
+            Ok(filtered) => Air::Moves(Box::new(filtered)),
+            Err(why) => Air::Unknown(why),
+        }
     }
 
     /// Adds what the filter found of the air to the row of `fits`.
@@ -173,29 +181,19 @@ impl Filtered {
     }
 }
 
-/// Ends of the iterations of one maneuver's filter.
-struct Reached {
-    minimum: Option<Minimum>,
-    /// Ends that determine no estimates.
-    others: Vec<Scored>,
-}
-
 /// Iterates from still or from moving air as the residuals of output error are, and where that gives no
 /// estimates from the other. Where rotary gusts account for the rates, both are tried: they can be taken
 /// for the rates' own effect.
+///
+/// # Errors
+/// Where no start leads to a minimum: why, of the end of least cost.
 fn reached<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
     group: &Group<NX, E, NG, G>,
     filters: &[Filter<NG, G>],
     implied: Vec<f64>,
     output_error: &Fit,
-) -> Reached {
-    let mut reached = Reached {
-        minimum: None,
-        others: vec![],
-    };
-    let Some(member) = group.members.first() else {
-        return reached;
-    };
+) -> Result<Minimum, NoMinimum> {
+    let member = group.members.first().ok_or(NoMinimum::Diverges)?;
     let case = &member.prepared.case;
     let start = |own: Vec<f64>, noise: Noise| FilterStart {
         own,
@@ -211,20 +209,19 @@ fn reached<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
     } else {
         [moving, still]
     };
+    let (mut least, mut failures) = (None::<Minimum>, vec![]);
     for start in &starts {
         match group.minimum(filters, start) {
-            Ok(found) => {
-                let both = reached.minimum.take().into_iter().chain([found]);
-                reached.minimum = both.min_by(Minimum::by_cost);
-            }
-            Err(end) => reached.others.extend(end.map(|end| *end)),
+            Ok(found) => least = least.into_iter().chain([found]).min_by(Minimum::by_cost),
+            Err(why) => failures.push(why),
         }
-        let found = reached.minimum.as_ref();
+        let found = least.as_ref();
         if found.is_some_and(|found| !is_mostly_air(filters, found, &case.motion.states)) {
             break;
         }
     }
-    reached
+    let why = || failures.into_iter().min_by(NoMinimum::by_cost);
+    least.ok_or_else(|| why().unwrap_or(NoMinimum::Diverges))
 }
 
 /// True where a rotary gust is as large as a good part of the rate that it adds to, in the filter of one

@@ -17,6 +17,7 @@ mod held_by_evidence;
 mod second_opinion;
 mod alpha_slopes;
 mod whiteness;
+mod filter_minimum;
 mod filter_group;
 mod sensor_noise;
 mod in_gusts;

@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 use super::context::Context;
 use super::doubt::Explanation;
 use super::estimated::{Covariance, Estimated};
+use super::filter_minimum::NoMinimum;
 use super::in_gusts::{Air, Filtered};
 use super::prepared_case::PreparedCase;
 use super::second_opinion::add_second_opinion;
@@ -114,7 +115,7 @@ impl Task<'_> {
                     return Ok(self.estimated_in_gusts(&prepared, &filtered, &second));
                 }
                 Air::IsStill => fit.reason.push_str(OF_SENSORS),
-                Air::Unknown => discard_in_gusts(&case.measurements, &mut fit),
+                Air::Unknown(why) => discard_in_gusts(&case.measurements, &why, &mut fit),
             }
         }
         estimation::add_bounds(case, &mut fit, &self.context.settings.iteration);
@@ -195,10 +196,9 @@ impl Task<'_> {
 }
 
 /// Takes back a fit by output error in moving air, which charges the gusts to the derivatives.
-fn discard_in_gusts(measurements: &Measurements, fit: &mut Fit) {
+fn discard_in_gusts(measurements: &Measurements, why: &NoMinimum, fit: &mut Fit) {
     if fit.outcome == Outcome::Converged && !is_white(measurements, fit) {
         fit.outcome = Outcome::NotConverged;
-        "filter error does not converge, and the residuals of output error show that the air moved"
-            .clone_into(&mut fit.reason);
+        fit.reason = format!("{why}, and the residuals of output error show that the air moved");
     }
 }

@@ -3,6 +3,7 @@
 use super::member::{Fitted, Member, is_own, starting_values};
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
 use crate::estimate::filter_group::{FilterStart, Group, GroupMember, Swept};
+use crate::estimate::filter_minimum::NoMinimum;
 use crate::estimate::in_gusts::Air;
 use crate::estimate::task::Task;
 use crate::estimate::whiteness::{lag_one, largest};
@@ -40,10 +41,10 @@ impl<'m, 'a, const NX: usize, E: Equations<NX>> OwnEstimate<'m, 'a, NX, E> {
         let (fit, noise, cost) = match air {
             Air::Moves(filtered) => (filtered.fit, filtered.noise, Some(filtered.cost)),
             Air::IsStill => alone(Noise::slight(deviations())),
-            Air::Unknown if member.alone.outcome == Outcome::Unidentifiable => {
+            Air::Unknown(_) if member.alone.outcome == Outcome::Unidentifiable => {
                 alone(Noise::starting(deviations()))
             }
-            Air::Unknown => return Err("alone: filter error does not converge".to_owned()),
+            Air::Unknown(why) => return Err(format!("alone: {why}")),
         };
         Ok(OwnEstimate {
             member,
@@ -71,7 +72,7 @@ pub fn fit<'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG
         .iter()
         .map(|o| GroupMember::new(&o.member.task, &o.member.prepared, &o.wide));
     let group: Group<NX, E, NG, G> = Group::new(task, members.collect(), parameters);
-    let swept = minimum(&group, own).ok_or("filter error does not converge")?;
+    let swept = minimum(&group, own).map_err(|why| why.to_string())?;
     let (fit, responses) = group.fit(&swept).with_response(Response::default());
     let members = own.iter().map(|o| o.member);
     let mut fitted = Fitted::new(task, group.parameters.names(), &fit, members, swept.costs());
@@ -88,7 +89,7 @@ pub fn fit<'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG
 fn minimum<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
     group: &Group<NX, E, NG, G>,
     own: &[OwnEstimate<NX, E>],
-) -> Option<Swept<NG, G>> {
+) -> Result<Swept<NG, G>, NoMinimum> {
     let alone: Vec<&Fit> = own.iter().map(|o| &o.fit).collect();
     let shared = starting_values(&alone, group.parameters.shared());
     let values: Vec<Vec<f64>> = alone.iter().map(|fit| fit.values.clone()).collect();
@@ -102,8 +103,9 @@ fn minimum<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
     let constant = group.constant();
     let filters = group.filters(&constant, None);
     let minimum = group.minimum(&filters, &found);
-    let minimum = minimum.or_else(|_| group.minimum(&filters, &light)).ok()?;
-    Some(group.with_slopes(group.swept(constant, filters, minimum)?))
+    let minimum = minimum.or_else(|_| group.minimum(&filters, &light))?;
+    let swept = group.swept(constant, filters, minimum);
+    Ok(group.with_slopes(swept.ok_or(NoMinimum::Diverges)?))
 }
 
 /// Air of a group's maneuvers, and their predicted outputs.
