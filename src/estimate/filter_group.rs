@@ -8,13 +8,14 @@ use nalgebra::{DMatrix, DVector};
 use super::alpha_slopes::AlphaSlopes;
 use super::calibration_effect::NOT_COUNTED;
 use super::filter_minimum::{Minimum, NoMinimum};
+use super::held_slopes::HeldSlopes;
 use super::prepared_case::{PreparedCase, all_free};
 use super::task::{Task, values_by_name};
 use super::whiteness::sample_noise;
 use crate::aero::Output;
 use crate::dynamics::motion::Window;
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
-use crate::filter_error::bounds::{self, Bounds, WidePass};
+use crate::filter_error::bounds::{self, WidePass};
 use crate::filter_error::filter::Filter;
 use crate::filter_error::joint_filter::JointFilter;
 use crate::filter_error::noise::Noise;
@@ -65,12 +66,12 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
     }
 
     /// The maneuver's model with the slopes held.
-    fn held<'s>(&'s self, sweep: &Sweep) -> Model<'s> {
+    fn held<'s>(&'s self, held: &HeldSlopes) -> Model<'s> {
         let model: &Model<'s> = &self.prepared.model;
-        if sweep.is_constant() {
+        if held.is_constant() {
             model.clone()
         } else {
-            self.slopes.held_in(model, &sweep.values_of(&self.slopes))
+            self.slopes.held_in(model, &held.values_of(&self.slopes))
         }
     }
 
@@ -99,13 +100,13 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
     /// Pass at a fit with the held derivatives and the slopes free as well.
     fn wide_pass<const NG: usize, G: InGusts<NG>>(
         &self,
-        sweep: &Sweep,
+        held: &HeldSlopes,
         filter: &Filter<NG, G>,
         parameters: &[f64],
     ) -> Option<WidePass> {
-        let model = self.held(sweep);
+        let model = self.held(held);
         let all = all_free(&model);
-        let all = if sweep.is_constant() {
+        let all = if held.is_constant() {
             self.slopes.added_to(&all)
         } else {
             all
@@ -120,11 +121,11 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
     fn gradient_shifts<const NG: usize, G: InGusts<NG>>(
         &self,
         errors: &[Misreading],
-        sweep: &Sweep,
+        held: &HeldSlopes,
         filter: &Filter<NG, G>,
         parameters: &[f64],
     ) -> Result<Vec<DVector<f64>>, Diverged> {
-        let model = self.held(sweep);
+        let model = self.held(held);
         let window = &self.slopes.window;
         let cases = errors.iter().map(|error| {
             let misread_window = error.of_window(window);
@@ -136,19 +137,19 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
     }
 
     /// Starting values by equation error with the slopes held.
-    fn implied(&self, sweep: &Sweep) -> Vec<f64> {
-        let case = self.case_with(&self.held(sweep));
+    fn implied(&self, held: &HeldSlopes) -> Vec<f64> {
+        let case = self.case_with(&self.held(held));
         equation_error::start(&case, &self.task.tunnel_start(&self.prepared.case))
     }
 
     /// Equation error with the slopes over α that a fit holds; `None` without any.
-    pub fn second_opinion_on(&self, sweep: &Sweep) -> Option<equation_error::Regression> {
-        let model = self.held(sweep);
+    pub fn second_opinion_on(&self, held: &HeldSlopes) -> Option<equation_error::Regression> {
+        let model = self.held(held);
         let uncertainties = self.task.held_uncertainties(&self.prepared.model);
         let regression = |wide: &Case<NX, E>| {
             equation_error::regression(&self.case_with(&model), wide, &uncertainties)
         };
-        (!sweep.is_constant()).then(|| regression(&self.case_with(&all_free(&model))))
+        (!held.is_constant()).then(|| regression(&self.case_with(&all_free(&model))))
     }
 }
 
@@ -215,15 +216,15 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
     }
 
     /// Derivatives that do not change over α.
-    pub fn constant(&self) -> Sweep {
-        Sweep::constant(self.members.iter().map(|member| &member.slopes))
+    pub fn constant(&self) -> HeldSlopes {
+        HeldSlopes::constant(self.members.iter().map(|member| &member.slopes))
     }
 
     /// Filters with the slopes held; `like` are others of the maneuvers.
-    pub fn filters(&self, sweep: &Sweep, like: Option<&[Filter<NG, G>]>) -> Vec<Filter<NG, G>> {
+    pub fn filters(&self, held: &HeldSlopes, like: Option<&[Filter<NG, G>]>) -> Vec<Filter<NG, G>> {
         let members = self.members.iter().enumerate();
         let filter = |(i, member): (usize, &GroupMember<'g, 'a, NX, E>)| {
-            member.filter(&member.held(sweep), like.and_then(|like| like.get(i)))
+            member.filter(&member.held(held), like.and_then(|like| like.get(i)))
         };
         members.map(filter).collect()
     }
@@ -256,16 +257,16 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
     }
 
     /// A fit with what is left of the slopes' effect on it.
-    pub fn swept(
+    pub fn slope_fit(
         &self,
-        sweep: Sweep,
+        held: HeldSlopes,
         filters: Vec<Filter<NG, G>>,
         found: Minimum,
-    ) -> Option<Swept<NG, G>> {
-        let pass = self.wide_pass(&sweep, &filters, &found)?;
-        let effect = sweep.effect(&pass, &found.bounds);
-        Some(Swept {
-            sweep,
+    ) -> Option<SlopeFit<NG, G>> {
+        let pass = self.wide_pass(&held, &filters, &found)?;
+        let effect = held.effect(&pass, &found.bounds);
+        Some(SlopeFit {
+            held,
             filters,
             found,
             pass,
@@ -276,7 +277,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
     /// Pass at a fit with the held derivatives and the slopes free as well.
     fn wide_pass(
         &self,
-        sweep: &Sweep,
+        held: &HeldSlopes,
         filters: &[Filter<NG, G>],
         found: &Minimum,
     ) -> Option<WidePass> {
@@ -284,94 +285,96 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
         let mut passes = Vec::with_capacity(self.members.len());
         for (i, (member, filter)) in self.members.iter().zip(filters).enumerate() {
             let parameters = joint.parameters_of(i, &found.scored.parameters);
-            passes.push(member.wide_pass(sweep, filter, &parameters)?);
+            passes.push(member.wide_pass(held, filter, &parameters)?);
         }
         Some(WidePass::joined(&passes, &self.parameters))
     }
 
     /// Fits the filters again with the slopes held, as long as they move the estimates. A step that
     /// the likelihood does not bear out is halved; slopes of which no step holds are uncertainty alone.
-    pub fn with_slopes(&self, start: Swept<NG, G>) -> Swept<NG, G> {
-        let mut swept = start;
+    pub fn with_slopes(&self, start: SlopeFit<NG, G>) -> SlopeFit<NG, G> {
+        let mut slope_fit = start;
         for _ in 0..SLOPE_STEPS {
-            let Some(effect) = swept.moving_effect() else {
-                return swept;
+            let Some(effect) = slope_fit.moving_effect() else {
+                return slope_fit;
             };
             let next = STEP_SHARES
                 .iter()
-                .find_map(|share| self.step_to_slopes(&swept, effect, *share));
+                .find_map(|share| self.step_to_slopes(&slope_fit, effect, *share));
             match next {
-                Some(next) => swept = next,
+                Some(next) => slope_fit = next,
                 None => break,
             }
         }
-        if let Some(effect) = &mut swept.effect
-            && swept
+        if let Some(effect) = &mut slope_fit.effect
+            && slope_fit
                 .found
                 .bounds
                 .are_exceeded_by(&effect.change, SMALL_CHANGE)
         {
             effect.become_uncertainty();
         }
-        swept
+        slope_fit
     }
 
     /// Fit with the slopes a share of the way to those found; `None` where its cost rises.
     fn step_to_slopes(
         &self,
-        swept: &Swept<NG, G>,
+        slope_fit: &SlopeFit<NG, G>,
         effect: &SlopeEffect,
         share: f64,
-    ) -> Option<Swept<NG, G>> {
-        let sweep = swept.sweep.towards(&effect.slopes, share);
+    ) -> Option<SlopeFit<NG, G>> {
+        let held = slope_fit.held.towards(&effect.slopes, share);
         let near = FilterStart {
-            own: self.moved(swept, &effect.change, share),
-            noise: self.noise(swept),
+            own: self.moved(slope_fit, &effect.change, share),
+            noise: self.noise(slope_fit),
         };
-        let filters = self.filters(&sweep, Some(&swept.filters));
-        let starts = std::iter::once(near).chain(self.implied(&sweep));
+        let filters = self.filters(&held, Some(&slope_fit.filters));
+        let starts = std::iter::once(near).chain(self.implied(&held));
         let found = starts.filter_map(|start| self.minimum(&filters, &start).ok());
         let found = found.min_by(Minimum::by_cost)?;
-        (found.cost() < swept.found.cost() + ALLOWED_RISE)
-            .then(|| self.swept(sweep, filters, found))?
+        (found.cost() < slope_fit.found.cost() + ALLOWED_RISE)
+            .then(|| self.slope_fit(held, filters, found))?
     }
 
     /// Start by equation error with the slopes held, for a maneuver by itself. Joined maneuvers start
     /// from their own fits.
-    fn implied(&self, sweep: &Sweep) -> Option<FilterStart> {
+    fn implied(&self, held: &HeldSlopes) -> Option<FilterStart> {
         let [member] = &self.members[..] else {
             return None;
         };
         Some(FilterStart {
-            own: member.implied(sweep),
+            own: member.implied(held),
             noise: vec![Noise::starting(member.deviations)],
         })
     }
 
     /// Derivatives, biases and initial states of a fit, moved by a share of a change.
-    fn moved(&self, swept: &Swept<NG, G>, change: &DVector<f64>, share: f64) -> Vec<f64> {
-        let both = self.own(swept).iter().zip(change.iter());
+    fn moved(&self, slope_fit: &SlopeFit<NG, G>, change: &DVector<f64>, share: f64) -> Vec<f64> {
+        let both = self.own(slope_fit).iter().zip(change.iter());
         both.map(|(own, change)| own + share * change).collect()
     }
 
     /// Derivatives, biases and initial states of a fit.
-    fn own<'s>(&self, swept: &'s Swept<NG, G>) -> &'s [f64] {
-        &swept.parameters()[..self.parameters.names().len()]
+    fn own<'s>(&self, slope_fit: &'s SlopeFit<NG, G>) -> &'s [f64] {
+        &slope_fit.parameters()[..self.parameters.names().len()]
     }
 
-    pub fn joint<'s>(&'s self, swept: &'s Swept<NG, G>) -> JointFilter<'s, NG, G> {
-        JointFilter::new(&swept.filters, &self.parameters)
+    pub fn joint<'s>(&'s self, slope_fit: &'s SlopeFit<NG, G>) -> JointFilter<'s, NG, G> {
+        JointFilter::new(&slope_fit.filters, &self.parameters)
     }
 
     /// Noise of each maneuver.
-    pub fn noise(&self, swept: &Swept<NG, G>) -> Vec<Noise> {
-        self.joint(swept).noise(swept.parameters())
+    pub fn noise(&self, slope_fit: &SlopeFit<NG, G>) -> Vec<Noise> {
+        self.joint(slope_fit).noise(slope_fit.parameters())
     }
 
     /// Information of derivatives, biases and initial states.
-    pub fn information(&self, swept: &Swept<NG, G>) -> DMatrix<f64> {
+    pub fn information(&self, slope_fit: &SlopeFit<NG, G>) -> DMatrix<f64> {
         let n = self.parameters.names().len();
-        let all = self.joint(swept).information(&swept.found.scored.response);
+        let all = self
+            .joint(slope_fit)
+            .information(&slope_fit.found.scored.response);
         all.view((0, 0), (n, n)).into_owned()
     }
 
@@ -379,17 +382,21 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
     pub fn outputs_along_air(
         &self,
         member: usize,
-        swept: &Swept<NG, G>,
+        slope_fit: &SlopeFit<NG, G>,
     ) -> Option<Vec<[f64; OUTPUTS]>> {
-        let parameters = self.joint(swept).parameters_of(member, swept.parameters());
-        swept.filters[member].outputs_along_air(&parameters).ok()
+        let parameters = self
+            .joint(slope_fit)
+            .parameters_of(member, slope_fit.parameters());
+        slope_fit.filters[member]
+            .outputs_along_air(&parameters)
+            .ok()
     }
 
     /// Fit in the form of output error: the noise's parameters are left out, and the outputs are the
     /// predicted ones. The weights are those of the first maneuver.
-    pub fn fit(&self, swept: &Swept<NG, G>) -> Fit<Vec<Response>> {
-        let Minimum { scored, bounds } = &swept.found;
-        let noise = self.noise(swept);
+    pub fn fit(&self, slope_fit: &SlopeFit<NG, G>) -> Fit<Vec<Response>> {
+        let Minimum { scored, bounds } = &slope_fit.found;
+        let noise = self.noise(slope_fit);
         let responses = scored.response.members.iter();
         let mut fit = Fit {
             outcome: Outcome::Converged,
@@ -397,7 +404,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
             iterations: scored.iterations,
             initial_cost: Some(scored.initial_cost),
             final_cost: Some(scored.response.cost),
-            values: self.own(swept).to_vec(),
+            values: self.own(slope_fit).to_vec(),
             weights: noise[0].outputs.map(|deviation| deviation.powi(-2)),
             response: responses
                 .map(|r| Response::of_outputs(r.predicted.clone()))
@@ -407,23 +414,23 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
             covariance: Some(bounds.covariance.clone()),
             covariance_held: None,
             covariance_calibration: None,
-            covariance_corrected: Some(bounds.corrected(&self.joint(swept), scored)),
+            covariance_corrected: Some(bounds.corrected(&self.joint(slope_fit), scored)),
             shared_errors: vec![],
         };
-        self.add_held(swept, &mut fit);
-        self.add_calibration(swept, &mut fit);
+        self.add_held(slope_fit, &mut fit);
+        self.add_calibration(slope_fit, &mut fit);
         fit
     }
 
     /// Adds the effect of the tunnel's errors on the estimates, and that of the derivatives' change
     /// over the angles of attack of the maneuvers. Both are common to all maneuvers.
-    fn add_held(&self, swept: &Swept<NG, G>, fit: &mut Fit<Vec<Response>>) {
+    fn add_held(&self, slope_fit: &SlopeFit<NG, G>, fit: &mut Fit<Vec<Response>>) {
         let Some(first) = self.members.first() else {
             return;
         };
         let uncertainties = self.task.held_uncertainties(&first.prepared.model);
-        let bounds = &swept.found.bounds;
-        let changes = bounds.changes(&swept.pass.held_shifts(&uncertainties));
+        let bounds = &slope_fit.found.bounds;
+        let changes = bounds.changes(&slope_fit.pass.held_shifts(&uncertainties));
         let mut held = covariance_of(&changes, fit.values.len());
         let effects = uncertainties
             .iter()
@@ -432,7 +439,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
                 ErrorEffect::new(SharedError::Held((*name).to_owned()), *deviation, change)
             });
         fit.shared_errors.extend(effects);
-        if let Some(effect) = &swept.effect {
+        if let Some(effect) = &slope_fit.effect {
             for (value, change) in fit.values.iter_mut().zip(effect.change.iter()) {
                 *value += change;
             }
@@ -446,7 +453,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
     /// Adds the effect of calibration errors. The estimates move by H⁻¹ times the gradient of the
     /// maneuvers as an instrument in error would have recorded them; its error is taken as common to
     /// all.
-    fn add_calibration(&self, swept: &Swept<NG, G>, fit: &mut Fit<Vec<Response>>) {
+    fn add_calibration(&self, slope_fit: &SlopeFit<NG, G>, fit: &mut Fit<Vec<Response>>) {
         let Some(first) = self.members.first() else {
             return;
         };
@@ -455,9 +462,11 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
             return;
         }
         let mut together = vec![DVector::zeros(fit.values.len()); errors.len()];
-        for (i, (member, filter)) in self.members.iter().zip(&swept.filters).enumerate() {
-            let parameters = self.joint(swept).parameters_of(i, swept.parameters());
-            let shifts = member.gradient_shifts(&errors, &swept.sweep, filter, &parameters);
+        for (i, (member, filter)) in self.members.iter().zip(&slope_fit.filters).enumerate() {
+            let parameters = self
+                .joint(slope_fit)
+                .parameters_of(i, slope_fit.parameters());
+            let shifts = member.gradient_shifts(&errors, &slope_fit.held, filter, &parameters);
             let Ok(shifts) = shifts else {
                 fit.reason.push_str(NOT_COUNTED);
                 return;
@@ -466,7 +475,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
                 add_vector(self.parameters.places(i), shift, sum);
             }
         }
-        let changes = swept.found.bounds.changes(&together);
+        let changes = slope_fit.found.bounds.changes(&together);
         let common = covariance_of(&changes, fit.values.len());
         let effects = errors.iter().zip(&changes);
         fit.shared_errors
@@ -482,65 +491,16 @@ fn add(sum: &mut Option<DMatrix<f64>>, part: &DMatrix<f64>) {
     }
 }
 
-/// Slopes of the derivatives over α, and the values at which a fit holds them. Slopes of one name are
-/// common to the maneuvers.
-#[derive(Clone)]
-pub(super) struct Sweep {
-    names: Vec<String>,
-    values: Vec<f64>,
-}
-
-impl Sweep {
-    /// Derivatives that do not change over α.
-    fn constant<'s>(members: impl Iterator<Item = &'s AlphaSlopes>) -> Self {
-        let mut names: Vec<String> = vec![];
-        for derivative in members.flat_map(|slopes| &slopes.derivatives) {
-            if !names.contains(&derivative.name) {
-                names.push(derivative.name.clone());
-            }
-        }
-        let values = vec![0.0; names.len()];
-        Sweep { names, values }
-    }
-
-    /// A share of the way to other values.
-    fn towards(&self, values: &DVector<f64>, share: f64) -> Self {
-        let both = self.values.iter().zip(values.iter());
-        Sweep {
-            names: self.names.clone(),
-            values: both.map(|(from, to)| from + share * (to - from)).collect(),
-        }
-    }
-
-    fn effect(&self, pass: &WidePass, bounds: &Bounds) -> Option<SlopeEffect> {
-        pass.slope_effect(bounds, &self.names, &self.values)
-    }
-
-    fn is_constant(&self) -> bool {
-        self.values.iter().all(|v| *v == 0.0)
-    }
-
-    /// Values of a maneuver's slopes, in their order.
-    fn values_of(&self, slopes: &AlphaSlopes) -> Vec<f64> {
-        let value = |name: &str| {
-            let place = self.names.iter().position(|n| n == name);
-            place.map_or(0.0, |place| self.values[place])
-        };
-        let derivatives = slopes.derivatives.iter();
-        derivatives.map(|d| value(&d.name)).collect()
-    }
-}
-
 /// Fit with the derivatives' slopes held, and the effect of what they are known to be off.
-pub(super) struct Swept<const NG: usize, G: InGusts<NG>> {
-    pub sweep: Sweep,
+pub(super) struct SlopeFit<const NG: usize, G: InGusts<NG>> {
+    pub held: HeldSlopes,
     filters: Vec<Filter<NG, G>>,
     found: Minimum,
     pass: WidePass,
     effect: Option<SlopeEffect>,
 }
 
-impl<const NG: usize, G: InGusts<NG>> Swept<NG, G> {
+impl<const NG: usize, G: InGusts<NG>> SlopeFit<NG, G> {
     /// Effect of the slopes, if it moves the estimates by more than a small part of their bounds.
     fn moving_effect(&self) -> Option<&SlopeEffect> {
         let bounds = &self.found.bounds;

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, SVector};
 
-use super::filter_group::{FilterStart, Group, GroupMember, Swept};
+use super::filter_group::{FilterStart, Group, GroupMember, SlopeFit};
 use super::filter_minimum::{Minimum, NoMinimum};
 use super::prepared_case::PreparedCase;
 use super::sensor_noise;
@@ -82,12 +82,12 @@ impl<'a> Task<'a> {
         let constant = group.constant();
         let filters = group.filters(&constant, None);
         let reached = reached(&group, &filters, implied, output_error);
-        let swept = reached.and_then(|found| {
-            let swept = group.swept(constant, filters, found);
-            Ok(group.with_slopes(swept.ok_or(NoMinimum::Diverges)?))
+        let slope_fit = reached.and_then(|found| {
+            let slope_fit = group.slope_fit(constant, filters, found);
+            Ok(group.with_slopes(slope_fit.ok_or(NoMinimum::Diverges)?))
         });
-        let end = match &swept {
-            Ok(swept) => Some(swept.end()),
+        let end = match &slope_fit {
+            Ok(slope_fit) => Some(slope_fit.end()),
             Err(why) => why.end(),
         };
         let filter = end.and_then(|end| end.response.members.first());
@@ -95,8 +95,8 @@ impl<'a> Task<'a> {
         if filter.is_some_and(|filter| sensor_noise::explains(measurements, output_error, filter)) {
             return Air::IsStill;
         }
-        let filtered = swept.and_then(|swept| {
-            Filtered::of_one(&group, &swept, output_error).ok_or(NoMinimum::Diverges)
+        let filtered = slope_fit.and_then(|slope_fit| {
+            Filtered::of_one(&group, &slope_fit, output_error).ok_or(NoMinimum::Diverges)
         });
         match filtered {
             Ok(filtered) => Air::Moves(Box::new(filtered)),
@@ -157,25 +157,25 @@ impl Filtered {
     /// Result of the fit of one maneuver.
     fn of_one<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
         group: &Group<NX, E, NG, G>,
-        swept: &Swept<NG, G>,
+        slope_fit: &SlopeFit<NG, G>,
         output_error: &Fit,
     ) -> Option<Filtered> {
         let member = group.members.first()?;
         let case = &member.prepared.case;
-        let (mut fit, mut responses) = group.fit(swept).with_response(Response::default());
+        let (mut fit, mut responses) = group.fit(slope_fit).with_response(Response::default());
         fit.response = responses.pop()?;
-        let noise = group.noise(swept).pop()?;
+        let noise = group.noise(slope_fit).pop()?;
         Some(Filtered {
-            information: group.information(swept),
-            outputs_along_air: group.outputs_along_air(0, swept),
-            second_opinion: member.second_opinion_on(&swept.sweep),
+            information: group.information(slope_fit),
+            outputs_along_air: group.outputs_along_air(0, slope_fit),
+            second_opinion: member.second_opinion_on(&slope_fit.held),
             noise,
-            cost: swept.cost(),
+            cost: slope_fit.cost(),
             attitude_drifts: noise.is_of_air(G::FELT_RATES.len(), case.step_s),
             autocorrelation: lag_one(&case.measurements, &fit.response.outputs),
             output_error_costs: [output_error.initial_cost, output_error.final_cost],
             likelihood_gain: white_cost(&case.measurements, output_error)
-                .map(|cost| cost - swept.cost()),
+                .map(|cost| cost - slope_fit.cost()),
             fit,
         })
     }

@@ -18,6 +18,7 @@ mod second_opinion;
 mod alpha_slopes;
 mod whiteness;
 mod filter_minimum;
+mod held_slopes;
 mod filter_group;
 mod sensor_noise;
 mod in_gusts;

@@ -2,7 +2,7 @@
 
 use super::member::{Fitted, Member, is_own, starting_values};
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
-use crate::estimate::filter_group::{FilterStart, Group, GroupMember, Swept};
+use crate::estimate::filter_group::{FilterStart, Group, GroupMember, SlopeFit};
 use crate::estimate::filter_minimum::NoMinimum;
 use crate::estimate::in_gusts::Air;
 use crate::estimate::task::Task;
@@ -72,12 +72,18 @@ pub fn fit<'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG
         .iter()
         .map(|o| GroupMember::new(&o.member.task, &o.member.prepared, &o.wide));
     let group: Group<NX, E, NG, G> = Group::new(task, members.collect(), parameters);
-    let swept = minimum(&group, own).map_err(|why| why.to_string())?;
-    let (fit, responses) = group.fit(&swept).with_response(Response::default());
+    let slope_fit = minimum(&group, own).map_err(|why| why.to_string())?;
+    let (fit, responses) = group.fit(&slope_fit).with_response(Response::default());
     let members = own.iter().map(|o| o.member);
-    let mut fitted = Fitted::new(task, group.parameters.names(), &fit, members, swept.costs());
+    let mut fitted = Fitted::new(
+        task,
+        group.parameters.names(),
+        &fit,
+        members,
+        slope_fit.costs(),
+    );
     let air = JointAir {
-        noise: group.noise(&swept),
+        noise: group.noise(&slope_fit),
         responses,
     };
     air.add(own, &mut fitted.estimated.fit);
@@ -89,7 +95,7 @@ pub fn fit<'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG
 fn minimum<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
     group: &Group<NX, E, NG, G>,
     own: &[OwnEstimate<NX, E>],
-) -> Result<Swept<NG, G>, NoMinimum> {
+) -> Result<SlopeFit<NG, G>, NoMinimum> {
     let alone: Vec<&Fit> = own.iter().map(|o| &o.fit).collect();
     let shared = starting_values(&alone, group.parameters.shared());
     let values: Vec<Vec<f64>> = alone.iter().map(|fit| fit.values.clone()).collect();
@@ -104,8 +110,8 @@ fn minimum<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
     let filters = group.filters(&constant, None);
     let minimum = group.minimum(&filters, &found);
     let minimum = minimum.or_else(|_| group.minimum(&filters, &light))?;
-    let swept = group.swept(constant, filters, minimum);
-    Ok(group.with_slopes(swept.ok_or(NoMinimum::Diverges)?))
+    let slope_fit = group.slope_fit(constant, filters, minimum);
+    Ok(group.with_slopes(slope_fit.ok_or(NoMinimum::Diverges)?))
 }
 
 /// Air of a group's maneuvers, and their predicted outputs.

@@ -1,0 +1,56 @@
+//! Slopes over α of the derivatives of a fit.
+
+use nalgebra::DVector;
+
+use super::alpha_slopes::AlphaSlopes;
+use crate::filter_error::bounds::{Bounds, WidePass};
+use crate::filter_error::slopes::SlopeEffect;
+
+/// Slopes of the derivatives over α, and the values at which a fit holds them. Slopes of one name are
+/// common to the maneuvers.
+#[derive(Clone)]
+pub(super) struct HeldSlopes {
+    names: Vec<String>,
+    values: Vec<f64>,
+}
+
+impl HeldSlopes {
+    /// Derivatives that do not change over α.
+    pub fn constant<'s>(members: impl Iterator<Item = &'s AlphaSlopes>) -> Self {
+        let mut names: Vec<String> = vec![];
+        for derivative in members.flat_map(|slopes| &slopes.derivatives) {
+            if !names.contains(&derivative.name) {
+                names.push(derivative.name.clone());
+            }
+        }
+        let values = vec![0.0; names.len()];
+        HeldSlopes { names, values }
+    }
+
+    /// A share of the way to other values.
+    pub fn towards(&self, values: &DVector<f64>, share: f64) -> Self {
+        let both = self.values.iter().zip(values.iter());
+        HeldSlopes {
+            names: self.names.clone(),
+            values: both.map(|(from, to)| from + share * (to - from)).collect(),
+        }
+    }
+
+    pub fn effect(&self, pass: &WidePass, bounds: &Bounds) -> Option<SlopeEffect> {
+        pass.slope_effect(bounds, &self.names, &self.values)
+    }
+
+    pub fn is_constant(&self) -> bool {
+        self.values.iter().all(|v| *v == 0.0)
+    }
+
+    /// Values of a maneuver's slopes, in their order.
+    pub fn values_of(&self, slopes: &AlphaSlopes) -> Vec<f64> {
+        let value = |name: &str| {
+            let place = self.names.iter().position(|n| n == name);
+            place.map_or(0.0, |place| self.values[place])
+        };
+        let derivatives = slopes.derivatives.iter();
+        derivatives.map(|d| value(&d.name)).collect()
+    }
+}
