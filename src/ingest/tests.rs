@@ -549,6 +549,14 @@ fn a_wrong_channel_refuses_the_flight_or_is_reported_as_the_settings_say() {
 }
 
 #[test]
+fn a_channel_that_no_correction_sets_right_is_named_once() {
+    let mut flight = Flight::noisy();
+    flight.values("alpha").iter_mut().for_each(|v| *v *= -1e3);
+    let place = flight.refused().place;
+    assert_eq!(place.matches("`alpha`").count(), 1, "{place}");
+}
+
+#[test]
 fn masses_and_inertias_that_no_aircraft_has_are_named() {
     let cases = [
         (

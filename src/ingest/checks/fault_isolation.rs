@@ -142,14 +142,18 @@ impl<'a> Isolation<'a> {
     }
 
     /// Corrects one channel after another by the trial that leaves the fewest relations failed,
-    /// until all hold.
+    /// until all hold. A channel is corrected and named once.
     fn find_by_trial(&self, mut blocks: BlockMeans, mut checks: Vec<Check>) -> Vec<FaultyChannel> {
-        let mut faulty = Vec::new();
+        let mut faulty: Vec<FaultyChannel> = Vec::new();
+        let is_named = |faulty: &[FaultyChannel], name: &str| {
+            faulty.iter().any(|channel| channel.channel == name)
+        };
         for _ in 0..MOST_FAULTS {
             if failed(&checks).next().is_none() {
                 return faulty;
             }
-            let trials = self.trials(&blocks, &checks);
+            let mut trials = self.trials(&blocks, &checks);
+            trials.retain(|trial| !is_named(&faulty, trial.name));
             let best = trials.first();
             let Some(best) = best.filter(|t| t.failures < failures(&checks, &checks)) else {
                 break;
@@ -162,7 +166,9 @@ impl<'a> Isolation<'a> {
             blocks = blocks.with(&best.channel.signal, best.factor);
             checks.clone_from(&best.checks);
         }
-        faulty.extend(self.common_channels(&checks, &blocks));
+        let mut common = self.common_channels(&checks, &blocks);
+        common.retain(|channel| !is_named(&faulty, &channel.channel));
+        faulty.extend(common);
         faulty
     }
 
