@@ -26,6 +26,9 @@ Examples:
 
 Exit codes: 0 written; 1 not written, the message says why; 2 written, and something of the campaign was rejected.";
 
+/// Most models drawn at once: their files have four digits.
+const MOST_DRAWS: usize = 9999;
+
 #[derive(Args, Debug)]
 pub struct ExportOptions {
     #[command(flatten)]
@@ -36,11 +39,19 @@ pub struct ExportOptions {
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
     /// Also write this many models drawn from the posterior
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = draws)]
     draws: usize,
     /// Seed of the draws
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     seed: u64,
+}
+
+/// Number of drawn models as typed.
+fn draws(typed: &str) -> Result<usize, String> {
+    match typed.parse() {
+        Ok(draws @ 0..=MOST_DRAWS) => Ok(draws),
+        _ => Err(format!("it must be a whole number from 0 to {MOST_DRAWS}")),
+    }
 }
 
 /// Writes the derivatives for simulators and prints the files.

@@ -33,9 +33,9 @@ use crate::lineage::Stage;
 /// Flight-test archives in, trusted aerodynamic derivatives out.
 ///
 /// harvest reads Parquet flight records, finds the maneuvers in them, estimates the stability and
-/// control derivatives of each by maximum likelihood (output error), fits trends across angle of
-/// attack, compares them with a wind-tunnel database, and writes tables (Parquet and CSV) and a
-/// report (HTML).
+/// control derivatives of each by maximum likelihood (output error, and filter error in gusts), fits
+/// trends across angle of attack, fuses flights and wind tunnel, and writes tables (Parquet and CSV)
+/// and a report (HTML and PDF).
 #[derive(Debug, Parser)]
 #[command(version = VERSION, after_long_help = AFTER)]
 struct Cli {

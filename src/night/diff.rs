@@ -1,7 +1,7 @@
 //! Changes from one published night to another, with their causes.
 
-use super::changes;
 use super::published_night::PublishedNight;
+use super::{NONE_PUBLISHED, changes};
 use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::lineage::Changes;
@@ -23,10 +23,9 @@ pub fn diff(config: &Config, since: Option<&str>, to: Option<&str>) -> Result<Di
     let nights = Nights::look(&config.reports);
     let night = match to {
         Some(name) => complete_night(config, &nights, name)?,
-        None => nights.complete().ok_or_else(|| {
-            let what = "no night has been published here yet; `harvest run` publishes one";
-            Error::not_found(&config.reports, what)
-        })?,
+        None => nights
+            .complete()
+            .ok_or_else(|| Error::not_found(&config.reports, NONE_PUBLISHED))?,
     };
     let changes = match since.or(night.since.as_deref()) {
         Some(name) => {

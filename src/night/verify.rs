@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use super::NONE_PUBLISHED;
 use super::campaign_lineage::campaign_lineage;
 use super::damaged_artefacts::{damaged_artefacts, fetch_records};
 use super::published_tables::publish_tables;
@@ -118,13 +119,15 @@ fn find_night(config: &Config, nights: &Nights, name: Option<&str>) -> Result<Ni
     };
     night.ok_or_else(|| {
         let damaged = nights.damaged_current().filter(|_| name.is_none());
+        let names = nights.names();
         let what = match damaged {
             Some(name) => {
                 format!("night {name} is damaged: its night.json is not as it was published")
             }
+            None if names.is_empty() => NONE_PUBLISHED.to_owned(),
             None => format!(
                 "there is no such night here; there are {}",
-                nights.names().join(", ")
+                names.join(", ")
             ),
         };
         Error::not_found(&config.reports, what)

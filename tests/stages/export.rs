@@ -91,7 +91,10 @@ fn jsbsim_itself_computes_the_exported_coefficients() {
 #[test]
 fn draws_are_whole_models_and_the_same_for_the_same_seed() {
     let campaign = exported();
-    let export = || crate::support::run(campaign.command("export").args(["--draws", "3"]));
+    let draw =
+        |number: &str| crate::support::run(campaign.command("export").args(["--draws", number]));
+    assert_eq!(draw("10000").code, Some(64), "files have four digits");
+    let export = || draw("3");
     let read = |name: &str| std::fs::read(campaign.path("reports/export").join(name)).unwrap();
     assert_eq!(export().code, Some(0));
     let (table, section) = (read("draws.csv"), read("draw_0002_jsbsim.xml"));

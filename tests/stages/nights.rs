@@ -438,6 +438,16 @@ fn explain_prints_origin_fit_and_dependencies_of_a_maneuver() {
 }
 
 #[test]
+fn what_needs_a_night_says_where_none_is_published() {
+    let campaign = Campaign::of_pitch_steps();
+    for command in ["verify", "diff"] {
+        let outcome = campaign.ends(command, 1);
+        let words = "no night has been published here yet; `harvest run` publishes one";
+        assert!(outcome.stderr.contains(words), "{outcome:?}");
+    }
+}
+
+#[test]
 fn published_tables_carry_their_lineage_and_verify_checks_it() {
     let campaign = Campaign::of_pitch_steps();
     campaign.copy_pipeline();
