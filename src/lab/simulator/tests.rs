@@ -450,12 +450,12 @@ fn turbulence_of_one_seed_is_flown_again_and_of_another_is_not() {
     let first = fly(1);
     assert_eq!(first, fly(1));
     assert_ne!(first, fly(2));
-    // 3 ft/s at some 330 ft/s move the vane by half a degree rms.
+    // 3 ft/s at some 330 ft/s move the vane by half a degree rms: by one to four of them at most.
     let alpha = first.values(signal::ALPHA_VANE).unwrap();
     let spread = alpha
         .iter()
         .fold(0.0_f64, |most, a| most.max((a - alpha[0]).abs()));
-    assert!((0.1..3.0).contains(&spread), "{spread}");
+    assert!((0.5..2.0).contains(&spread), "{spread}");
 }
 
 fn estimated(campaign: &SimulatedCampaign, flown: &FlownManeuver) -> Estimated {
