@@ -17,6 +17,7 @@ use super::lever::lever;
 use crate::aircraft::{Aircraft, Flow, Position, Sensors, Thrust};
 use crate::earth::gravity_at;
 use crate::flight::{Record, signal};
+use crate::numerics::sample_count::nearest;
 use crate::units::{G0_FT_S2, RAD};
 
 /// Motion at one instant, in rad, rad/s, rad/s², ft, ft/s, slug, lbf.
@@ -469,14 +470,9 @@ fn constant_mean(values: &[f64]) -> Vec<f64> {
 const SLOPE_REACH_S: f64 = 0.1;
 
 /// Samples on each side of the local straight line whose slope is the derivative, at least one.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a small positive number"
-)]
 #[must_use]
 pub fn slope_reach(step_s: f64) -> usize {
-    ((SLOPE_REACH_S / step_s).round() as usize).max(1)
+    nearest(SLOPE_REACH_S / step_s).max(1)
 }
 
 /// Slope per second of a signal over a range of the record, by local least squares.
@@ -525,6 +521,7 @@ fn slope_at_gap(values: &[f64], k: usize, step_s: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flight::record::with_margin;
     use approx::assert_abs_diff_eq;
 
     #[test]
@@ -540,6 +537,19 @@ mod tests {
     fn a_slope_spans_the_same_time_at_any_rate() {
         let reaches = [10.0, 20.0, 40.0, 50.0, 2.0].map(|rate_hz| slope_reach(1.0 / rate_hz));
         assert_eq!(reaches, [1, 2, 4, 5, 1]);
+    }
+
+    #[test]
+    fn a_part_of_a_record_has_the_samples_of_its_slopes_at_any_rate() {
+        for rate_hz in [2.0, 40.0, 100.0, 1000.0] {
+            let step_s = 1.0 / rate_hz;
+            let part = with_margin(5000, 5000, 9000, step_s);
+            let reach = slope_reach(step_s);
+            assert!(
+                part.start <= 5000 - reach && part.end > 5000 + reach,
+                "{rate_hz}"
+            );
+        }
     }
 
     #[test]

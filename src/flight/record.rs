@@ -6,6 +6,8 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
+use crate::numerics::sample_count::nearest;
+
 /// Repair or fault of one sample of one signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
@@ -83,8 +85,19 @@ pub struct Record {
     pub signals: BTreeMap<String, Series>,
 }
 
-/// Samples beyond either end of a part: as far as a numerical slope or an interpolation reaches.
+/// Fewest samples beyond either end of a part: as far as an interpolation reaches.
 const MARGIN: usize = 10;
+
+/// Shortest time beyond either end of a part: as far as a numerical slope reaches.
+const MARGIN_S: f64 = 0.1;
+
+/// Samples of a part from the first to the last, and those beyond its ends that its slopes and
+/// interpolations need.
+#[must_use]
+pub fn with_margin(first: usize, last: usize, samples: usize, step_s: f64) -> Range<usize> {
+    let margin = MARGIN.max(nearest(MARGIN_S / step_s));
+    first.saturating_sub(margin)..(last + margin + 1).min(samples)
+}
 
 impl Record {
     /// Time of a sample, s.
@@ -171,8 +184,7 @@ impl Record {
     /// of signals at the ends of the part are those of the whole. Sample times are unchanged.
     #[must_use]
     pub fn part(&self, start_s: f64, end_s: f64) -> Record {
-        let from = self.sample_at(start_s).saturating_sub(MARGIN);
-        let to = (self.sample_at(end_s) + MARGIN + 1).min(self.samples);
-        self.cut(None, from..to)
+        let (first, last) = (self.sample_at(start_s), self.sample_at(end_s));
+        self.cut(None, with_margin(first, last, self.samples, self.step_s))
     }
 }

@@ -30,7 +30,7 @@ use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::ColumnPath;
 
 use crate::error::Error;
-use crate::flight::record::Series;
+use crate::flight::record::{Series, with_margin};
 use crate::flight::{Correction, Mark, Record, StandIn};
 
 /// Suffix of a signal's column of marks.
@@ -424,10 +424,9 @@ impl RecordFile {
         start_s: f64,
         end_s: f64,
     ) -> Result<Record, Error> {
-        const MARGIN: usize = 10;
-        let from = self.sample_at(start_s).saturating_sub(MARGIN);
-        let to = (self.sample_at(end_s) + MARGIN + 1).min(self.header.samples);
-        self.window(signals, from..to)
+        let (first, last) = (self.sample_at(start_s), self.sample_at(end_s));
+        let (samples, step_s) = (self.header.samples, self.header.step_s);
+        self.window(signals, with_margin(first, last, samples, step_s))
     }
 
     /// Reads a range of samples of some signals, or of all. Signals that the record lacks are left
