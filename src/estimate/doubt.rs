@@ -7,13 +7,11 @@ use super::settings::Doubtful;
 use super::task::Task;
 use crate::aero::Output;
 use crate::dynamics::{Equations, OUTPUTS};
+use crate::numerics::student::NORMAL_95;
 use crate::output_error::equation_error::Regression;
 use crate::output_error::theil::Agreement;
 use crate::output_error::{Case, Fit, InitialState, Outcome};
 use crate::units::{DEG, Unit};
-
-/// Half width of a 95 % interval in standard errors.
-const STANDARD_ERRORS: f64 = 1.96;
 
 /// Motion that a fit explains without the corrections of a filter, and the second opinion on it.
 pub(super) struct Explanation<'a> {
@@ -162,7 +160,7 @@ impl Task<'_> {
         let ordinary = self.ordinary_bias(output)?;
         let most = self.context.settings.doubt.ordinary_biases * ordinary;
         let uncertainty = unit * fit.covariance_corrected.as_ref()?[(j, j)].sqrt();
-        (error.abs() > most + STANDARD_ERRORS * uncertainty).then(|| {
+        (error.abs() > most + NORMAL_95 * uncertainty).then(|| {
             format!(
                 "{error:.3} {}, {:.0} times the ordinary bias of its instrument",
                 Unit::of_signal(output.signal()).name,

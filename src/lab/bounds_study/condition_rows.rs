@@ -2,10 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use super::coverage::{HALF_95, MeasuredPoint, TrueAndEstimated};
+use super::coverage::{MeasuredPoint, TrueAndEstimated};
 use super::recordings::Realisation;
 use crate::aero::{Buildup, Regressor, WindTunnel};
 use crate::numerics::order_statistics::median;
+use crate::numerics::student::NORMAL_95;
 use crate::tables::ConditionRow;
 
 /// Class of the row of all classes.
@@ -45,7 +46,7 @@ fn row(condition: &str, class: &str, points: &[&MeasuredPoint], scales: Scales) 
         .collect();
     let covered = |bound: fn(&TrueAndEstimated) -> Option<f64>| {
         let holds = |e: &&TrueAndEstimated| match (e.error(), bound(e)) {
-            (Some(error), Some(bound)) => error.abs() <= HALF_95 * bound,
+            (Some(error), Some(bound)) => error.abs() <= NORMAL_95 * bound,
             _ => false,
         };
         estimates.iter().filter(holds).count() as f64 / estimates.len() as f64

@@ -6,12 +6,12 @@ use super::recordings::{Realisation, StudyManeuver};
 use crate::error::Problem;
 use crate::maneuver::Status;
 use crate::numerics::random::derived_seed;
+use crate::numerics::student::NORMAL_95;
 use crate::output_error::Outcome;
 use crate::tables::{CoverageRow, EstimateRow};
 
-/// Half widths of the intervals that contain a normal deviate with probability 0.68 and 0.95.
-const HALF_68: f64 = 0.994_458;
-pub const HALF_95: f64 = 1.959_964;
+/// Two-sided 68 % quantile of the normal distribution.
+const NORMAL_68: f64 = 0.994_457_883_209_753;
 
 /// Estimates of one maneuver under one condition.
 pub struct MeasuredPoint {
@@ -189,8 +189,8 @@ impl Intervals {
         let square = bounds.iter().map(|b| b * b).sum::<f64>() / n;
         Intervals {
             ratio: statistics.deviation / square.sqrt(),
-            share_68: within(HALF_68),
-            share_95: within(HALF_95),
+            share_68: within(NORMAL_68),
+            share_95: within(NORMAL_95),
         }
     }
 }

@@ -2,6 +2,7 @@
 //! the others' in some.
 
 use super::quality_charts::QualityChart;
+use crate::numerics::student::NORMAL_95;
 use crate::report::contents::Contents;
 use crate::report::figure::scale::{Scale, extent};
 use crate::report::figure::style::INK;
@@ -10,9 +11,6 @@ use crate::tables::{
     ALL_FLIGHTS, CommonErrorVerdict, InstrumentError, InstrumentRow, InstrumentTrend,
     InstrumentTrendRow,
 };
-
-/// Ratio of a 95 % interval's half width to its standard deviation.
-const WIDTH_95: f64 = 1.96;
 
 /// The charts, in the order of the table.
 #[must_use]
@@ -45,7 +43,7 @@ fn chart(contents: &Contents, number: usize, trend: &InstrumentTrendRow) -> Opti
     let label = format!("{}, {}", trend.error, trend.unit);
     let common = trend.mean.zip(trend.scatter.zip(trend.mean_bound));
     let common = common.map(|(mean, (scatter, bound))| {
-        let half = WIDTH_95 * scatter.hypot(bound);
+        let half = NORMAL_95 * scatter.hypot(bound);
         LevelBox {
             label: "all flights",
             x: (None, None),
@@ -86,7 +84,7 @@ fn points(contents: &Contents, trend: &InstrumentTrendRow) -> Vec<ChartPoint> {
             } else {
                 String::new()
             },
-            outline: vec![(x, y - WIDTH_95 * bound), (x, y + WIDTH_95 * bound)],
+            outline: vec![(x, y - NORMAL_95 * bound), (x, y + NORMAL_95 * bound)],
         })
     };
     of_channel.enumerate().filter_map(point).collect()
