@@ -1,6 +1,6 @@
-//! Numerical methods that several rooms share: vectors of the processor, aligned matrices, small
-//! matrices, the inverse of a symmetric matrix, dual numbers, Fourier sums, one Runge-Kutta step, a running integral,
-//! durations as numbers of samples, Student's t, χ².
+//! Numerical methods that several rooms share: linear algebra and dual numbers, distributions and order
+//! statistics, sums over time and frequency, roots and minima, random numbers, and the processor's
+//! vectors.
 
 pub mod chi_squared;
 pub(crate) mod digits;

@@ -99,7 +99,7 @@ settings! {
         /// Largest share of the inputs' time that a surface moves at its actuator's rate, where it
         /// follows no command. Its measured motion enters the equations, so less does no harm.
         pub rate_limited_share: f64 = 0.8,
-        /// Largest share of flagged samples: bridged, despiked, missing or stuck. Segment applies it
+        /// Largest share of marked samples: bridged, despiked, missing or stuck. Segment applies it
         /// to all signals of a maneuver, estimate to the outputs together and to each surface.
         /// Larger: more maneuvers are estimated from repaired samples.
         pub marked_share: f64 = 0.2,
