@@ -23,7 +23,7 @@ impl Minimum {
     }
 }
 
-/// Why a start leads to no estimates by filter error.
+/// Reason why a start leads to no estimates by filter error.
 pub(super) enum NoMinimum {
     /// The state leaves its bounds, or the filter has no finite gain.
     Diverges,
@@ -34,7 +34,7 @@ pub(super) enum NoMinimum {
 }
 
 impl NoMinimum {
-    /// Where the iteration ended; `None` where the filter diverges.
+    /// End of the iteration; `None` where the filter diverges.
     pub fn end(&self) -> Option<&Scored> {
         match self {
             NoMinimum::Diverges => None,

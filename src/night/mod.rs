@@ -24,5 +24,5 @@ pub use run::{RunOutcome, has_rejections, run};
 pub(crate) use campaign_lineage::campaign_lineage;
 pub(crate) use table_metadata::shelf_of_stage;
 
-/// What a command that reads a night says where there is none.
+/// Answer of a command that reads a night where there is none.
 const NONE_PUBLISHED: &str = "no night has been published here yet; `harvest run` publishes one";
