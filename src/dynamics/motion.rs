@@ -1,7 +1,7 @@
 //! Measured motion: all inputs of an axis's equations, at the samples and halfway between them.
 //!
-//! Signals are linear between samples. A fourth-order Runge-Kutta step needs them at its ends and
-//! in its middle: point 2k is sample k, point 2k+1 lies between samples k and k+1.
+//! A fourth-order Runge-Kutta step needs signals at its ends and in its middle: point 2k is sample k,
+//! point 2k+1 lies between samples k and k+1, on a cubic through the samples beside it.
 #![expect(
     clippy::inline_always,
     reason = "laid out by vectors for the processor at hand"
@@ -244,6 +244,20 @@ impl Window {
         window
     }
 
+    /// Window with all signals linear between samples, as other estimators take them.
+    #[must_use]
+    pub fn linear_between_samples(&self) -> Window {
+        let mut window = self.clone();
+        for points in window.points.values_mut() {
+            let points = Arc::make_mut(points);
+            for middle in (1..points.len()).step_by(2) {
+                points[middle] = 0.5 * (points[middle - 1] + points[middle + 1]);
+            }
+        }
+        window.flow = Arc::new(window.flow_at_cg());
+        window
+    }
+
     /// Window with a further, constant signal.
     #[must_use]
     pub fn with_constant(&self, name: &str, value: f64) -> Window {
@@ -439,13 +453,25 @@ fn has_missing(values: &[f64]) -> bool {
     })
 }
 
-/// Interleaves samples with the means of neighbours.
+/// Interleaves samples with the values half-way between them, of the cubic through the two samples on
+/// either side. A straight line would cut the corners of a sine of angular frequency ω by (ω step)²/12,
+/// and so the effect of a surface; at 10 Hz and 1 Hz that is 3 %. At the ends, and beside a gap, the
+/// value is the mean of its neighbours.
 fn with_half_samples(values: &[f64]) -> Vec<f64> {
     let mut points = vec![0.0; (2 * values.len()).saturating_sub(1)];
     Arch::new().dispatch(|| {
         for (points, pair) in points.chunks_exact_mut(2).zip(values.windows(2)) {
             points[0] = pair[0];
             points[1] = 0.5 * (pair[0] + pair[1]);
+        }
+        let inner = points.get_mut(2..).unwrap_or_default();
+        for (points, four) in inner.chunks_exact_mut(2).zip(values.windows(4)) {
+            let middle = points[1] + ((four[1] - four[0]) - (four[3] - four[2])) / 16.0;
+            points[1] = if middle.is_finite() {
+                middle
+            } else {
+                points[1]
+            };
         }
     });
     if let (Some(point), Some(value)) = (points.last_mut(), values.last()) {
@@ -525,12 +551,28 @@ mod tests {
     use approx::assert_abs_diff_eq;
 
     #[test]
-    fn points_between_samples_are_the_means() {
-        assert_eq!(
-            with_half_samples(&[1.0, 3.0, 2.0]),
-            [1.0, 2.0, 3.0, 2.5, 2.0]
-        );
+    fn points_between_samples_lie_on_cubics_and_at_the_ends_on_lines() {
+        let cubic = |t: f64| 1.0 - 2.0 * t + 0.5 * t * t + 0.25 * t * t * t;
+        let samples: Vec<f64> = (0..8).map(|k| cubic(f64::from(k))).collect();
+        let points = with_half_samples(&samples);
+        assert_eq!(points.len(), 15);
+        for (i, point) in points.iter().enumerate() {
+            let expected = match i {
+                1 | 13 => 0.5 * (samples[i / 2] + samples[i / 2 + 1]),
+                _ => cubic(0.5 * i as f64),
+            };
+            assert_abs_diff_eq!(*point, expected, epsilon = 1e-12);
+        }
+        assert_eq!(with_half_samples(&[1.0, 3.0]), [1.0, 2.0, 3.0]);
         assert!(with_half_samples(&[]).is_empty());
+    }
+
+    #[test]
+    fn points_beside_a_gap_are_the_means_of_their_neighbours() {
+        let points = with_half_samples(&[0.0, 1.0, 4.0, 9.0, f64::NAN, 25.0]);
+        assert_abs_diff_eq!(points[3], 2.25);
+        assert_abs_diff_eq!(points[5], 6.5);
+        assert!(points[7].is_nan() && points[9].is_nan());
     }
 
     #[test]

@@ -151,20 +151,22 @@ impl StandardCase {
         })
     }
 
-    /// Signals of the case at and between the samples.
+    /// Signals of the case at the samples, and between them on straight lines, as the programs that
+    /// the case is compared with take them.
     ///
     /// # Errors
     /// The message for a signal that the record lacks.
     pub fn window(&self) -> Result<Window, String> {
         let derivatives = self.free.iter().chain(self.held.iter().map(|(d, _)| d));
         let surfaces = derivatives.flat_map(|d| d.regressor.signals());
-        Window::cut(
+        let window = Window::cut(
             &self.aircraft,
             &self.record,
             0..self.record.samples,
             surfaces,
             MassProperties::Mean,
-        )
+        )?;
+        Ok(window.linear_between_samples())
     }
 
     /// Free and held parameters of the case.
