@@ -10,19 +10,11 @@
 //! `OWN_SCATTER` maneuvers has a τ of its own. So a class with wrong values, say because a derivative
 //! is held at a wrong one, keeps its scatter to itself.
 //!
-//! One outlier must bend neither the trend nor τ: a residual beyond `HUBER` standard deviations
-//! counts as if it were just that far (Huber's weights in the fit, his proposal 2 for τ). No bound
-//! counts as less than the share `BOUND_FLOOR` of the group's median bound: bounds are themselves
-//! uncertain by a factor of a few.
-//!
-//! The covariance of the coefficients is that of an M-estimate (Huber 1981, section 7.6),
-//!
-//! K² · [Σψ²(uᵢ)/(n − p)] / m² · (Xᵀ V⁻¹ X)⁻¹, K = 1 + (p/n)(1 − m)/m,
-//!
-//! with u the residuals over their standard deviations, ψ cutting them at `HUBER`, m the share that
-//! is not cut and V = b² + τ². The bracket scales the covariance by the residuals as they are, not as
-//! bounds and τ predict them; few data need that. The interval takes Student's t with n − p degrees
-//! of freedom (Hartung and Knapp 2001). It is never narrower than the bounds alone give.
+//! One outlier must bend neither the trend nor τ: [`RobustSolution`] has the weights, and the
+//! covariance of the coefficients. No bound counts as less than the share `BOUND_FLOOR` of the group's
+//! median bound: bounds are themselves uncertain by a factor of a few. The interval takes Student's t
+//! with n − p degrees of freedom (Hartung and Knapp 2001). It is never narrower than the bounds alone
+//! give.
 //!
 //! A trend of few coefficients may not follow the derivative. Maneuvers of one flown α differ by their
 //! own deviations alone; their mean residuals differ from α to α also by lack of fit, λ (Paule and
@@ -40,15 +32,14 @@ use nalgebra::{DMatrix, DVector};
 use super::basis::Basis;
 use super::lack_of_fit::LackOfFit;
 use super::point::{Point, flown_alphas};
-use super::scatter::{HUBER, floored_variances, strata, total_variances};
+use super::robust::{Residual, RobustSolution, inverse_variances, weighted_solution};
+use super::scatter::{floored_variances, strata};
 use super::settings::{Criterion, Settings};
 use crate::numerics::order_statistics::upper_median;
-use crate::numerics::{student, symmetric};
+use crate::numerics::student;
 
 /// Standard deviations beyond which a residual has no influence on the order of the polynomial.
 const OUTLYING: f64 = 3.0;
-/// Most steps of the iteration between coefficients, τ² and Huber's weights; about ten suffice.
-const MOST_STEPS: usize = 100;
 
 /// A fitted trend.
 #[derive(Clone, Debug)]
@@ -68,15 +59,6 @@ pub(super) struct Fit {
     criterion: f64,
     /// In the points' order.
     residuals: Vec<Residual>,
-}
-
-/// Residual of one maneuver's estimate.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Residual {
-    /// Over its standard deviation, which the estimate's leverage on the trend reduces.
-    pub z: f64,
-    /// Share of its weight that Huber's weights leave: one, less for an outlier.
-    pub share: f64,
 }
 
 /// The trend of the order that the criterion chooses, with the other orders for its uncertainty.
@@ -193,65 +175,29 @@ impl Fit {
     /// The fit of one basis; `None` where the normal equations have no solution.
     pub(super) fn of(points: &[Point], basis: Basis, criterion: Criterion) -> Option<Fit> {
         let (n, p) = (points.len(), basis.size());
-        let design = DMatrix::from_rows(
-            &points
-                .iter()
-                .map(|q| basis.row(q.alpha_deg))
-                .collect::<Vec<_>>(),
-        );
+        let rows: Vec<_> = points.iter().map(|q| basis.row(q.alpha_deg)).collect();
+        let design = DMatrix::from_rows(&rows);
         let values = DVector::from_iterator(n, points.iter().map(|q| q.value));
-        let variances = floored_variances(points);
+        let bounds2 = floored_variances(points);
         let degrees_of_freedom = n.checked_sub(p).filter(|d| *d > 0)?;
         let strata = strata(points);
-        let mut weights = DVector::from_iterator(n, variances.iter().map(|v| 1.0 / v));
-        let mut solution = solve(&design, &values, &weights)?;
-        let mut total = vec![f64::INFINITY; n];
-        for _ in 0..MOST_STEPS {
-            let residuals = &values - &design * &solution.0;
-            let before = total;
-            let freedom = residual_freedom(&design, &weights, &solution.1);
-            total = total_variances(&residuals, &variances, &freedom, &strata);
-            weights = DVector::from_iterator(n, (0..n).map(|i| weight(residuals[i], total[i])));
-            let next = solve(&design, &values, &weights)?;
-            let moved = (&design * (&next.0 - &solution.0)).amax();
-            let smallest = total.iter().copied().fold(f64::INFINITY, f64::min);
-            solution = next;
-            let settled = total
-                .iter()
-                .zip(&before)
-                .all(|(now, before)| (now - before).abs() <= 1e-6 * now);
-            if settled && moved <= 1e-6 * smallest.sqrt() {
-                break;
-            }
-        }
-        let residuals = &values - &design * &solution.0;
-        let misfit = (0..n)
-            .map(|i| deviance(residuals[i], total[i]))
-            .sum::<f64>();
-        let covariance = robust_covariance(&design, &residuals, &total)?;
-        let covariance_of_bounds = solve(
-            &design,
-            &values,
-            &DVector::from_iterator(n, variances.iter().map(|v| 1.0 / v)),
-        )?
-        .1;
-        let lack = LackOfFit::of(points, &residuals, &variances, p);
-        let bound2 = upper_median(variances.iter().copied()).unwrap_or(0.0);
+        let solution = RobustSolution::of(&design, &values, &bounds2, &strata)?;
+        let misfit: f64 = solution.deviations().map(deviance).sum();
+        let by_bounds = inverse_variances(&bounds2);
+        let lack = LackOfFit::of(points, &solution.residuals, &bounds2, p);
+        let bound2 = upper_median(bounds2.iter().copied()).unwrap_or(0.0);
+        let totals = solution.variances.iter().zip(&bounds2);
         Some(Fit {
             lack_of_fit2: lack.lack2,
             deviation_of_one_more: (bound2 + lack.own2).sqrt(),
-            residuals: standardised(&design, &residuals, &total, &weights, &solution.1),
+            residuals: solution.standardised(&design),
             basis,
-            coefficients: solution.0,
-            covariance,
-            covariance_of_bounds,
-            scatter2: total
-                .iter()
-                .zip(&variances)
-                .map(|(all, bound)| all - bound)
-                .collect(),
+            covariance: solution.covariance(&design)?,
+            covariance_of_bounds: weighted_solution(&design, &values, &by_bounds)?.1,
+            scatter2: totals.map(|(all, bound)| all - bound).collect(),
             degrees_of_freedom,
             criterion: misfit + penalty(criterion, n, p + strata.len()),
+            coefficients: solution.coefficients,
         })
     }
 
@@ -291,102 +237,9 @@ impl Fit {
     }
 }
 
-/// Covariance of the coefficients of an M-estimate (Huber 1981, section 7.6).
-fn robust_covariance(
-    design: &DMatrix<f64>,
-    residuals: &DVector<f64>,
-    variances: &[f64],
-) -> Option<DMatrix<f64>> {
-    let (n, p) = (design.nrows() as f64, design.ncols() as f64);
-    let u2 = || residuals.iter().zip(variances).map(|(r, v)| r * r / v);
-    let kept = u2().filter(|u2| *u2 <= HUBER * HUBER).count() as f64 / n;
-    let cut: f64 = u2().map(|u2| u2.min(HUBER * HUBER)).sum();
-    // At least half of the residuals lie within the cut of any fit worth publishing.
-    let kept = kept.max(0.5);
-    let correction = 1.0 + p / n * (1.0 - kept) / kept;
-    let scale = correction * correction * cut / (n - p) / (kept * kept);
-    let weights = DVector::from_iterator(variances.len(), variances.iter().map(|v| 1.0 / v));
-    Some(solve(design, residuals, &weights)?.1 * scale)
-}
-
-/// Residuals over their standard deviations: leverage reduces the variance of a residual.
-fn standardised(
-    design: &DMatrix<f64>,
-    residuals: &DVector<f64>,
-    variances: &[f64],
-    weights: &DVector<f64>,
-    inverse: &DMatrix<f64>,
-) -> Vec<Residual> {
-    let residual = |(i, spread): (usize, f64)| {
-        let left = (1.0 - weights[i] * spread).max(1e-6);
-        Residual {
-            z: residuals[i] / (variances[i] * left).sqrt(),
-            share: weights[i] * variances[i],
-        }
-    };
-    let spreads = spreads(design, inverse).into_iter();
-    spreads.enumerate().map(residual).collect()
-}
-
-/// 1 − h of each point, with h its leverage.
-fn residual_freedom(
-    design: &DMatrix<f64>,
-    weights: &DVector<f64>,
-    inverse: &DMatrix<f64>,
-) -> Vec<f64> {
-    let spreads = spreads(design, inverse).into_iter().zip(weights);
-    spreads
-        .map(|(spread, weight)| (1.0 - weight * spread).max(0.0))
-        .collect()
-}
-
-/// x M xᵀ of each row x of the design. Products of so small matrices take the library several times as
-/// long.
-fn spreads(design: &DMatrix<f64>, matrix: &DMatrix<f64>) -> Vec<f64> {
-    let (rows, columns_of_rows) = (design.transpose(), matrix.transpose());
-    let mut image = vec![0.0; matrix.ncols()];
-    let of = |row: &[f64]| {
-        image.fill(0.0);
-        for (value, own) in row.iter().zip(columns_of_rows.column_iter()) {
-            for (sum, element) in image.iter_mut().zip(&own) {
-                *sum += element * value;
-            }
-        }
-        image.iter().zip(row).map(|(a, b)| a * b).sum()
-    };
-    rows.as_slice()
-        .chunks_exact(design.ncols().max(1))
-        .map(of)
-        .collect()
-}
-
-/// Coefficients and their covariance for given weights.
-fn solve(
-    design: &DMatrix<f64>,
-    values: &DVector<f64>,
-    weights: &DVector<f64>,
-) -> Option<(DVector<f64>, DMatrix<f64>)> {
-    let weighted = DMatrix::from_fn(design.nrows(), design.ncols(), |i, j| {
-        weights[i] * design[(i, j)]
-    });
-    let weighted = weighted.transpose();
-    let inverse = symmetric::inverse(&(&weighted * design))?;
-    Some((&inverse * (&weighted * values), inverse))
-}
-
-/// Weight of a residual: one over the variance, less for an outlier.
-fn weight(residual: f64, variance: f64) -> f64 {
-    let u = residual.abs() / variance.sqrt();
-    if u > HUBER {
-        HUBER / u / variance
-    } else {
-        1.0 / variance
-    }
-}
-
 /// Minus twice the log-likelihood of one residual, constant for outliers: no order is chosen because
 /// it comes nearer to one.
-fn deviance(residual: f64, variance: f64) -> f64 {
+fn deviance((residual, variance): (f64, f64)) -> f64 {
     variance.ln() + (residual * residual / variance).min(OUTLYING * OUTLYING)
 }
 

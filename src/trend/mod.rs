@@ -12,6 +12,7 @@ mod fit;
 mod lack_of_fit;
 mod means;
 mod point;
+mod robust;
 mod scatter;
 mod settings;
 #[cfg(test)]

@@ -1,0 +1,184 @@
+//! Weighted least squares that one outlier bends neither in its coefficients nor in τ.
+//!
+//! A residual beyond [`HUBER`] standard deviations counts as if it were just that far: Huber's weights
+//! in the solution, his proposal 2 for τ. The covariance of the coefficients is that of an M-estimate
+//! (Huber 1981, section 7.6),
+//!
+//! K² · [Σψ²(uᵢ)/(n − p)] / m² · (Xᵀ V⁻¹ X)⁻¹, K = 1 + (p/n)(1 − m)/m,
+//!
+//! with u the residuals over their standard deviations, ψ cutting them at [`HUBER`], m the share that
+//! is not cut and V = b² + τ². The bracket scales the covariance by the residuals as they are, not as
+//! bounds and τ predict them; few data need that.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::scatter::{HUBER, total_variances};
+use crate::numerics::symmetric;
+
+/// Most steps of the iteration between coefficients, τ² and Huber's weights; about ten suffice.
+const MOST_STEPS: usize = 100;
+/// Change at which coefficients, over their standard deviations, and variances, as shares, stay.
+const SETTLED: f64 = 1e-6;
+
+/// Residual of one maneuver's estimate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Residual {
+    /// Over its standard deviation, which the estimate's leverage on the trend reduces.
+    pub z: f64,
+    /// Share of its weight that Huber's weights leave: one, less for an outlier.
+    pub share: f64,
+}
+
+/// Coefficients and τ² of a design, solved together.
+pub(super) struct RobustSolution {
+    pub coefficients: DVector<f64>,
+    /// (Xᵀ W X)⁻¹.
+    inverse: DMatrix<f64>,
+    /// W, Huber's weights over the variances.
+    weights: DVector<f64>,
+    pub residuals: DVector<f64>,
+    /// b² + τ² of each point.
+    pub variances: Vec<f64>,
+}
+
+impl RobustSolution {
+    /// Solution for points of these values and squared bounds, with one τ for each stratum; `None`
+    /// where the normal equations have none.
+    pub(super) fn of(
+        design: &DMatrix<f64>,
+        values: &DVector<f64>,
+        bounds2: &[f64],
+        strata: &[Vec<usize>],
+    ) -> Option<RobustSolution> {
+        let mut weights = inverse_variances(bounds2);
+        let (mut coefficients, mut inverse) = weighted_solution(design, values, &weights)?;
+        let mut variances = vec![f64::INFINITY; values.len()];
+        for _ in 0..MOST_STEPS {
+            let residuals = values - design * &coefficients;
+            let freedom = residual_freedom(design, &weights, &inverse);
+            let before = variances;
+            variances = total_variances(&residuals, bounds2, &freedom, strata);
+            let weighed = residuals
+                .iter()
+                .zip(&variances)
+                .map(|(r, v)| weight(*r, *v));
+            weights = DVector::from_iterator(values.len(), weighed);
+            let next = weighted_solution(design, values, &weights)?;
+            let moved = (design * (&next.0 - &coefficients)).amax();
+            (coefficients, inverse) = next;
+            if have_settled(&variances, &before) && moved <= SETTLED * smallest(&variances).sqrt() {
+                break;
+            }
+        }
+        Some(RobustSolution {
+            residuals: values - design * &coefficients,
+            coefficients,
+            inverse,
+            weights,
+            variances,
+        })
+    }
+
+    /// Residual and variance of each point.
+    pub(super) fn deviations(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        let residuals = self.residuals.iter().copied();
+        residuals.zip(self.variances.iter().copied())
+    }
+
+    /// Covariance of the coefficients.
+    pub(super) fn covariance(&self, design: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let (n, p) = (design.nrows() as f64, design.ncols() as f64);
+        let u2 = || self.deviations().map(|(r, v)| r * r / v);
+        let kept = u2().filter(|u2| *u2 <= HUBER * HUBER).count() as f64 / n;
+        let cut: f64 = u2().map(|u2| u2.min(HUBER * HUBER)).sum();
+        // At least half of the residuals lie within the cut of any fit worth publishing.
+        let kept = kept.max(0.5);
+        let correction = 1.0 + p / n * (1.0 - kept) / kept;
+        let scale = correction * correction * cut / (n - p) / (kept * kept);
+        let weights = inverse_variances(&self.variances);
+        Some(weighted_solution(design, &self.residuals, &weights)?.1 * scale)
+    }
+
+    /// Residuals over their standard deviations: leverage reduces the variance of a residual.
+    pub(super) fn standardised(&self, design: &DMatrix<f64>) -> Vec<Residual> {
+        let residual = |(i, spread): (usize, f64)| {
+            let left = (1.0 - self.weights[i] * spread).max(1e-6);
+            Residual {
+                z: self.residuals[i] / (self.variances[i] * left).sqrt(),
+                share: self.weights[i] * self.variances[i],
+            }
+        };
+        let spreads = spreads(design, &self.inverse).into_iter();
+        spreads.enumerate().map(residual).collect()
+    }
+}
+
+fn have_settled(variances: &[f64], before: &[f64]) -> bool {
+    let mut pairs = variances.iter().zip(before);
+    pairs.all(|(now, before)| (now - before).abs() <= SETTLED * now)
+}
+
+fn smallest(variances: &[f64]) -> f64 {
+    variances.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+/// Weights of points by their variances alone.
+pub(super) fn inverse_variances(variances: &[f64]) -> DVector<f64> {
+    DVector::from_iterator(variances.len(), variances.iter().map(|v| 1.0 / v))
+}
+
+/// 1 − h of each point, with h its leverage.
+fn residual_freedom(
+    design: &DMatrix<f64>,
+    weights: &DVector<f64>,
+    inverse: &DMatrix<f64>,
+) -> Vec<f64> {
+    let spreads = spreads(design, inverse).into_iter().zip(weights);
+    spreads
+        .map(|(spread, weight)| (1.0 - weight * spread).max(0.0))
+        .collect()
+}
+
+/// x M xᵀ of each row x of the design. Products of so small matrices take the library several times as
+/// long.
+fn spreads(design: &DMatrix<f64>, matrix: &DMatrix<f64>) -> Vec<f64> {
+    let (rows, columns_of_rows) = (design.transpose(), matrix.transpose());
+    let mut image = vec![0.0; matrix.ncols()];
+    let of = |row: &[f64]| {
+        image.fill(0.0);
+        for (value, own) in row.iter().zip(columns_of_rows.column_iter()) {
+            for (sum, element) in image.iter_mut().zip(&own) {
+                *sum += element * value;
+            }
+        }
+        image.iter().zip(row).map(|(a, b)| a * b).sum()
+    };
+    rows.as_slice()
+        .chunks_exact(design.ncols().max(1))
+        .map(of)
+        .collect()
+}
+
+/// Coefficients and their covariance for given weights.
+pub(super) fn weighted_solution(
+    design: &DMatrix<f64>,
+    values: &DVector<f64>,
+    weights: &DVector<f64>,
+) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    let weighted = DMatrix::from_fn(design.nrows(), design.ncols(), |i, j| {
+        weights[i] * design[(i, j)]
+    });
+    let weighted = weighted.transpose();
+    let inverse = symmetric::inverse(&(&weighted * design))?;
+    Some((&inverse * (&weighted * values), inverse))
+}
+
+/// Weight of a residual: one over the variance, less for an outlier.
+fn weight(residual: f64, variance: f64) -> f64 {
+    let u = residual.abs() / variance.sqrt();
+    if u > HUBER {
+        HUBER / u / variance
+    } else {
+        1.0 / variance
+    }
+}
