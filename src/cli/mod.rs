@@ -4,6 +4,7 @@
 mod terminal;
 
 mod bars;
+mod changes;
 mod check_command;
 mod cluster_commands;
 mod export_command;

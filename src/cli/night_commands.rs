@@ -6,11 +6,10 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::bars::Bars;
+use super::changes::{self, MOST};
 use super::cluster_commands;
 use super::options::{ATTENTION, Options, Patience, REJECTED, exit_code, start_threads};
-use crate::lineage::{Changes, Moved};
 use crate::night::{diff, explain, gc, status, verify};
-use crate::numerics::digits::rounded;
 
 #[derive(Args, Debug)]
 pub struct StatusOptions {
@@ -137,9 +136,6 @@ pub fn status(options: &StatusOptions) -> anyhow::Result<ExitCode> {
     })
 }
 
-/// Most lines of one kind that are printed.
-const MOST: usize = 10;
-
 /// The first items, and the number of the others.
 fn first_items(items: &[String]) -> String {
     let (first, more) = items.split_at(items.len().min(3));
@@ -176,107 +172,9 @@ pub fn diff(options: &DiffOptions) -> anyhow::Result<ExitCode> {
     if options.json {
         out!("{}", serde_json::to_string_pretty(&found.changes)?);
     } else if !options.options.quiet || found.changes.alert {
-        print_changes(&found.night, &found.changes);
+        changes::print(&found.night, &found.changes);
     }
     Ok(exit_code(found.changes.alert, ATTENTION))
-}
-
-fn print_changes(night: &str, changes: &Changes) {
-    let Some(since) = &changes.since else {
-        out!("night {night} is the first complete one: there is none to compare it with");
-        return;
-    };
-    out!("night {night} since night {since}");
-    print_list("because", &changes.causes, |c| c.words.clone());
-    print_list("maneuvers", &changes.maneuvers, |m| {
-        let words = if m.words.is_empty() {
-            String::new()
-        } else {
-            format!(": {}", m.words)
-        };
-        format!(
-            "{} {} ({}){words} [{}]",
-            m.what.name(),
-            m.maneuver_id,
-            m.class,
-            m.because
-        )
-    });
-    let moved = |m: &Moved| {
-        let (of, alpha, because) = (&m.of, m.alpha_deg, &m.because);
-        format!(
-            "{} of {of} at {alpha:.1} deg: {} became {}, ±{} [{because}]",
-            m.derivative, m.before, m.now, m.uncertainty
-        )
-    };
-    print_list(
-        "estimates that moved by more than their uncertainty",
-        &changes.estimates,
-        moved,
-    );
-    print_list(
-        "trends that moved by more than their uncertainty",
-        &changes.trends,
-        moved,
-    );
-    print_list("new trends", &changes.new_trends, Clone::clone);
-    print_list("trends gone", &changes.gone_trends, Clone::clone);
-    print_list("verdicts", &changes.verdicts, |v| {
-        format!(
-            "{} at {} deg: {} became {} [{}]",
-            v.derivative, v.alpha_deg, v.before, v.now, v.because
-        )
-    });
-    print_list(
-        "contradicted by the rest of the campaign",
-        &changes.contradictions,
-        |c| {
-            format!(
-                "{} in {}: {:.0} % of {} estimates inside their 95 % intervals",
-                c.item, c.coefficient, c.inside_95_pct, c.estimates
-            )
-        },
-    );
-    print_list("instruments that changed", &changes.instruments, |i| {
-        format!(
-            "{} of `{}`: {} since {}: {} ± {} {}",
-            i.error,
-            i.channel,
-            i.what,
-            i.since,
-            rounded(i.change),
-            rounded(i.bound),
-            i.unit
-        )
-    });
-    print_list("learnt", &changes.learnt, |l| {
-        format!(
-            "{}: {:.1} nats; at {:.1} deg {} ± {} became {} ± {}",
-            l.derivative,
-            l.nats,
-            l.alpha_deg,
-            rounded(l.before),
-            rounded(l.before_deviation),
-            rounded(l.now),
-            rounded(l.now_deviation)
-        )
-    });
-    if changes.is_empty() {
-        out!("nothing that was published moved by more than its uncertainty");
-    }
-}
-
-fn print_list<T>(title: &str, items: &[T], words: impl Fn(&T) -> String) {
-    if items.is_empty() {
-        return;
-    }
-    out!("{title}: {}", items.len());
-    for item in items.iter().take(MOST) {
-        out!("  {}", words(item));
-    }
-    if items.len() > MOST {
-        out!("  and {} more (all of them: --json)", items.len() - MOST);
-    }
 }
 
 /// Prints the findings about a published night.

@@ -12,7 +12,7 @@ use crate::aero::{Axis, Buildup, WindTunnel};
 use crate::error::Result;
 use crate::maneuver::{Class, Status};
 use crate::output_error::calibration_errors::Calibration;
-use crate::{compare, ingest, segment, store};
+use crate::{segment, store};
 
 /// Options of the command line that replace keys of `pipeline.yaml`.
 #[derive(Clone, Debug, Default)]
@@ -29,6 +29,30 @@ pub struct Overrides {
     pub memory_mb: Option<f64>,
 }
 
+impl Overrides {
+    fn replace_keys(self, pipeline: &mut PipelineFile) {
+        if let Some(archive) = self.archive {
+            pipeline.archive = archive;
+        }
+        replace(&mut pipeline.wind_tunnel, self.wind_tunnel);
+        replace(&mut pipeline.store, self.store);
+        replace(&mut pipeline.store_cache, self.store_cache);
+        replace(&mut pipeline.reports, self.reports);
+        replace(&mut pipeline.events, self.events);
+        if !self.against.is_empty() {
+            pipeline.compare.against = self.against;
+        }
+        if let Some(memory_mb) = self.memory_mb {
+            pipeline.ingest.memory_mb = memory_mb;
+        }
+    }
+}
+
+/// Puts an option in the place of a key, where the option is given.
+fn replace<T>(key: &mut Option<T>, option: Option<T>) {
+    *key = option.or(key.take());
+}
+
 impl Config {
     /// Reads and checks a pipeline's folder.
     ///
@@ -39,37 +63,28 @@ impl Config {
         let files = Files::read(folder)?;
         questions::none_open(&files)?;
         let mut pipeline = pipeline_file(&files.pipeline)?;
+        overrides.replace_keys(&mut pipeline);
         let aircraft = files.aircraft()?;
         share_keys(&mut pipeline, &aircraft.instruments);
         let buildup = files.model()?;
         let mut classes = files.classes()?;
-        let wind_tunnel = overrides.wind_tunnel.or(pipeline.wind_tunnel);
         let name = folder.file_name().map_or_else(
             || "pipeline".to_owned(),
             |n| n.to_string_lossy().into_owned(),
         );
-        let events = overrides.events.or(pipeline.events);
-        let template = pipeline
-            .report
-            .template
-            .as_deref()
-            .map(store::files::text)
-            .transpose()?;
+        let template = pipeline.report.template.as_deref();
+        let template = template.map(store::files::text).transpose()?;
         let default = Path::new("data/store").join(&name);
-        let store = overrides.store.or(pipeline.store);
-        let cache = overrides.store_cache.or(pipeline.store_cache);
-        let (store, shared_store) = places::store(store, cache, default, &files.pipeline)?;
-        let reports = overrides
-            .reports
-            .or(pipeline.reports)
-            .unwrap_or_else(|| Path::new("reports").join(&name));
-        let archive = overrides.archive.unwrap_or(pipeline.archive);
-        places::reachable(Path::new(&archive))?;
-        let tunnel = match &wind_tunnel {
+        let cache = pipeline.store_cache;
+        let (store, shared_store) = places::store(pipeline.store, cache, default, &files.pipeline)?;
+        let default = || Path::new("reports").join(&name);
+        let reports = pipeline.reports.unwrap_or_else(default);
+        places::reachable(Path::new(&pipeline.archive))?;
+        let tunnel = match &pipeline.wind_tunnel {
             Some(file) => check::tunnel(file, &buildup, &pipeline.tunnel)?,
             None => WindTunnel::new(pipeline.tunnel.clone()),
         };
-        let held_at_nothing = match &wind_tunnel {
+        let held_at_nothing = match &pipeline.wind_tunnel {
             Some(_) => 0,
             None => classes.iter_mut().map(Class::hold_nothing).sum(),
         };
@@ -79,10 +94,10 @@ impl Config {
         let config = Config {
             tunnel,
             held_at_nothing,
-            events: check::events(events.as_deref(), &classes)?,
+            events: check::events(pipeline.events.as_deref(), &classes)?,
             title: pipeline.title,
-            archive,
-            wind_tunnel,
+            archive: pipeline.archive,
+            wind_tunnel: pipeline.wind_tunnel,
             store,
             shared_store,
             reports: places::in_folder(reports, "reports are published in a folder")?,
@@ -92,10 +107,7 @@ impl Config {
             constants: aircraft.constants,
             buildup,
             classes,
-            ingest: ingest::Settings {
-                memory_mb: overrides.memory_mb.unwrap_or(pipeline.ingest.memory_mb),
-                ..pipeline.ingest
-            },
+            ingest: pipeline.ingest,
             segment: pipeline.segment,
             estimate: pipeline.estimate,
             trend: pipeline.trend,
@@ -103,21 +115,26 @@ impl Config {
             qualities: files.qualities()?,
             match_database,
             proof_of_match: proof,
-            compare: against(pipeline.compare, overrides.against),
+            compare: pipeline.compare,
             export: pipeline.export,
             report: pipeline.report,
             cluster: pipeline.cluster,
             template,
             files: files.all().map(|file| file.named(folder)).collect(),
         };
-        check::whole(&config, &files)?;
-        qualities::check(&config, &files)?;
-        proof_of_match::check(&config, &files)?;
-        check::instruments(&aircraft.instruments, &config, &files.aircraft)?;
+        config.check(&files, &aircraft.instruments)?;
+        Ok(config)
+    }
+
+    /// Checks what no single file shows, and the numbers of every file.
+    fn check(&self, files: &Files, instruments: &BTreeMap<String, Instrument>) -> Result<()> {
+        check::whole(self, files)?;
+        qualities::check(self, files)?;
+        proof_of_match::check(self, files)?;
+        check::instruments(instruments, self, &files.aircraft)?;
         files.all().try_for_each(ranges::are_finite)?;
         ranges::of_pipeline(&files.pipeline)?;
-        files.classes.iter().try_for_each(ranges::of_class)?;
-        Ok(config)
+        files.classes.iter().try_for_each(ranges::of_class)
     }
 }
 
@@ -173,17 +190,5 @@ fn name_surfaces(classes: &mut [Class], buildup: &Buildup, segment: &segment::Se
         let stepping = surfaces.filter(|surface| segment.steps.contains_key(*surface));
         let names: BTreeSet<String> = stepping.map(str::to_owned).collect();
         class.recognition.surfaces = names.into_iter().collect();
-    }
-}
-
-/// Settings of the comparison, with the earlier campaigns of the command line where it names some.
-fn against(settings: compare::Settings, named: Vec<PathBuf>) -> compare::Settings {
-    if named.is_empty() {
-        settings
-    } else {
-        compare::Settings {
-            against: named,
-            ..settings
-        }
     }
 }

@@ -23,6 +23,7 @@ use crate::pdf;
 use crate::pipeline::{Campaign, Conductor, Progress, decisive_differences, evidence, flown_means};
 use crate::proof_of_match::of_posterior;
 use crate::qualities::{self, FlownConditions};
+use crate::store::table::Shelf;
 use crate::store::{atomic, files, table};
 
 /// Published files of the page.
@@ -104,14 +105,23 @@ pub fn plan_next_flight(
     let next = &cards.cards.next;
     let budget = Budget::of(next, request.minutes);
     let plan = plan(&tonight, &rehearsals, &goals, budget);
-    let shelf = shelf_of_stage(folder, &campaign_lineage(&conductor), Stage::Model);
-    table::publish(&shelf, &plan.cards)?;
-    table::publish(&shelf, &plan.goals)?;
     let page = kneeboard::page(config, &plan, request.minutes, next)
         .map_err(|what| Error::store(&folder.join(PAGE), &what))?;
-    files::place_text(&folder.join(PAGE), &page)?;
+    let shelf = shelf_of_stage(folder, &campaign_lineage(&conductor), Stage::Model);
+    Ok(PlannedFlight {
+        files: place_plan(&plan, &page, folder, &shelf)?,
+        plan,
+        problems: campaign.problems,
+    })
+}
+
+/// Writes the tables and the page of a plan, and names their files.
+fn place_plan(plan: &Plan, page: &str, folder: &Path, shelf: &Shelf) -> Result<Vec<PathBuf>> {
+    table::publish(shelf, &plan.cards)?;
+    table::publish(shelf, &plan.goals)?;
+    files::place_text(&folder.join(PAGE), page)?;
     let printed = folder.join(PRINTED_PAGE);
-    let bytes = pdf::pdf(&page).map_err(|what| Error::store(&printed, &what))?;
+    let bytes = pdf::pdf(page).map_err(|what| Error::store(&printed, &what))?;
     atomic::place(&printed, &bytes)?;
     let names = [
         "next_cards.csv",
@@ -119,12 +129,8 @@ pub fn plan_next_flight(
         "next_goals.csv",
         "next_goals.parquet",
     ];
-    let files = names.into_iter().chain([PAGE, PRINTED_PAGE]);
-    Ok(PlannedFlight {
-        plan,
-        files: files.map(|name| folder.join(name)).collect(),
-        problems: campaign.problems,
-    })
+    let names = names.into_iter().chain([PAGE, PRINTED_PAGE]);
+    Ok(names.map(|name| folder.join(name)).collect())
 }
 
 /// Reads the cards and checks them against the pipeline's classes.
