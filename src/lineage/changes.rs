@@ -99,9 +99,12 @@ pub struct InstrumentChange {
 pub struct Changes {
     /// Name of the night compared with; `None` for a first night.
     pub since: Option<String>,
-    /// `true` if a value moved, vanished or changed, an instrument changed, or the rest of the campaign
-    /// contradicts a part. New maneuvers alone are no alert.
+    /// `true` if a value moved, vanished or changed, an instrument changed, the rest of the campaign
+    /// contradicts a part, or the nights cannot be compared. New maneuvers alone are no alert.
     pub alert: bool,
+    /// Reason why the values of the two nights are not compared; `None` where they are.
+    #[serde(default)]
+    pub not_compared: Option<String>,
     /// Differences of flights, configuration and code.
     pub causes: Vec<Cause>,
     pub maneuvers: Vec<ManeuverChange>,

@@ -30,9 +30,8 @@ pub fn diff(config: &Config, since: Option<&str>, to: Option<&str>) -> Result<Di
     let changes = match since.or(night.since.as_deref()) {
         Some(name) => {
             let before = complete_night(config, &nights, name)?;
-            let tables = PublishedNight::read(&nights, &before)?;
             let now = PublishedNight::read(&nights, &night)?;
-            changes::between(&before.name, &tables.tables(), &now.tables())
+            changes::since(&nights, &before, &now.tables())
         }
         None => Changes::default(),
     };

@@ -38,7 +38,7 @@ pub struct NightTables<'a> {
 }
 
 /// Tables of a published night that are compared with those of another.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct PublishedNight {
     lineage: Lineage,
     maneuvers: Vec<ManeuverWindow>,

@@ -7,10 +7,10 @@ use std::time::Duration;
 use super::campaign_lineage::{campaign_lineage, rejection};
 use super::changes;
 use super::damaged_artefacts::damaged_artefacts;
-use super::published_night::{ManeuverWindow, NightTables, PublishedNight};
+use super::published_night::{ManeuverWindow, NightTables};
 use super::published_tables::publish_tables;
 use crate::config::Config;
-use crate::error::{Problem, ProblemStage, Result};
+use crate::error::{Error, Problem, ProblemStage, Result};
 use crate::lineage::{Changes, Lineage, Stage};
 use crate::maneuver::Maneuver;
 use crate::pipeline::{
@@ -153,8 +153,9 @@ impl NightRun<'_> {
     /// of the campaign.
     fn place_report(&self, tonight: &Path, campaign: &mut Campaign) -> Result<Changes> {
         let changes = self.changes(campaign);
-        let alert = serde_json::to_vec_pretty(&changes).unwrap_or_default();
-        atomic::place(&tonight.join(ALERT), &alert)?;
+        let place = tonight.join(ALERT);
+        let alert = serde_json::to_vec_pretty(&changes).map_err(|e| Error::store(&place, &e))?;
+        atomic::place(&place, &alert)?;
         let Report { html, pdf } = make_report(&self.conductor, campaign, &changes)?;
         atomic::place(&tonight.join(PAGE), html.as_bytes())?;
         match pdf {
@@ -168,14 +169,9 @@ impl NightRun<'_> {
         Ok(changes)
     }
 
-    /// Changes since the last complete night; none if there is no such night, or if an older
-    /// program wrote tables that lack a column of today's.
+    /// Changes since the last complete night; none if there is no such night.
     fn changes(&self, campaign: &Campaign) -> Changes {
-        let before = self.night_before().and_then(|night| {
-            let tables = PublishedNight::read(&self.nights, &night).ok()?;
-            Some((night.name, tables))
-        });
-        let Some((name, before)) = before else {
+        let Some(before) = self.night_before() else {
             return Changes::default();
         };
         let maneuvers: Vec<ManeuverWindow> = campaign.maneuvers.iter().map(window).collect();
@@ -195,7 +191,7 @@ impl NightRun<'_> {
             self_check: &campaign.model.rows.self_check,
             instrument_trends: &campaign.instrument_trends,
         };
-        changes::between(&name, &before.tables(), &now)
+        changes::since(&self.nights, &before, &now)
     }
 
     /// The complete night that tonight's is compared with. A night that is repaired keeps its

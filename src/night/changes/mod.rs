@@ -18,12 +18,28 @@ use self::causes::Causes;
 use self::contradictions::contradictions;
 use self::instruments::instruments;
 use self::learnt::learnt;
-use super::published_night::{ManeuverWindow, NightTables};
+use super::published_night::{ManeuverWindow, NightTables, PublishedNight};
 use crate::lineage::{Changes, ManeuverChange, ManeuverDifference, Moved, Stage, VerdictChange};
 use crate::maneuver::Status;
+use crate::store::{Night, Nights};
 use crate::tables::{
     EstimateRow, FitRow, Outcome, PublishedTrend, PublishedVerdict, TunnelVerdict,
 };
+
+/// Changes since a published night. Tables that cannot be read, say because an older program wrote them
+/// without a column of today's, are an alert.
+#[must_use]
+pub fn since(nights: &Nights, before: &Night, now: &NightTables) -> Changes {
+    match PublishedNight::read(nights, before) {
+        Ok(tables) => between(&before.name, &tables.tables(), now),
+        Err(error) => Changes {
+            since: Some(before.name.clone()),
+            alert: true,
+            not_compared: Some(error.to_string()),
+            ..Changes::default()
+        },
+    }
+}
 
 /// Changes from the night `since` to now.
 #[must_use]
@@ -36,6 +52,7 @@ pub fn between(since: &str, before: &NightTables, now: &NightTables) -> Changes 
     let mut changes = Changes {
         since: Some(since.to_owned()),
         alert: false,
+        not_compared: None,
         new_trends: trends_now.difference(&trends_before).cloned().collect(),
         gone_trends: trends_before.difference(&trends_now).cloned().collect(),
         trends: moved_trends(before, now, &causes),

@@ -270,3 +270,19 @@ fn an_instrument_that_steps_is_an_alert_with_its_channel_and_flight_once() {
     let again = between("0002", &now.tables(), &now.tables());
     assert!(!again.alert && again.instruments.is_empty());
 }
+
+#[test]
+fn a_night_before_without_readable_tables_is_an_alert_with_the_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let nights = Nights::look(folder.path());
+    let before = Night {
+        name: "0007".to_owned(),
+        ..Night::default()
+    };
+    let now = PublishedNight::default();
+    let changes = since(&nights, &before, &now.tables());
+    assert_eq!(changes.since.as_deref(), Some("0007"));
+    assert!(changes.alert);
+    let why = changes.not_compared.unwrap();
+    assert!(why.contains("0007") && why.contains("cannot read"), "{why}");
+}

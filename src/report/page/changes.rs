@@ -19,6 +19,9 @@ pub fn headline(changes: &Changes) -> String {
                 one with."
             .to_owned();
     };
+    if let Some(why) = &changes.not_compared {
+        return format!("Night {since} cannot be compared with this one: {why}.");
+    }
     if changes.is_empty() {
         return format!(
             "Nothing that was published in night {since} has moved by more than its uncertainty."

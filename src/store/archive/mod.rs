@@ -563,8 +563,14 @@ fn refuse_other_types(field: &Field, channel: Option<&Channel>) -> Result<(), St
         "" => String::new(),
         signal => format!(" (signal `{signal}`)"),
     };
+    let remedy = match found {
+        DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View => {
+            "; write its numbers as numbers, or import the recording from CSV (`harvest import`)"
+        }
+        _ => "",
+    };
     Err(format!(
-        "column `{}`{of_signal} is of type {found}; expected {number}",
+        "column `{}`{of_signal} is of type {found}; expected {number}{remedy}",
         field.name()
     ))
 }

@@ -236,7 +236,7 @@ fn a_column_of_text_is_named_with_the_type_found_and_expected() {
     .unwrap_err();
     assert_eq!(problem.flight_id, "f");
     assert!(problem.place.ends_with("f.parquet"));
-    let expected = "column `q` (signal `q_deg_s`) is of type Utf8; expected a number (float, integer or boolean)";
+    let expected = "column `q` (signal `q_deg_s`) is of type Utf8; expected a number (float, integer or boolean); write its numbers as numbers, or import the recording from CSV (`harvest import`)";
     assert_eq!(problem.reason, expected);
 }
 
