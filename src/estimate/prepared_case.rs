@@ -33,7 +33,7 @@ impl<'a> Task<'a> {
             .chain(model.held.iter().map(|(d, _)| *d));
         let surfaces: Vec<&str> = derivatives.flat_map(|d| d.regressor.signals()).collect();
         let settings = self.context.settings;
-        self.check_flagged_share(&surfaces)?;
+        self.check_marked_share(&surfaces)?;
         let window = Window::cut(
             self.context.aircraft,
             self.record,
@@ -64,9 +64,9 @@ impl<'a> Task<'a> {
         })
     }
 
-    /// Rejects a maneuver with too large a share of flagged samples.
+    /// Rejects a maneuver with too large a share of marked samples.
     /// Samples between those of a slow channel do not count: the cost leaves them out.
-    fn check_flagged_share(&self, surfaces: &[&str]) -> Result<(), String> {
+    fn check_marked_share(&self, surfaces: &[&str]) -> Result<(), String> {
         let Maneuver { start_s, end_s, .. } = *self.maneuver;
         let most = self.context.settings.max_marked_share;
         let outputs = self.record.marked_share(

@@ -179,7 +179,7 @@ settings! {
         /// Uncertainty that calibration leaves of each signal: `instruments:` of aircraft.yaml.
         /// Signals without an entry count as exact.
         pub calibration: BTreeMap<String, Calibration> = BTreeMap::new(),
-        /// Largest share of flagged samples over the outputs together, and in each surface:
+        /// Largest share of marked samples over the outputs together, and in each surface:
         /// `segment: quality: marked_share`.
         pub max_marked_share: f64 = 0.2,
     }
