@@ -1,6 +1,7 @@
 //! Residuals of a fit as white noise: their correlation, cost, and the noise of the samples.
 
 use crate::dynamics::OUTPUTS;
+use crate::numerics::differences;
 use crate::numerics::order_statistics::median;
 use crate::output_error::{Fit, Measurements, Outcome};
 
@@ -8,18 +9,14 @@ use crate::output_error::{Fit, Measurements, Outcome};
 /// short maneuver stay below it.
 const COLOURED: f64 = 0.3;
 
-/// Standard deviation of an output's white noise: the second difference of white noise has six times
-/// its variance, and that of the motion is small.
+/// Standard deviation of an output's white noise, from its second differences.
 pub(super) fn sample_noise(measurements: &Measurements, output: usize) -> f64 {
-    const NORMAL_MEDIAN: f64 = 0.674_489_75;
-    let both = measurements
-        .values
-        .windows(3)
-        .zip(measurements.used.windows(3));
-    let differences = both
+    let samples = measurements.values.array_windows::<3>();
+    let both = samples.zip(measurements.used.array_windows::<3>());
+    let sizes = both
         .filter(|(_, used)| used.iter().all(|used| used[output]))
-        .map(|(z, _)| (z[0][output] - 2.0 * z[1][output] + z[2][output]).abs());
-    median(differences).unwrap_or(0.0) / (NORMAL_MEDIAN * 6f64.sqrt())
+        .map(|(z, _)| differences::second(&z.map(|z| z[output])).abs());
+    differences::noise_of_second(median(sizes).unwrap_or(0.0))
 }
 
 /// True for a fit by output error whose residuals show no motion of the air.

@@ -1,8 +1,9 @@
 //! Numerical methods that several rooms share: linear algebra and dual numbers, distributions and order
-//! statistics, sums over time and frequency, roots and minima, random numbers, and the processor's
+//! statistics, differences, sums over time and frequency, roots and minima, random numbers, and the processor's
 //! vectors.
 
 pub mod chi_squared;
+pub mod differences;
 pub(crate) mod digits;
 pub mod dual;
 pub(crate) mod harmonics;

@@ -8,6 +8,7 @@ use crate::dynamics::Motion;
 use crate::dynamics::motion::{MassProperties, Window};
 use crate::flight::Record;
 use crate::maneuver::Maneuver;
+use crate::numerics::differences;
 use crate::numerics::order_statistics::median;
 use crate::rigid_body::{Loading, Mass};
 
@@ -205,15 +206,13 @@ fn trim_samples(record: &Record, maneuver: &Maneuver, samples: usize, longest_s:
     count.clamp(FEWEST_SAMPLES.min(samples), samples)
 }
 
-/// White noise of each output from its third differences, whose variance is 20 times that of the
-/// noise. The median leaves out steps of the accelerations.
+/// White noise of each output, from its third differences. Their median leaves out steps of the
+/// accelerations.
 fn noise(measured: &[Outputs]) -> Outputs {
-    const MEDIAN_TO_DEVIATION: f64 = 0.674_489_750_196_082;
     std::array::from_fn(|i| {
-        let third = measured
-            .windows(4)
-            .map(|w| (w[3][i] - 3.0 * w[2][i] + 3.0 * w[1][i] - w[0][i]).abs());
-        let spread = median(third).unwrap_or(0.0) / MEDIAN_TO_DEVIATION / 20_f64.sqrt();
-        spread.max(LEAST_NOISE[i])
+        let samples = measured.array_windows::<4>();
+        let sizes = samples.map(|w| differences::third(&w.map(|z| z[i])).abs());
+        let noise = differences::noise_of_third(median(sizes).unwrap_or(0.0));
+        noise.max(LEAST_NOISE[i])
     })
 }

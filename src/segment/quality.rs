@@ -9,7 +9,8 @@ use crate::aero::{Axis, Output};
 use crate::flight::record::Series;
 use crate::flight::{Record, signal};
 use crate::maneuver::{Acceptance, Class, Maneuver, Quality};
-use crate::numerics::order_statistics::{SIGMA_PER_MAD, upper_median_in_place};
+use crate::numerics::differences;
+use crate::numerics::order_statistics::upper_median_in_place;
 use crate::numerics::sample_count::nearest;
 use crate::units::RAD;
 
@@ -238,17 +239,15 @@ fn mean_square(values: &[f64], about: About) -> Option<f64> {
 fn signal_to_noise(record: &Record, signals: &[&str], part: &RangeInclusive<usize>) -> Option<f64> {
     let of_signal = |name: &&str| -> Option<f64> {
         let values = record.values(name)?.get(part.clone())?;
-        let second = |w: &[f64]| (w[0] - 2.0 * w[1] + w[2]).abs();
-        let mut differences: Vec<f64> = values
-            .windows(3)
-            .map(second)
+        let mut sizes: Vec<f64> = values
+            .array_windows()
+            .map(|w| differences::second(w).abs())
             .filter(|d| d.is_finite())
             .collect();
-        if differences.len() < 2 {
+        if sizes.len() < 2 {
             return None;
         }
-        // Second differences of white noise have six times its variance.
-        let noise = SIGMA_PER_MAD * upper_median_in_place(&mut differences)? / 6.0_f64.sqrt();
+        let noise = differences::noise_of_second(upper_median_in_place(&mut sizes)?);
         ratio(Some(mean_square(values, About::Line)?.sqrt()), Some(noise))
     };
     signals.iter().filter_map(of_signal).max_by(f64::total_cmp)

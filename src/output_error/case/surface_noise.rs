@@ -6,7 +6,8 @@ use crate::aero::{Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
 use crate::flight::signal;
-use crate::numerics::order_statistics::{SIGMA_PER_MAD, upper_median_of_magnitudes};
+use crate::numerics::differences;
+use crate::numerics::order_statistics::upper_median_of_magnitudes;
 
 /// Surface with noise on its measured deflection.
 #[derive(Clone, Debug, PartialEq)]
@@ -99,15 +100,13 @@ fn samples_of(window: &Window, name: &str) -> Vec<f64> {
 
 /// Variance of the white noise on a signal that is otherwise smooth but for few steps.
 ///
-/// Third differences have 1 + 9 + 9 + 1 times the noise's variance, and their median size ignores
-/// the steps.
+/// The median size of third differences ignores the steps.
 #[must_use]
 pub fn white_variance(samples: &[f64]) -> f64 {
-    let third_difference = |u: &[f64]| (u[3] - 3.0 * u[2] + 3.0 * u[1] - u[0]).abs().to_bits();
-    let mut sizes: Vec<u64> =
-        Arch::new().dispatch(|| samples.windows(4).map(third_difference).collect());
+    let size = |u: &[f64; 4]| differences::third(u).abs().to_bits();
+    let mut sizes: Vec<u64> = Arch::new().dispatch(|| samples.array_windows().map(size).collect());
     let median = upper_median_of_magnitudes(&mut sizes).unwrap_or(0.0);
-    (SIGMA_PER_MAD * median).powi(2) / 20.0
+    differences::noise_of_third(median).powi(2)
 }
 
 #[cfg(test)]
