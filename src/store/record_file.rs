@@ -48,7 +48,7 @@ const CONSTANT: &str = "constant:";
 pub const GROUP: usize = 1 << 19;
 
 /// Samples of a page, which is decoded whole for any of its samples.
-const PAGE: usize = 1 << 14;
+const PAGE: usize = 1 << 11;
 
 /// Id, clock and constants of a record.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -42,13 +42,13 @@ pub fn score_covariance(
     let moves = moves_of_start(window, linearised)?;
     let mut products = block_products(window, linearised, weights);
     sum_later(&mut products);
-    let by_start = information.eliminated(&products);
-    let mut scores = DMatrix::zeros(PARAMETERS, INPUTS * moves.len());
+    let mut scores = DMatrix::zeros(ALL, INPUTS * moves.len());
     for (block, moves) in moves.iter().enumerate() {
-        let by_start = by_start.columns(STATES * block, STATES);
+        let by_start = products.columns(STATES * block, STATES);
         let mut own = scores.columns_mut(INPUTS * block, INPUTS);
         own.gemm(1.0, &by_start, moves, 0.0);
     }
+    let mut scores = information.eliminated(&scores);
     make_consistent(&mut scores, window, &information.shared);
     Some(&scores * scores.transpose())
 }

@@ -267,7 +267,11 @@ impl ReducedInformation {
 
     /// Scores on the shared parameters, from scores on all, one a column.
     pub fn eliminated(&self, scores: &DMatrix<f64>) -> DMatrix<f64> {
-        scores.rows(LOCAL, PARAMETERS) - self.following.tr_mul(&scores.rows(0, LOCAL))
+        let mut shared = scores.rows(LOCAL, PARAMETERS).into_owned();
+        // Products with a transposed matrix are dots, element by element.
+        let followed = self.following.transpose();
+        shared.gemm(-1.0, &followed, &scores.rows(0, LOCAL), 1.0);
+        shared
     }
 
     /// Gradient on the shared parameters, from that on all.
