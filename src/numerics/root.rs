@@ -12,21 +12,52 @@ pub const EXACT: f64 = 1e-14;
 /// there are directions left.
 #[must_use]
 pub fn root(covariance: &DMatrix<f64>, least: f64) -> DMatrix<f64> {
-    let all: Vec<usize> = (0..covariance.nrows()).collect();
-    root_of_some(covariance, &all, least)
+    root_with_pivots(covariance, least).0
+}
+
+/// Root D S, with the standard deviations D and the symmetric root S of the correlations. It changes as little
+/// as the covariance does, so draws by it do too. A small difference of two variances may change the order of the
+/// pivots of [`root`], and with it every draw.
+#[must_use]
+pub fn continuous_root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let deviations = covariance.diagonal().map(|v| v.max(0.0).sqrt());
+    if deviations.is_empty() {
+        return covariance.clone();
+    }
+    let per = deviations.map(|d| if d > 0.0 { 1.0 / d } else { 0.0 });
+    let correlations = DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |i, j| {
+        per[i] * covariance[(i, j)] * per[j]
+    });
+    let eigen = correlations.symmetric_eigen();
+    let roots = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
+    let vectors = &eigen.eigenvectors;
+    let root = vectors * DMatrix::from_diagonal(&roots) * vectors.transpose();
+    DMatrix::from_diagonal(&deviations) * root
 }
 
 /// Root of the covariance of some quantities, continued to all: of `covariance`, between all and these, and the
 /// `places` of these among all. Their rows are their own root, and all rows with them give `covariance`.
 #[must_use]
 pub fn root_of_some(covariance: &DMatrix<f64>, places: &[usize], least: f64) -> DMatrix<f64> {
+    pivoted(covariance, places, least).0
+}
+
+/// As [`root`], with the row of each column's pivot. These rows are a lower triangular matrix, the exact root
+/// of their own covariance.
+#[must_use]
+pub fn root_with_pivots(covariance: &DMatrix<f64>, least: f64) -> (DMatrix<f64>, Vec<usize>) {
+    let all: Vec<usize> = (0..covariance.nrows()).collect();
+    pivoted(covariance, &all, least)
+}
+
+fn pivoted(covariance: &DMatrix<f64>, places: &[usize], least: f64) -> (DMatrix<f64>, Vec<usize>) {
     let own = places.iter().enumerate().map(|(j, i)| covariance[(*i, j)]);
     let mut rest = DVector::from_iterator(places.len(), own);
     let limit = least * rest.amax();
     let mut root = DMatrix::<f64>::zeros(covariance.nrows(), places.len());
-    let mut rank = 0;
-    while rank < places.len() {
-        let pivot = rest.imax();
+    let mut pivots = Vec::new();
+    while pivots.len() < places.len() {
+        let (pivot, rank) = (rest.imax(), pivots.len());
         if rest[pivot] <= limit {
             break;
         }
@@ -40,9 +71,9 @@ pub fn root_of_some(covariance: &DMatrix<f64>, places: &[usize], least: f64) -> 
         }
         rest[pivot] = 0.0;
         root.set_column(rank, &column);
-        rank += 1;
+        pivots.push(places[pivot]);
     }
-    root.resize_horizontally(rank, 0.0)
+    (root.resize_horizontally(pivots.len(), 0.0), pivots)
 }
 
 /// Root of a block diagonal covariance.
@@ -147,7 +178,31 @@ mod tests {
     #[test]
     fn the_square_of_the_root_is_the_covariance() {
         let root = root(&covariance(), EXACT);
-        assert_relative_eq!(&root * root.transpose(), covariance(), epsilon = 1e-14);
+        assert_relative_eq!(&root * root.transpose(), covariance(), epsilon = 1e-13);
+    }
+
+    #[test]
+    fn the_square_of_a_continuous_root_is_the_covariance() {
+        let root = continuous_root(&covariance());
+        assert_relative_eq!(&root * root.transpose(), covariance(), epsilon = 1e-13);
+        let singular =
+            DMatrix::from_row_slice(3, 3, &[0.0, 0.0, 0.0, 0.0, 4.0, 6.0, 0.0, 6.0, 9.0]);
+        let root = continuous_root(&singular);
+        assert_relative_eq!(&root * root.transpose(), singular, epsilon = 1e-13);
+        assert!(continuous_root(&DMatrix::zeros(0, 0)).is_empty());
+    }
+
+    #[test]
+    fn a_continuous_root_moves_as_little_as_the_covariance_and_a_pivoted_one_does_not() {
+        // 1e-9 decides which of two variances is the larger.
+        let covariance = |by: f64| DMatrix::from_row_slice(2, 2, &[1.0 + by, 0.5, 0.5, 1.0 - by]);
+        let (more, less) = (covariance(1e-9), covariance(-1e-9));
+        assert!((root(&more, EXACT) - root(&less, EXACT)).amax() > 0.4);
+        assert_relative_eq!(
+            continuous_root(&more),
+            continuous_root(&less),
+            epsilon = 1e-8
+        );
     }
 
     #[test]

@@ -8,7 +8,7 @@ use crate::maneuver::{Maneuver, Means};
 use crate::qualities::{self, Basis};
 
 /// Version of the flying qualities.
-pub const QUALITIES_VERSION: u32 = 1;
+pub const QUALITIES_VERSION: u32 = 2;
 
 /// Computes the flying qualities of the posterior, where the pipeline has a specification.
 pub fn judge_qualities(config: &Config, campaign: &mut Campaign) {

@@ -15,7 +15,7 @@ use super::free_run::FreeRun;
 use super::judgement::Judged;
 use super::outputs::place;
 use super::recording::Recording;
-use super::repeat_flight::{Histories, MovedRuns, moving};
+use super::repeat_flight::{Histories, MovedRuns, moving, start_errors};
 use super::specification::Tolerance;
 use super::start::MatchedStart;
 use crate::aero::{Axis, Buildup, Condition};
@@ -96,7 +96,7 @@ impl LinearOutputs {
         posterior: &LocalPosterior,
         (buildup, axis): (&Buildup, Axis),
     ) -> Option<LinearOutputs> {
-        let covariance = start.covariance.as_ref()?;
+        let errors = start_errors(start.covariance.as_ref()?, axis);
         let slope = |(value, derivative): (usize, usize)| {
             let deviation = posterior.covariance[(value, value)].sqrt();
             let effect = runs.effect(&[(derivative, deviation)]);
@@ -105,7 +105,7 @@ impl LinearOutputs {
         };
         let moving = moving(posterior, buildup).into_iter();
         let slopes = moving.filter_map(slope).collect();
-        let of_start = runs.effects_of_start(covariance, axis).collect();
+        let of_start = runs.effects_of_start(&errors, axis).collect();
         Some(LinearOutputs {
             slopes,
             of_start,

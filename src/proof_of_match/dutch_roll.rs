@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::derivative_table::DerivativeTable;
-use super::deviations::independent;
+use super::deviations::Deviations;
 use crate::aero::{Axis, Buildup, Derivative, Regressor, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::maneuver::{Maneuver, Means};
@@ -71,7 +71,7 @@ pub struct LateralModes {
     /// Derivatives that the maneuver estimates; it holds the others.
     estimated: Vec<bool>,
     /// Independent errors of the estimates.
-    errors: Vec<DVector<f64>>,
+    errors: Deviations,
     alpha_deg: f64,
     pub flight: DutchRoll,
 }
@@ -121,7 +121,7 @@ impl LateralModes {
                 .iter()
                 .map(|name| estimates.place(name).is_some())
                 .collect(),
-            errors: independent(&estimates.covariance_of(&names)),
+            errors: Deviations::of(&estimates.covariance_of(&names)),
             alpha_deg: maneuver.alpha_deg,
             linear,
             derivatives,
@@ -163,7 +163,7 @@ impl LateralModes {
             Some(effect(&by)? / deviation)
         };
         let slopes: Option<Vec<f64>> = deviations.iter().map(slope).collect();
-        let errors: Option<Vec<f64>> = self.errors.iter().map(effect).collect();
+        let errors: Option<Vec<f64>> = self.errors.directions.iter().map(effect).collect();
         Some(RepeatQuantity {
             mean: at(values.clone())?,
             slopes: slopes?,
@@ -184,8 +184,9 @@ impl LateralModes {
         for (value, derivative) in values.iter_mut().zip(&self.derivatives) {
             *value += deviation(*derivative);
         }
-        for error in &self.errors {
-            values.axpy(stream.normal(), error, 1.0);
+        let deviates = self.errors.drawn(stream);
+        for (error, deviate) in self.errors.directions.iter().zip(deviates) {
+            values.axpy(deviate, error, 1.0);
         }
         self.as_estimated(values)
     }

@@ -9,7 +9,7 @@
 use nalgebra::{DMatrix, DVector};
 use pulp::Arch;
 
-use super::deviations::independent;
+use super::deviations::Deviations;
 use super::dutch_roll::{DutchRoll, LateralModes};
 use super::free_run::{FreeRun, STATES, Simulation, Start};
 use super::judgement::{Judged, Simulated, allowed_outside};
@@ -118,14 +118,19 @@ impl<'a> MovedRuns<'a> {
         self.difference(&raised, self.start)
     }
 
-    /// Effects of the independent errors of a matched start.
+    /// Effects of a matched start's errors in the axis's own parameters.
     pub fn effects_of_start(
         &self,
-        covariance: &DMatrix<f64>,
+        errors: &Deviations,
         axis: Axis,
     ) -> impl Iterator<Item = Histories> {
-        let moved = moved_starts(self.start, covariance, axis).into_iter();
-        moved.map(|moved| self.difference(self.simulation, &moved))
+        errors.directions.iter().map(move |error| {
+            let parameters = start_parameters(axis).into_iter().zip(error.iter());
+            let moved = parameters.fold(self.start.clone(), |start, (parameter, by)| {
+                start.moved(parameter, *by)
+            });
+            self.difference(self.simulation, &moved)
+        })
     }
 
     fn difference(&self, simulation: &Simulation, start: &Start) -> Histories {
@@ -146,17 +151,19 @@ pub fn effects(
 ) -> Option<Effects> {
     let covariance = start.covariance.as_ref()?;
     let runs = MovedRuns::new(simulation, &start.start, buildup);
-    let deviations = deviations(posterior, buildup)?;
-    let of_derivatives = deviations.iter().map(|deviation| runs.effect(deviation));
-    let effects = of_derivatives.chain(runs.effects_of_start(covariance, axis));
+    let of_derivatives = OfDerivatives::of(posterior, buildup)?;
+    let of_start = start_errors(covariance, axis);
+    let effects = of_derivatives.named.iter().map(|own| runs.effect(own));
+    let effects = effects.chain(runs.effects_of_start(&of_start, axis));
     let effects: Vec<Histories> = effects.collect();
     let mut stream = RandomStream::new(SEED, &simulation.recording.start_s.to_string());
     let draw = |_| {
-        let deviates: Vec<f64> = effects.iter().map(|_| stream.normal()).collect();
+        let mut deviates = of_derivatives.deviations.drawn(&mut stream);
         let dutch_roll = modes.and_then(|modes| {
             let mean = &simulation.aerodynamics.table;
-            modes.of_repeat(mean, |i| deviation(&deviations, i, &deviates), &mut stream)
+            modes.of_repeat(mean, |i| of_derivatives.drawn(i, &deviates), &mut stream)
         });
+        deviates.extend(of_start.drawn(&mut stream));
         Draw {
             deviates,
             dutch_roll,
@@ -172,16 +179,6 @@ pub fn effects(
     })
 }
 
-/// Drawn deviation of a derivative.
-fn deviation(deviations: &[Vec<(usize, f64)>], derivative: usize, deviates: &[f64]) -> f64 {
-    let both = deviations.iter().zip(deviates);
-    let own = both.map(|(deviation, deviate)| {
-        let own = deviation.iter().find(|(i, _)| *i == derivative);
-        own.map_or(0.0, |(_, by)| by * deviate)
-    });
-    own.sum()
-}
-
 /// Places of the derivatives that move a simulation, among the values of a posterior and in the build-up.
 #[must_use]
 pub fn moving(posterior: &LocalPosterior, buildup: &Buildup) -> Vec<(usize, usize)> {
@@ -195,39 +192,62 @@ pub fn moving(posterior: &LocalPosterior, buildup: &Buildup) -> Vec<(usize, usiz
     values.filter_map(|(i, v)| Some((i, index(v)?))).collect()
 }
 
-/// Independent deviations of the derivatives; `None` where the posterior has none of the axis.
-fn deviations(posterior: &LocalPosterior, buildup: &Buildup) -> Option<Vec<Vec<(usize, f64)>>> {
-    let known = moving(posterior, buildup);
-    if known.is_empty() {
-        return None;
-    }
-    let covariance = DMatrix::from_fn(known.len(), known.len(), |i, j| {
-        posterior.covariance[(known[i].0, known[j].0)]
-    });
-    let named = |deviation: DVector<f64>| {
-        let pairs = known.iter().zip(deviation.iter());
-        pairs
-            .map(|((_, derivative), by)| (*derivative, *by))
-            .collect()
-    };
-    Some(independent(&covariance).into_iter().map(named).collect())
+/// Deviations of the derivatives that move a simulation.
+struct OfDerivatives {
+    deviations: Deviations,
+    /// Each direction by the derivatives' places in the build-up.
+    named: Vec<Vec<(usize, f64)>>,
 }
 
-/// Starts with one independent error of the axis's own parameters each.
-fn moved_starts(start: &Start, covariance: &DMatrix<f64>, axis: Axis) -> Vec<Start> {
+impl OfDerivatives {
+    /// Deviations by a posterior; `None` where it knows no derivative of the axis.
+    fn of(posterior: &LocalPosterior, buildup: &Buildup) -> Option<OfDerivatives> {
+        let known = moving(posterior, buildup);
+        if known.is_empty() {
+            return None;
+        }
+        let deviations = Deviations::of(&DMatrix::from_fn(known.len(), known.len(), |i, j| {
+            posterior.covariance[(known[i].0, known[j].0)]
+        }));
+        let named = |direction: &DVector<f64>| {
+            let pairs = known.iter().zip(direction.iter());
+            pairs
+                .map(|((_, derivative), by)| (*derivative, *by))
+                .collect()
+        };
+        Some(OfDerivatives {
+            named: deviations.directions.iter().map(named).collect(),
+            deviations,
+        })
+    }
+
+    /// Deviation of one derivative in a draw.
+    fn drawn(&self, derivative: usize, deviates: &[f64]) -> f64 {
+        let both = self.named.iter().zip(deviates);
+        let own = both.map(|(direction, deviate)| {
+            let own = direction.iter().find(|(i, _)| *i == derivative);
+            own.map_or(0.0, |(_, by)| by * deviate)
+        });
+        own.sum()
+    }
+}
+
+/// Parameters of a start that an axis determines.
+fn start_parameters(axis: Axis) -> [usize; 7] {
     // α, airspeed, q, θ with CN, Cm, CA; β, p, r, φ with CY, Cl, Cn.
-    let parameters: [usize; 7] = match axis {
+    match axis {
         Axis::Longitudinal => [0, 2, 4, 6, STATES, STATES + 1, STATES + 2],
         Axis::Lateral => [1, 3, 5, 7, STATES + 3, STATES + 4, STATES + 5],
-    };
-    let own = DMatrix::from_fn(7, 7, |i, j| covariance[(parameters[i], parameters[j])]);
-    let moved = |deviation: DVector<f64>| {
-        let parameters = parameters.iter().zip(deviation.iter());
-        parameters.fold(start.clone(), |start, (parameter, by)| {
-            start.moved(*parameter, *by)
-        })
-    };
-    independent(&own).into_iter().map(moved).collect()
+    }
+}
+
+/// Errors of a start in the axis's own parameters, from the covariance of all.
+#[must_use]
+pub fn start_errors(covariance: &DMatrix<f64>, axis: Axis) -> Deviations {
+    let own = start_parameters(axis);
+    Deviations::of(&DMatrix::from_fn(own.len(), own.len(), |i, j| {
+        covariance[(own[i], own[j])]
+    }))
 }
 
 /// Difference of two runs; after a departure the last one stays.

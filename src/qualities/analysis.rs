@@ -16,7 +16,7 @@ use crate::model::LocalPosterior;
 use crate::numerics::dual::Dual;
 use crate::numerics::order_statistics::quantile;
 use crate::numerics::random::RandomStream;
-use crate::numerics::root::{EXACT, root};
+use crate::numerics::root::continuous_root;
 use crate::numerics::student::NORMAL_95;
 use crate::tables::{Airframe, DeviationBasis, Level, LevelRow, QualityRow, Quantity, RootRow};
 
@@ -60,7 +60,7 @@ impl AxisAnalysis {
         draws: usize,
     ) -> Option<AxisAnalysis> {
         let mean = linear.quantities(axis, &posterior.mean, Differentiation::Slopes)?;
-        let root = root(&posterior.covariance, EXACT);
+        let root = continuous_root(&posterior.covariance);
         let mut stream = RandomStream::new(SEED, axis.name());
         let drawn = (0..draws).filter_map(|_| {
             let deviates = DVector::from_fn(root.ncols(), |_, _| stream.normal());
