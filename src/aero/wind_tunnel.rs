@@ -134,8 +134,10 @@ pub struct WindTunnel {
     settings: Settings,
 }
 
-fn key(derivative: &str) -> String {
-    derivative.chars().filter(|c| *c != '_').collect()
+/// Name of a derivative as databases are searched for it: without underscores.
+#[must_use]
+pub fn key(derivative: &str) -> String {
+    derivative.replace('_', "")
 }
 
 impl WindTunnel {

@@ -56,7 +56,7 @@ pub(super) fn tunnel(
         if let Some(derivative) = buildup
             .derivatives
             .iter()
-            .find(|d| plain(&d.name) == plain(&row.derivative))
+            .find(|d| wind_tunnel::key(&d.name) == wind_tunnel::key(&row.derivative))
         {
             let unit = derivative.unit();
             let Some(factor) = unit.factor_from(&row.unit) else {
@@ -102,8 +102,11 @@ fn misspelt(read: &TunnelRows, buildup: &Buildup) -> Option<(usize, String)> {
     let derivatives = buildup.derivatives.iter().map(|d| &d.name);
     let names = derivatives.chain(buildup.combined.iter().map(|c| &c.name));
     let (found, lacking): (Vec<&String>, Vec<&String>) =
-        names.partition(|name| read.lines.contains_key(&plain(name)));
-    let found: BTreeSet<String> = found.into_iter().map(|name| plain(name)).collect();
+        names.partition(|name| read.lines.contains_key(&wind_tunnel::key(name)));
+    let found: BTreeSet<String> = found
+        .into_iter()
+        .map(|name| wind_tunnel::key(name))
+        .collect();
     let unknown = read.lines.iter().filter(|(name, _)| !found.contains(*name));
     unknown
         .filter_map(|(_, (line, written))| {
@@ -128,15 +131,12 @@ pub(crate) fn tunnel_rows(
     let derivatives = buildup.derivatives.iter().map(|d| &d.name);
     let names: Vec<String> = derivatives
         .chain(buildup.combined.iter().map(|c| &c.name))
-        .map(|n| plain(n))
+        .map(|name| wind_tunnel::key(name))
         .collect();
     let third = settings.third.as_ref().map(|third| third.name.as_str());
-    store::tunnel::rows(path, third, |variable| names.contains(&plain(variable)))
-}
-
-/// Name without underscores, as tunnels may write it.
-fn plain(name: &str) -> String {
-    name.replace('_', "")
+    store::tunnel::rows(path, third, |variable| {
+        names.contains(&wind_tunnel::key(variable))
+    })
 }
 
 /// Rows of the tunnel read so far. Each point stands once, and all rows of a derivative have the same
@@ -152,7 +152,7 @@ struct TunnelRows {
 
 impl TunnelRows {
     fn add(&mut self, line: usize, row: &TunnelRow) -> std::result::Result<(), String> {
-        let name = plain(&row.derivative);
+        let name = wind_tunnel::key(&row.derivative);
         let written = || (line, row.derivative.clone());
         self.lines.entry(name.clone()).or_insert_with(written);
         let given = (row.mach.is_some(), row.third.is_some());

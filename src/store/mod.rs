@@ -5,6 +5,7 @@ pub mod archive;
 mod artefact_name;
 mod artefacts;
 pub mod atomic;
+mod clock_column;
 pub mod contents;
 pub mod files;
 pub mod fingerprint;

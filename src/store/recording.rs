@@ -8,6 +8,7 @@ use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
 
 use super::archive::{FlightFiles, guarded, open};
 use super::atomic::Draft;
+use super::clock_column::is_clock;
 use super::import::tall::Tall;
 use super::recorder::UNIT;
 use crate::error::{Error, Result};
@@ -94,7 +95,7 @@ fn channels(path: &Path) -> Result<BTreeMap<String, Channel>, String> {
     let fields = metadata.schema().fields().iter();
     let channel = |field: &arrow::datatypes::FieldRef| {
         let kind = field.data_type();
-        let is_clock = matches!(kind, DataType::Timestamp(..) | DataType::Duration(_));
+        let is_clock = is_clock(kind);
         let is_number = kind.is_numeric() || *kind == DataType::Boolean;
         let unit = field.metadata().get(UNIT).cloned();
         let (signal, unit) = if is_clock {

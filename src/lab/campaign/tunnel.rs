@@ -3,6 +3,7 @@
 use super::cards::TunnelErrors;
 use super::simulated_campaign::SimulatedCampaign;
 use crate::aero::Combined;
+use crate::aero::wind_tunnel::key;
 use crate::numerics::random::RandomStream;
 use crate::store::files::TunnelRow;
 
@@ -28,7 +29,7 @@ fn measured(
     errors: &TunnelErrors,
     derivative: &str,
 ) -> Vec<TunnelRow> {
-    let is_same = |row: &&TunnelRow| row.derivative.replace('_', "") == derivative.replace('_', "");
+    let is_same = |row: &&TunnelRow| key(&row.derivative) == key(derivative);
     let size = campaign.config.tunnel.root_mean_square(derivative) / 100.0;
     let mut random = RandomStream::new(campaign.cards.seed, &format!("tunnel {derivative}"));
     let common = errors.error_pct * random.normal();

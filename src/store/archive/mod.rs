@@ -14,8 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Once;
 
 use arrow::array::{Array, AsArray, RecordBatch};
-use arrow::compute::cast;
-use arrow::datatypes::{DataType, Field, Float64Type, TimeUnit};
+use arrow::datatypes::{DataType, Field, Float64Type};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder, RowSelection,
@@ -30,6 +29,7 @@ use crate::ingest::ColumnSource;
 use crate::units::Unit;
 
 use super::atomic::Draft;
+use super::clock_column::{as_floats, tick_unit};
 use super::import::tall::Tall;
 use super::object;
 use super::recorder::UNIT;
@@ -480,12 +480,7 @@ fn hand_over(
         sink(plain.values());
         return Ok(());
     }
-    let plain = if clock_factor.is_some() {
-        cast(array, &DataType::Int64)?
-    } else {
-        cast(array, &DataType::Float64)?
-    };
-    let plain = cast(&plain, &DataType::Float64)?;
+    let plain = as_floats(array)?;
     let factor = clock_factor.unwrap_or(1.0);
     let mut numbers: Vec<f64> = plain
         .as_primitive::<Float64Type>()
@@ -548,9 +543,8 @@ pub fn read(
 
 fn refuse_other_types(field: &Field, channel: Option<&Channel>) -> Result<(), String> {
     let found = field.data_type();
-    let clock = matches!(found, DataType::Timestamp(..) | DataType::Duration(_));
     let fits = found.is_numeric() || *found == DataType::Boolean || *found == DataType::Null;
-    if fits || (clock && clock_factor(found, channel).is_some()) {
+    if fits || clock_factor(found, channel).is_some() {
         return Ok(());
     }
     let signal = channel.map(|c| c.signal.as_str()).unwrap_or_default();
@@ -577,17 +571,8 @@ fn refuse_other_types(field: &Field, channel: Option<&Channel>) -> Result<(), St
 
 /// Factor from the ticks of timestamps and durations to the unit of the channel map.
 fn clock_factor(found: &DataType, channel: Option<&Channel>) -> Option<f64> {
-    let (DataType::Timestamp(tick, _) | DataType::Duration(tick)) = found else {
-        return None;
-    };
-    let name = match tick {
-        TimeUnit::Second => "s",
-        TimeUnit::Millisecond => "ms",
-        TimeUnit::Microsecond => "us",
-        TimeUnit::Nanosecond => "ns",
-    };
     let mapped = Unit::parse(&channel?.unit).ok()?;
-    Unit::parse(name).ok()?.factor_to(mapped)
+    Unit::parse(tick_unit(found)?).ok()?.factor_to(mapped)
 }
 
 mod file_rules;

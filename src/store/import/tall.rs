@@ -22,8 +22,10 @@ use super::contents::{Contents, ImportedColumn, refused};
 use super::flight_file::{BATCH_ROWS, Sink, write, write_draft};
 use crate::error::{Error, Result};
 use crate::store::atomic::Draft;
+use crate::store::clock_column::{as_floats, is_clock, tick_unit};
 use crate::store::object;
 use crate::store::recorder::UNIT;
+use crate::units::Unit;
 
 /// Names of the columns of tall files.
 const TIMES: [&str; 5] = ["time", "t", "timestamp", "time_s", "times"];
@@ -508,18 +510,10 @@ impl Tall {
 
     /// Times; those of a calendar in seconds since its beginning.
     fn times(&self, batch: &RecordBatch) -> Result<Vec<f64>> {
-        use arrow::datatypes::TimeUnit;
-        let ticks = match self.column(batch, &self.time)?.data_type() {
-            DataType::Timestamp(unit, _) | DataType::Duration(unit) => Some(match unit {
-                TimeUnit::Second => 1.0,
-                TimeUnit::Millisecond => 1e-3,
-                TimeUnit::Microsecond => 1e-6,
-                TimeUnit::Nanosecond => 1e-9,
-            }),
-            _ => None,
-        };
+        let unit = tick_unit(self.column(batch, &self.time)?.data_type());
+        let seconds = |unit: &str| Unit::parse(unit).ok()?.factor_to(Unit::parse("s").ok()?);
         let numbers = self.numbers(batch, &self.time)?;
-        Ok(match ticks {
+        Ok(match unit.and_then(seconds) {
             Some(tick) => numbers.into_iter().map(|t| t * tick).collect(),
             None => numbers,
         })
@@ -528,12 +522,7 @@ impl Tall {
     fn numbers(&self, batch: &RecordBatch, name: &str) -> Result<Vec<f64>> {
         let column = self.column(batch, name)?;
         let no_numbers = |_| refused(&self.source, &format!("column `{name}` holds no numbers"));
-        let plain = if is_clock(column.data_type()) {
-            cast(column, &DataType::Int64)
-        } else {
-            cast(column, &DataType::Float64)
-        };
-        let plain = cast(&plain.map_err(no_numbers)?, &DataType::Float64).map_err(no_numbers)?;
+        let plain = as_floats(column).map_err(no_numbers)?;
         let numbers = plain.as_primitive::<Float64Type>();
         Ok(numbers.iter().map(|v| v.unwrap_or(f64::NAN)).collect())
     }
@@ -557,10 +546,6 @@ fn text(texts: &StringArray, row: usize) -> &str {
 
 fn damaged(source: &Path, e: &dyn std::fmt::Display) -> Error {
     refused(source, &format!("not a readable Parquet file: {e}"))
-}
-
-fn is_clock(kind: &DataType) -> bool {
-    matches!(kind, DataType::Timestamp(..) | DataType::Duration(_))
 }
 
 fn is_text(kind: &DataType) -> bool {
