@@ -2,8 +2,9 @@
 
 use nalgebra::{DMatrix, DVector, SVector};
 
-use super::filter_group::{FilterStart, Group, GroupMember, SlopeFit};
+use super::filter_group::{FilterStart, Group, SlopeFit};
 use super::filter_minimum::{Minimum, NoMinimum};
+use super::group_member::GroupMember;
 use super::prepared_case::PreparedCase;
 use super::sensor_noise;
 use super::settings::Method;

@@ -19,6 +19,7 @@ mod alpha_slopes;
 mod whiteness;
 mod filter_minimum;
 mod held_slopes;
+mod group_member;
 mod filter_group;
 mod sensor_noise;
 mod in_gusts;

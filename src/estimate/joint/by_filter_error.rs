@@ -2,8 +2,9 @@
 
 use super::member::{Fitted, Member, is_own, starting_values};
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
-use crate::estimate::filter_group::{FilterStart, Group, GroupMember, SlopeFit};
+use crate::estimate::filter_group::{FilterStart, Group, SlopeFit};
 use crate::estimate::filter_minimum::NoMinimum;
+use crate::estimate::group_member::GroupMember;
 use crate::estimate::in_gusts::Air;
 use crate::estimate::task::Task;
 use crate::estimate::whiteness::{lag_one, largest};
