@@ -17,7 +17,8 @@ use crate::numerics::symmetric;
 
 /// Most steps of the iteration between coefficients, τ² and Huber's weights; about ten suffice.
 const MOST_STEPS: usize = 100;
-/// Change at which coefficients, over their standard deviations, and variances, as shares, stay.
+/// Change by a step below which the iteration has settled: of the trend over the smallest standard deviation,
+/// and of each variance over itself.
 const SETTLED: f64 = 1e-6;
 
 /// Residual of one maneuver's estimate.
