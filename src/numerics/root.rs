@@ -4,6 +4,8 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::symmetric::{scale, scaled};
+
 /// Share of the largest variance below which a direction has none.
 pub const EXACT: f64 = 1e-14;
 
@@ -20,19 +22,21 @@ pub fn root(covariance: &DMatrix<f64>, least: f64) -> DMatrix<f64> {
 /// pivots of [`root`], and with it every draw.
 #[must_use]
 pub fn continuous_root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let correlations = scaled(covariance, &scale(covariance));
     let deviations = covariance.diagonal().map(|v| v.max(0.0).sqrt());
-    if deviations.is_empty() {
-        return covariance.clone();
+    DMatrix::from_diagonal(&deviations) * symmetric_root(correlations)
+}
+
+/// The symmetric root, S S = C.
+#[must_use]
+pub fn symmetric_root(matrix: DMatrix<f64>) -> DMatrix<f64> {
+    if matrix.is_empty() {
+        return matrix;
     }
-    let per = deviations.map(|d| if d > 0.0 { 1.0 / d } else { 0.0 });
-    let correlations = DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |i, j| {
-        per[i] * covariance[(i, j)] * per[j]
-    });
-    let eigen = correlations.symmetric_eigen();
+    let eigen = matrix.symmetric_eigen();
     let roots = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
     let vectors = &eigen.eigenvectors;
-    let root = vectors * DMatrix::from_diagonal(&roots) * vectors.transpose();
-    DMatrix::from_diagonal(&deviations) * root
+    vectors * DMatrix::from_diagonal(&roots) * vectors.transpose()
 }
 
 /// Root of the covariance of some quantities, continued to all: of `covariance`, between all and these, and the

@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::numerics::random::RandomStream;
-use crate::numerics::root::{continuous_root, root_with_pivots};
+use crate::numerics::root::{root_with_pivots, symmetric_root};
+use crate::numerics::symmetric::{scale, scaled};
 
 /// Share of the largest variance, in units of the parameters' own, below which a direction is left out:
 /// it adds 3 % of a standard deviation.
@@ -11,7 +12,7 @@ const LEAST_VARIANCE: f64 = 1e-3;
 
 /// Independent deviations of parameters.
 ///
-/// A draw starts from a deviate for each parameter and [`continuous_root`]. The directions serve as
+/// A draw starts from a deviate for each parameter and the symmetric root, which is continuous. The directions serve as
 /// coordinates alone: which there are, and in which order, is decided by small differences of
 /// variances and must not decide a draw.
 #[derive(Clone, Debug)]
@@ -28,13 +29,10 @@ impl Deviations {
     #[must_use]
     pub fn of(covariance: &DMatrix<f64>) -> Deviations {
         let deviations = covariance.diagonal().map(|v| v.max(0.0).sqrt());
-        let per = deviations.map(|d| if d > 0.0 { 1.0 / d } else { 0.0 });
-        let correlation = DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |i, j| {
-            per[i] * covariance[(i, j)] * per[j]
-        });
-        let (root, pivots) = root_with_pivots(&correlation, LEAST_VARIANCE);
+        let correlations = scaled(covariance, &scale(covariance));
+        let (root, pivots) = root_with_pivots(&correlations, LEAST_VARIANCE);
         let columns = root.column_iter();
-        let mut by_parameter = continuous_root(&correlation).select_rows(&pivots);
+        let mut by_parameter = symmetric_root(correlations).select_rows(&pivots);
         // Pivots have positive variances, so the triangle has a solution.
         root.select_rows(&pivots)
             .solve_lower_triangular_mut(&mut by_parameter);
