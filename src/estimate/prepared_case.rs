@@ -51,9 +51,7 @@ impl<'a> Task<'a> {
                 case.parameters()
             ));
         }
-        let mut free = model.free.clone();
-        free.sort_by_key(|d| case.names.iter().position(|name| *name == d.name));
-        case.noisy_surfaces = noisy_surfaces(self.context.aircraft, &window, &free, &model.held);
+        case.noisy_surfaces = noisy_surfaces(self.context.aircraft, &window, &model);
         case.pressure_variance = pressure_noise::relative_variance(self.record, range);
         Ok(PreparedCase {
             model,

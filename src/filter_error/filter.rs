@@ -132,7 +132,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
             patterns,
             pattern_of,
             priors: vec![],
-            names: own_names::<NX, E>(model),
+            names: model.parameter_names(&E::STATES[..E::own_states()]),
         };
         filter.priors = filter.priors(biases);
         filter
@@ -594,13 +594,6 @@ fn without_own<'a>(model: &Model<'a>) -> Model<'a> {
         initial_state: InitialState::Measured,
         ..model.clone()
     }
-}
-
-/// Names of derivatives, biases and initial states.
-fn own_names<const NX: usize, E: InGusts<NX>>(model: &Model) -> Vec<String> {
-    let mut free = model.free.clone();
-    free.sort_by_key(|d| d.coefficient.index());
-    model.parameter_names(&free, &E::STATES[..E::own_states()])
 }
 
 /// T: the effect of a step's decay of the rotary gusts on the state.

@@ -102,11 +102,8 @@ impl StandardEstimate {
     /// Standard errors that account for autocorrelated residuals and the noise of the surfaces;
     /// `None` where the information matrix is singular.
     pub fn corrected(&mut self, standard: &StandardCase) -> Option<Vec<f64>> {
-        let names = &self.case.names;
-        let mut free: Vec<&Derivative> = standard.free.iter().collect();
-        free.sort_by_key(|d| names.iter().position(|name| *name == d.name));
-        let held: Vec<(&Derivative, f64)> = standard.held.iter().map(|(d, v)| (d, *v)).collect();
-        self.case.noisy_surfaces = noisy_surfaces(&standard.aircraft, &self.window, &free, &held);
+        let model = standard.model();
+        self.case.noisy_surfaces = noisy_surfaces(&standard.aircraft, &self.window, &model);
         let bounds = cramer_rao::bounds(self.inverse.as_ref()?, &self.case, &self.fit);
         Some(
             bounds

@@ -272,42 +272,16 @@ fn cholesky_root(
 mod tests {
 
     use super::*;
-    use crate::aero::Derivative;
-    use crate::dynamics::motion::MassProperties;
-    use crate::dynamics::motion::Window;
     use crate::dynamics::tests::aircraft;
     use crate::dynamics::{Lateral, Longitudinal};
     use crate::flight::Record;
     use crate::output_error::bounds::bounded::Bounded;
     use crate::output_error::case::surface_noise::noisy_surfaces;
     use crate::output_error::case::{InitialState, Model};
-    use crate::output_error::tests::{Noise, SAMPLES, TABLE, nothing_measured, record, truth};
-
-    const SURFACES: [&str; 5] = ["de_deg", "dpv_deg", "da_deg", "dr_deg", "dyv_deg"];
-
-    /// Record with white noise on its surfaces.
-    fn noisy(sd_deg: f64, noise: &mut Noise) -> Record {
-        let mut record = record();
-        for name in SURFACES {
-            let series = record.signals.get_mut(name).unwrap();
-            series
-                .values
-                .iter_mut()
-                .for_each(|v| *v += sd_deg * noise.gaussian());
-        }
-        record
-    }
-
-    fn window(record: &Record) -> Window {
-        Window::cut(
-            &aircraft(),
-            record,
-            0..SAMPLES,
-            SURFACES,
-            MassProperties::Recorded,
-        )
-        .unwrap()
-    }
+    use crate::output_error::tests::{
+        Noise, SAMPLES, TABLE, nothing_measured, record, truth, window, window_of,
+        with_noisy_surfaces,
+    };
 
     /// Record with noise on every nth value of its dynamic pressure, and lines between them.
     fn slow_pressure(share: f64, every: usize, noise: &mut Noise) -> Record {
@@ -334,7 +308,7 @@ mod tests {
     impl Source {
         fn record(self, noise: &mut Noise) -> Record {
             match self {
-                Source::Surfaces { sd_deg } => noisy(sd_deg, noise),
+                Source::Surfaces { sd_deg } => with_noisy_surfaces(sd_deg, noise),
                 Source::Pressure { share, every } => slow_pressure(share, every, noise),
             }
         }
@@ -352,7 +326,7 @@ mod tests {
             biases: vec![],
             initial_state: InitialState::Estimated,
         };
-        let exact = window(&record());
+        let exact = window();
         let mut case = Case::<NX, E>::new(&aircraft(), &exact, nothing_measured(), &model);
         let derivative = |name: &str| {
             free.iter()
@@ -369,7 +343,7 @@ mod tests {
         for _ in 0..draws {
             let other = Case::<NX, E>::new(
                 &aircraft(),
-                &window(&source.record(&mut noise)),
+                &window_of(&source.record(&mut noise)),
                 nothing_measured(),
                 &model,
             );
@@ -388,15 +362,10 @@ mod tests {
                 *s += g * g / f64::from(draws);
             }
         }
-        let ordered: Vec<&Derivative> = case
-            .names
-            .iter()
-            .filter_map(|name| free.iter().map(|(d, _)| d).find(|d| d.name == *name))
-            .collect();
         match source {
             Source::Surfaces { .. } => {
-                let once = window(&source.record(&mut noise));
-                case.noisy_surfaces = noisy_surfaces(&aircraft(), &once, &ordered, &model.held);
+                let once = window_of(&source.record(&mut noise));
+                case.noisy_surfaces = noisy_surfaces(&aircraft(), &once, &model);
             }
             Source::Pressure { share, every } => {
                 case.pressure_variance = every as f64 * share * share;
@@ -435,8 +404,11 @@ mod tests {
     #[test]
     fn without_noise_on_the_surfaces_nothing_is_added() {
         let truth = truth(crate::aero::Axis::Longitudinal);
-        let free: Vec<&Derivative> = truth.iter().map(|(d, _)| d).collect();
-        let still = window(&record());
-        assert_eq!(noisy_surfaces(&aircraft(), &still, &free, &[]), []);
+        let model = Model {
+            free: truth.iter().map(|(d, _)| d).collect(),
+            ..Model::default()
+        };
+        let still = window();
+        assert_eq!(noisy_surfaces(&aircraft(), &still, &model), []);
     }
 }

@@ -10,6 +10,7 @@ pub(crate) mod build_up;
 pub(crate) mod chunking;
 pub(crate) mod layout;
 pub(crate) mod regressors;
+mod model;
 pub mod pressure_noise;
 pub mod surface_noise;
 
@@ -23,53 +24,17 @@ use self::build_up::{BuildUp, PointBuildUp, Term, ValuedTerm};
 use self::layout::LaneLayout;
 use self::regressors::{PreparedMotion, RegressorColumns};
 use self::surface_noise::NoisySurface;
-use crate::aero::{Bias, Derivative};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
 
-/// Source of the initial states: estimated with the derivatives, or taken from the record.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum InitialState {
-    #[default]
-    Estimated,
-    Measured,
-}
+pub use self::model::{InitialState, Model};
 
 /// Measured outputs (deg, deg/s, g), and the samples that count.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Measurements {
     pub values: Vec<[f64; OUTPUTS]>,
     pub used: Vec<[bool; OUTPUTS]>,
-}
-
-/// Free and held parameters of a maneuver.
-#[derive(Clone, Debug, Default)]
-pub struct Model<'a> {
-    pub free: Vec<&'a Derivative>,
-    pub held: Vec<(&'a Derivative, f64)>,
-    pub biases: Vec<&'a Bias>,
-    pub initial_state: InitialState,
-}
-
-impl Model<'_> {
-    /// Names of the parameters in order, given the free derivatives sorted by coefficient.
-    pub(crate) fn parameter_names(&self, free: &[&Derivative], states: &[&str]) -> Vec<String> {
-        let mut names: Vec<String> = free.iter().map(|d| d.name.clone()).collect();
-        names.extend(self.biases.iter().map(|b| b.name.clone()));
-        if self.initial_state == InitialState::Estimated {
-            names.extend(states.iter().map(|s| format!("initial {s}")));
-        }
-        names
-    }
-
-    /// Outputs that the biases shift.
-    pub(crate) fn biased_outputs<const NX: usize, E: Equations<NX>>(&self) -> Vec<usize> {
-        let outputs = E::AXIS.outputs();
-        let place = |bias: &&Bias| outputs.iter().position(|o| *o == bias.output);
-        self.biases.iter().filter_map(place).collect()
-    }
 }
 
 /// One maneuver prepared for estimation.
@@ -156,8 +121,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         measurements: Measurements,
         model: &Model,
     ) -> Self {
-        let mut free = model.free.clone();
-        free.sort_by_key(|d| d.coefficient.index());
+        let free = model.free_in_order();
         let mut columns = RegressorColumns::<NX, E>::new(aircraft, window);
         let terms: Vec<Term> = free.iter().map(|d| columns.term(d)).collect();
         let held = model.held.iter().map(|(d, value)| ValuedTerm {
@@ -191,7 +155,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
             noisy_surfaces: vec![],
             pressure_variance: 0.0,
             measurements,
-            names: model.parameter_names(&free, &E::STATES),
+            names: model.parameter_names(&E::STATES),
             equations: PhantomData,
         }
     }

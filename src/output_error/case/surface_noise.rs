@@ -2,6 +2,7 @@
 
 use pulp::Arch;
 
+use super::model::Model;
 use crate::aero::{Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
@@ -34,19 +35,14 @@ pub(crate) enum DerivativeValue {
     Held(f64),
 }
 
-/// Surfaces of a window that have noise. `free` are the derivatives in the order of the case's
-/// parameters.
+/// Surfaces of a model that have noise in a window.
 #[must_use]
-pub fn noisy_surfaces(
-    aircraft: &Aircraft,
-    window: &Window,
-    free: &[&Derivative],
-    held: &[(&Derivative, f64)],
-) -> Vec<NoisySurface> {
-    let free = free.iter().enumerate();
+pub fn noisy_surfaces(aircraft: &Aircraft, window: &Window, model: &Model) -> Vec<NoisySurface> {
+    let free = model.free_in_order().into_iter().enumerate();
     let mut derivatives: Vec<(&Derivative, DerivativeValue)> =
-        free.map(|(j, d)| (*d, DerivativeValue::Free(j))).collect();
-    derivatives.extend(held.iter().map(|(d, v)| (*d, DerivativeValue::Held(*v))));
+        free.map(|(j, d)| (d, DerivativeValue::Free(j))).collect();
+    let held = model.held.iter();
+    derivatives.extend(held.map(|(d, v)| (*d, DerivativeValue::Held(*v))));
     let surfaces = derivatives
         .iter()
         .filter_map(|(d, _)| d.regressor.surface());

@@ -69,14 +69,12 @@ impl<'a, const NX: usize, E: Equations<NX>> Reference<'a, NX, E> {
         model: &'a Model<'a>,
         case: &'a Case<NX, E>,
     ) -> Self {
-        let mut free = model.free.clone();
-        free.sort_by_key(|d| d.coefficient.index());
         Reference {
             aircraft,
             window,
             measurements: &case.measurements,
             motion: window.motion(aircraft).points().collect(),
-            free,
+            free: model.free_in_order(),
             held: &model.held,
             biased_outputs: &case.biased_outputs,
             initial_state: model.initial_state,

@@ -170,16 +170,27 @@ pub(crate) fn record() -> Record {
     }
 }
 
+const SURFACES: [&str; 5] = ["de_deg", "dpv_deg", "da_deg", "dr_deg", "dyv_deg"];
+
+/// The record with white noise on its surfaces.
+pub(crate) fn with_noisy_surfaces(sd_deg: f64, noise: &mut Noise) -> Record {
+    let mut record = record();
+    for name in SURFACES {
+        let values = &mut record.signals.get_mut(name).unwrap().values;
+        values
+            .iter_mut()
+            .for_each(|v| *v += sd_deg * noise.gaussian());
+    }
+    record
+}
+
 pub(crate) fn window() -> Window {
-    let surfaces = ["de_deg", "dpv_deg", "da_deg", "dr_deg", "dyv_deg"];
-    Window::cut(
-        &aircraft(),
-        &record(),
-        0..SAMPLES,
-        surfaces,
-        MassProperties::Recorded,
-    )
-    .unwrap()
+    window_of(&record())
+}
+
+pub(crate) fn window_of(record: &Record) -> Window {
+    let mass = MassProperties::Recorded;
+    Window::cut(&aircraft(), record, 0..SAMPLES, SURFACES, mass).unwrap()
 }
 
 pub(crate) fn nothing_measured() -> Measurements {
