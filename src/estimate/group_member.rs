@@ -12,7 +12,9 @@ use crate::dynamics::motion::Window;
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
 use crate::filter_error::bounds::WidePass;
 use crate::filter_error::filter::Filter;
+use crate::filter_error::input_noise::NoisyInputs;
 use crate::output_error::calibration_errors::Misreading;
+use crate::output_error::surface_noise::noisy_surfaces;
 use crate::output_error::{Case, Diverged, Measurements, Model, equation_error};
 
 /// Maneuver of a group.
@@ -60,12 +62,14 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
         model: &Model,
         like: Option<&Filter<NG, G>>,
     ) -> Filter<NG, G> {
-        let (aircraft, window) = (self.task.context.aircraft, &self.slopes.window);
-        if let Some(filter) = like {
-            let biases = self.task.bias_uncertainties(model);
-            return filter.with_model(aircraft, window, model, &biases);
-        }
-        self.task.filter(self.prepared, window, model)
+        let window = &self.slopes.window;
+        let Some(filter) = like else {
+            return self.task.filter(self.prepared, window, model);
+        };
+        let aircraft = self.task.context.aircraft;
+        let biases = self.task.bias_uncertainties(model);
+        let filter = filter.with_model(aircraft, window, model, &biases);
+        filter.with_noisy_inputs(&self.task.noisy_inputs(self.prepared, window, model))
     }
 
     /// Pass at a fit with the held derivatives and the slopes free as well.
@@ -134,7 +138,21 @@ impl Task<'_> {
     ) -> Filter<NG, G> {
         let measurements = prepared.case.measurements.clone();
         let biases = self.bias_uncertainties(model);
-        Filter::new(self.context.aircraft, window, measurements, model, &biases)
+        let filter = Filter::new(self.context.aircraft, window, measurements, model, &biases);
+        filter.with_noisy_inputs(&self.noisy_inputs(prepared, window, model))
+    }
+
+    /// Noise of the inputs of a model in a window of the maneuver.
+    fn noisy_inputs<const NX: usize, E: Equations<NX>>(
+        &self,
+        prepared: &PreparedCase<NX, E>,
+        window: &Window,
+        model: &Model,
+    ) -> NoisyInputs {
+        NoisyInputs {
+            surfaces: noisy_surfaces(self.context.aircraft, window, model),
+            pressure_variance: prepared.case.pressure_variance,
+        }
     }
 
     /// Standard uncertainty of each bias, where calibration knows it.

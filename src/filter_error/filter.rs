@@ -11,12 +11,13 @@ use pulp::{Arch, Simd, WithSimd};
 use super::gains::{
     self, Outputs, ParameterSlope, Pattern, PatternGain, steady_variance_slopes, steady_variances,
 };
+use super::input_noise::{InputNoise, NoisyInputs};
 use super::linearised::{Discrete, Linearised};
 use super::noise::{Noise, NoiseParameter, Prior, RotaryCost};
 use super::pass::{
     Corrections, FilterPass, LaneBlocks, LaneGain, PassOutputs, RecordedRows, RowSink,
 };
-use super::riccati::{NoisySystem, States};
+use super::riccati::{NoisySystem, States, SteadyFilter};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
 use crate::dynamics::{InGusts, OUTPUTS};
@@ -36,6 +37,7 @@ pub struct Filter<const NX: usize, E: InGusts<NX>> {
     pub(super) case: Case<NX, E>,
     layout: LaneLayout,
     linearised: Linearised<NX>,
+    input_noise: InputNoise<NX>,
     biased_outputs: Vec<usize>,
     initial_states: usize,
     noise_parameters: Vec<NoiseParameter>,
@@ -124,6 +126,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         let (patterns, pattern_of) = patterns(&case.measurements.used);
         let mut filter = Filter {
             linearised: Linearised::of(&case),
+            input_noise: InputNoise::default(),
             case,
             layout,
             biased_outputs,
@@ -136,6 +139,13 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         };
         filter.priors = filter.priors(biases);
         filter
+    }
+
+    /// The filter where the inputs have noise; without it they are exact.
+    #[must_use]
+    pub fn with_noisy_inputs(mut self, inputs: &NoisyInputs) -> Self {
+        self.input_noise = InputNoise::of(&self.case, inputs);
+        self
     }
 
     /// Priors of the biases with known uncertainty, and of the noise.
@@ -438,17 +448,19 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         let step_s = self.case.step_s;
         let decay = decay_matrix::<NX, E>(noise.decay(step_s));
         let (discrete, by_derivative) = self.linearised.discrete(parameters);
+        let derivatives = &parameters[..self.case.derivatives()];
+        let (of_inputs, of_inputs_slopes) = self.input_noise.covariance(derivatives);
         let system = NoisySystem {
             a: product(&discrete.step, &decay),
             c: discrete.outputs,
-            q: noise.covariance::<NX, E>(step_s),
+            q: noise.covariance::<NX, E>(step_s) + of_inputs,
             r: steady_variances(&noise, &self.patterns),
         };
         let mut slopes = Vec::with_capacity(self.parameters());
-        for (parameter, slope) in by_derivative.iter().enumerate() {
+        for (parameter, (slope, q)) in by_derivative.iter().zip(of_inputs_slopes).enumerate() {
             slopes.push(ParameterSlope {
                 parameter,
-                system: derivative_slope(slope, &decay),
+                system: derivative_slope(slope, q, &decay),
             });
         }
         let first = self.first_noise();
@@ -460,7 +472,13 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
                 system: self.noise_slope(&noise, *kind, &discrete),
             });
         }
-        gains::gains(system, &noise, &slopes, &numbered, &self.patterns)
+        let is_still = noise.is_still() && self.input_noise.is_zero();
+        let filter = if is_still {
+            SteadyFilter::still(system)
+        } else {
+            SteadyFilter::of(system)?
+        };
+        gains::gains(&filter, &noise, &slopes, &numbered, &self.patterns)
     }
 
     /// Slope of the system along a parameter of the noise.
@@ -616,13 +634,17 @@ fn decay_matrix_slope<const NX: usize, E: InGusts<NX>>(slope: f64) -> States<NX>
     t
 }
 
-/// Slope of the system along a derivative.
+/// Slope of the system along a derivative, by which the noise of the states changes by `q`.
 #[inline(always)]
-fn derivative_slope<const NX: usize>(slope: &Discrete<NX>, decay: &States<NX>) -> NoisySystem<NX> {
+fn derivative_slope<const NX: usize>(
+    slope: &Discrete<NX>,
+    q: States<NX>,
+    decay: &States<NX>,
+) -> NoisySystem<NX> {
     NoisySystem {
         a: product(&slope.step, decay),
         c: slope.outputs,
-        q: States::zeros(),
+        q,
         r: [0.0; OUTPUTS],
     }
 }

@@ -1,12 +1,10 @@
 //! Gain of the filter and covariance of its innovations, for each pattern of outputs that count.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
-use std::hint::black_box;
-
 use nalgebra::{Cholesky, SMatrix};
 
 use super::noise::{Noise, NoiseParameter};
-use super::riccati::{NoisySystem, Observation, States, SteadyFilter, SystemSlope};
+use super::riccati::{Observation, States, SteadyFilter, SystemSlope};
 use crate::dynamics::OUTPUTS;
 use crate::numerics::small::{product, product_transposed, sandwich};
 
@@ -79,28 +77,21 @@ fn share(output: usize, patterns: &[Pattern], all: usize) -> f64 {
 /// Gains of all patterns; `None` where the filter has no finite covariance.
 #[inline(always)]
 pub(super) fn gains<const NX: usize>(
-    system: NoisySystem<NX>,
+    filter: &SteadyFilter<NX>,
     noise: &Noise,
     slopes: &[ParameterSlope<NX>],
     noise_parameters: &[(usize, NoiseParameter)],
     patterns: &[Pattern],
 ) -> Option<Vec<PatternGain<NX>>> {
-    // Where the compiler sees that most of Q is zero, it moves half a register by an instruction that the counter of
-    // instructions does not know (tests/count.sh).
-    let system = black_box(system);
-    let filter = if noise.is_still() {
-        SteadyFilter::still(system)
-    } else {
-        SteadyFilter::of(system)?
-    };
+    let c = &filter.system.c;
     let mut changes = Vec::with_capacity(slopes.len());
     for slope in slopes {
         changes.push((slope.parameter, slope.system.c, filter.slope(&slope.system)));
     }
     let mut gains = Vec::with_capacity(patterns.len());
     for pattern in patterns {
-        let mut own = PatternGain::of(&filter.prediction, &system.c, noise, pattern)?;
-        own.slopes = own.slopes_along(&filter.prediction, &system.c, &changes, pattern);
+        let mut own = PatternGain::of(&filter.prediction, c, noise, pattern)?;
+        own.slopes = own.slopes_along(&filter.prediction, c, &changes, pattern);
         own.add_output_noise(noise, noise_parameters, pattern);
         gains.push(own);
     }

@@ -12,13 +12,15 @@
 //! ```
 //!
 //! f is the step of output error, and T lets the rotary gusts decay. Derivatives, biases, initial
-//! states, process noise and output noise are estimated together. Without process noise K is zero,
-//! and the innovations are the residuals of output error.
+//! states, process noise and output noise are estimated together; the noise of the measured inputs is
+//! known beforehand. Without process noise and with exact inputs K is zero, and the innovations are the
+//! residuals of output error.
 //!
 //! | file | content |
 //! |---|---|
 //! | [`noise`] | parameters of the noise, their priors and floors |
 //! | `linearised` | mean system of a maneuver, as a function of its derivatives |
+//! | [`input_noise`] | noise of surfaces and dynamic pressure as noise of the states |
 //! | `riccati` | covariance of the prediction, and its slopes |
 //! | `gains` | gain and covariance of the innovations for each pattern of missing outputs |
 //! | `pass` | one pass: innovations and their sensitivities, in the kernel of output error |
@@ -31,6 +33,7 @@
 pub mod bounds;
 pub mod filter;
 mod gains;
+pub mod input_noise;
 pub mod joint_filter;
 mod linearised;
 pub mod noise;

@@ -41,7 +41,7 @@ pub(super) struct SteadyFilter<const NX: usize> {
     /// Covariance of the corrected state.
     corrected: States<NX>,
     gain: SMatrix<f64, NX, OUTPUTS>,
-    system: NoisySystem<NX>,
+    pub system: NoisySystem<NX>,
     /// Closed loop A (1 − K C), and its powers 2, 4, 8, ….
     powers: Vec<States<NX>>,
 }

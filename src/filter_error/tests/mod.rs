@@ -1,5 +1,6 @@
 //! The filter against finite differences, closed forms, a plain simulation and Monte Carlo.
 
+mod inputs;
 mod joint;
 
 use std::collections::BTreeMap;

@@ -1,0 +1,148 @@
+//! Noise of the measured inputs as noise of the states. The equations take surfaces and dynamic
+//! pressure as exact, so their white noise moves the computed aircraft; through a moment it is
+//! integrated to slow errors.
+//!
+//! An input's error n at one sample changes the coefficients by e n and the state, during a step, by
+//! Γ e n with Γ = ∂ẋ/∂c Δt. White errors of variance σ² give the states' noise the covariance
+//! Q = Σ σ² (Γ e)(Γ e)ᵀ in a step, summed over the inputs; the filter takes the mean over the maneuver.
+//! The effects e are linear in the derivatives, so Q has exact slopes along them. The direct part of
+//! the outputs' errors belongs to their own noise.
+
+use nalgebra::SVector;
+
+use super::riccati::States;
+use crate::dynamics::{COEFFICIENTS, Equations};
+use crate::output_error::Case;
+use crate::output_error::surface_noise::{DerivativeValue, NoisySurface};
+
+/// Samples between two at which the effects are taken: the mean needs no more.
+const STRIDE: usize = 16;
+
+/// White noise of the inputs of a maneuver.
+#[derive(Clone, Debug, Default)]
+pub struct NoisyInputs {
+    pub surfaces: Vec<NoisySurface>,
+    /// Relative variance of the dynamic pressure's noise.
+    pub pressure_variance: f64,
+}
+
+/// Effect of the inputs' noise on the states of a filter.
+#[derive(Clone, Debug, Default)]
+pub(super) struct InputNoise<const NX: usize> {
+    /// One for each input at each of some samples.
+    effects: Vec<StateEffect<NX>>,
+}
+
+/// Change of the state in a step by one standard deviation of an input's noise, over the root of the
+/// number of samples.
+#[derive(Clone, Debug)]
+struct StateEffect<const NX: usize> {
+    /// By the held derivatives.
+    held: SVector<f64, NX>,
+    /// Per unit of each free derivative that takes part.
+    free: Vec<(usize, SVector<f64, NX>)>,
+}
+
+impl<const NX: usize> InputNoise<NX> {
+    /// Effect in the filter of a case.
+    pub fn of<E: Equations<NX>>(case: &Case<NX, E>, inputs: &NoisyInputs) -> Self {
+        let samples = (0..case.samples()).step_by(STRIDE);
+        let share = 1.0 / samples.len().max(1) as f64;
+        let mut effects = vec![];
+        for sample in samples {
+            let at = At::new(case, sample);
+            let surfaces = inputs.surfaces.iter();
+            effects.extend(surfaces.map(|surface| at.of_surface(surface, share)));
+            if inputs.pressure_variance > 0.0 {
+                effects.push(at.of_pressure(inputs.pressure_variance * share));
+            }
+        }
+        InputNoise { effects }
+    }
+
+    /// True where the inputs are exact.
+    pub fn is_zero(&self) -> bool {
+        self.effects.is_empty()
+    }
+
+    /// Covariance of the states' noise in a step, and its slope along each of some free derivatives.
+    pub fn covariance(&self, derivatives: &[f64]) -> (States<NX>, Vec<States<NX>>) {
+        let mut covariance = States::zeros();
+        let mut slopes = vec![States::zeros(); derivatives.len()];
+        for effect in &self.effects {
+            let free = effect.free.iter();
+            let sum = free.fold(effect.held, |sum, (j, own)| sum + own * derivatives[*j]);
+            covariance += sum * sum.transpose();
+            for (j, own) in &effect.free {
+                let half = own * sum.transpose();
+                slopes[*j] += half + half.transpose();
+            }
+        }
+        (covariance, slopes)
+    }
+}
+
+/// A sample of a case.
+struct At<'a, const NX: usize, E: Equations<NX>> {
+    case: &'a Case<NX, E>,
+    sample: usize,
+    /// Γ, column by column.
+    by_coefficient: [SVector<f64, NX>; COEFFICIENTS],
+}
+
+impl<'a, const NX: usize, E: Equations<NX>> At<'a, NX, E> {
+    fn new(case: &'a Case<NX, E>, sample: usize) -> Self {
+        let inputs = &case.motion.rate_inputs[2 * sample];
+        let rates = E::rates(inputs, &case.motion.states[sample], &[0.0; COEFFICIENTS]);
+        let column = |k: usize| rates.by_coefficient.column(k) * case.step_s;
+        At {
+            case,
+            sample,
+            by_coefficient: std::array::from_fn(column),
+        }
+    }
+
+    fn of_surface(&self, surface: &NoisySurface, share: f64) -> StateEffect<NX> {
+        let deviation = (surface.variance * share).sqrt();
+        let mut sum = StateEffect::none();
+        for effect in &surface.effects {
+            let factor = effect.factors.get(self.sample).copied().unwrap_or(1.0);
+            let change = self.by_coefficient[effect.coefficient] * (factor * deviation);
+            match effect.value {
+                DerivativeValue::Free(j) => sum.free.push((j, change)),
+                DerivativeValue::Held(value) => sum.held += change * value,
+            }
+        }
+        sum
+    }
+
+    /// Every coefficient acts in proportion to the dynamic pressure.
+    fn of_pressure(&self, variance: f64) -> StateEffect<NX> {
+        let deviation = variance.sqrt();
+        let x = &self.case.motion.states[self.sample];
+        let mut sum = StateEffect::none();
+        let held = self.case.held.at(2 * self.sample).coefficients(x);
+        for (column, value) in self.by_coefficient.iter().zip(held) {
+            sum.held += column * (value * deviation);
+        }
+        let mut regressors = vec![0.0; self.case.derivatives()];
+        self.case.regressors_at(2 * self.sample, x, &mut regressors);
+        let terms = self.case.terms.iter().zip(regressors).enumerate();
+        sum.free.extend(terms.map(|(j, (term, regressor))| {
+            (
+                j,
+                self.by_coefficient[term.coefficient] * (regressor * deviation),
+            )
+        }));
+        sum
+    }
+}
+
+impl<const NX: usize> StateEffect<NX> {
+    fn none() -> Self {
+        StateEffect {
+            held: SVector::zeros(),
+            free: vec![],
+        }
+    }
+}
