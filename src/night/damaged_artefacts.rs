@@ -5,11 +5,15 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use crate::pipeline::IngestedFlight;
-use crate::store::{ArtefactName, Contents, Digest, Kind, Night, Store};
+use crate::store::{ArtefactName, Digest, InputDigests, Kind, Night, Store};
 
 /// Artefacts of a night that are damaged, gone, or another's under their name. A record has no seal:
 /// its digest is in its flight's artefact.
-pub fn damaged_artefacts(store: &Store, contents: &Contents, night: &Night) -> Vec<ArtefactName> {
+pub fn damaged_artefacts(
+    store: &Store,
+    contents: &InputDigests,
+    night: &Night,
+) -> Vec<ArtefactName> {
     let records = records(store, night);
     let is_whole = |(name, bytes): &(&ArtefactName, &u64)| {
         if name.is_of(Kind::Records) {

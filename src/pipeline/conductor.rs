@@ -23,7 +23,7 @@ use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::lineage::Stage;
 use crate::store::archive::{self, FlightFiles};
-use crate::store::{Contents, Store};
+use crate::store::{InputDigests, Store};
 
 /// Name and version of each method whose artefacts the store keeps.
 #[must_use]
@@ -123,13 +123,13 @@ impl<'a> Conductor<'a> {
         progress: &'a dyn Progress,
     ) -> Result<Conductor<'a>> {
         let store = Store::look(&config.store).sharing(config.shared_store.as_deref())?;
-        Conductor::looking(config, store, Contents::empty(), progress)
+        Conductor::looking(config, store, InputDigests::empty(), progress)
     }
 
     fn looking(
         config: &'a Config,
         store: Store,
-        contents: Contents,
+        contents: InputDigests,
         progress: &'a dyn Progress,
     ) -> Result<Conductor<'a>> {
         let archive = archive::find(&config.archive)?;
@@ -139,7 +139,7 @@ impl<'a> Conductor<'a> {
     fn new(
         config: &'a Config,
         store: Store,
-        contents: Contents,
+        contents: InputDigests,
         archive: Vec<FlightFiles>,
         absent: Absent,
         progress: &'a dyn Progress,

@@ -10,7 +10,7 @@ use super::progress::Progress;
 use crate::error::{Problem, ProblemStage};
 use crate::report::SourceFile;
 use crate::store::archive::FlightFiles;
-use crate::store::{Contents, Digest, Fingerprint};
+use crate::store::{Digest, Fingerprint, InputDigests};
 
 /// Content of the archive.
 #[derive(Clone, Debug, Default)]
@@ -27,7 +27,7 @@ impl FlightContents {
     /// Digests every file of the archive. Of flights with the same bytes the first counts.
     pub fn gather(
         files: &[FlightFiles],
-        contents: &Contents,
+        contents: &InputDigests,
         progress: &dyn Progress,
     ) -> FlightContents {
         progress.begin("contents", files.len());
@@ -61,7 +61,7 @@ impl FlightContents {
         &mut self,
         flight: &FlightFiles,
         digests: &[Digest],
-        contents: &Contents,
+        contents: &InputDigests,
         first_flights: &BTreeMap<String, &str>,
     ) -> Result<String, String> {
         let files = flight.files.iter().zip(digests);
@@ -81,7 +81,11 @@ impl FlightContents {
     ///
     /// # Errors
     /// A file with other bytes: either may be the flight.
-    fn reject_rivals(&mut self, flight: &FlightFiles, contents: &Contents) -> Result<(), String> {
+    fn reject_rivals(
+        &mut self,
+        flight: &FlightFiles,
+        contents: &InputDigests,
+    ) -> Result<(), String> {
         let own: Vec<Digest> = flight
             .files
             .iter()
@@ -123,7 +127,7 @@ impl FlightContents {
 }
 
 /// Digests of a flight's files, in their order.
-fn flight_digests(flight: &FlightFiles, contents: &Contents) -> Result<Vec<Digest>, String> {
+fn flight_digests(flight: &FlightFiles, contents: &InputDigests) -> Result<Vec<Digest>, String> {
     // Reasons name no folder: they are part of the lineage.
     let digest = |file: &PathBuf| {
         contents

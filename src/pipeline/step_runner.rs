@@ -9,7 +9,7 @@ use super::progress::Progress;
 use super::step::{Brought, Companion, Made, Step};
 use crate::config::Config;
 use crate::error::Result;
-use crate::store::{ArtefactName, Contents, Listed, Store};
+use crate::store::{ArtefactName, InputDigests, Listed, Store};
 
 /// Treatment of an artefact that the store lacks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,7 +25,7 @@ pub struct StepRunner<'a> {
     pub config: &'a Config,
     pub store: Store,
     /// Digests of input files.
-    pub contents: Contents,
+    pub contents: InputDigests,
     pub absent: Absent,
     progress: &'a dyn Progress,
     /// Artefacts that were found missing.
@@ -36,7 +36,7 @@ impl<'a> StepRunner<'a> {
     pub fn new(
         config: &'a Config,
         store: Store,
-        contents: Contents,
+        contents: InputDigests,
         absent: Absent,
         progress: &'a dyn Progress,
     ) -> StepRunner<'a> {

@@ -13,9 +13,9 @@ use serde::de::DeserializeOwned;
 
 use super::artefact_name::{ArtefactName, Kind};
 use super::atomic;
-use super::contents::Contents;
 use super::fingerprint::{Digest, sealed, unsealed};
 use super::in_work::{InWorkList, Listed};
+use super::input_digests::InputDigests;
 use super::lock::Lock;
 use super::shared::Shared;
 use crate::error::{Error, Result};
@@ -117,8 +117,8 @@ impl Store {
 
     /// Remembered digests of input files; of objects, those that other machines shared as well.
     #[must_use]
-    pub fn contents(&self) -> Contents {
-        let contents = Contents::load(&self.folder.join(CONTENTS));
+    pub fn contents(&self) -> InputDigests {
+        let contents = InputDigests::load(&self.folder.join(CONTENTS));
         let of_others = self
             .shared
             .as_ref()
@@ -133,7 +133,7 @@ impl Store {
     ///
     /// # Errors
     /// [`Error::Io`] or [`Error::Store`] naming the file.
-    pub fn remember(&self, contents: &Contents) -> Result<()> {
+    pub fn remember(&self, contents: &InputDigests) -> Result<()> {
         if let (Some(shared), Some(objects)) = (&self.shared, contents.objects()) {
             shared.put(CONTENTS, objects)?;
         }
@@ -300,7 +300,12 @@ impl Store {
     /// `true` if the folder has a record as it was written, or only the object store has it, with this
     /// size; then [`Store::fetch`] checks its digest.
     #[must_use]
-    pub fn has_record(&self, name: &ArtefactName, digest: &Digest, contents: &Contents) -> bool {
+    pub fn has_record(
+        &self,
+        name: &ArtefactName,
+        digest: &Digest,
+        contents: &InputDigests,
+    ) -> bool {
         if self.has_file(name) {
             let is_written = contents
                 .of(&self.path(name))

@@ -6,7 +6,7 @@ mod artefact_name;
 mod artefacts;
 pub mod atomic;
 mod clock_column;
-pub mod contents;
+pub mod input_digests;
 pub mod files;
 pub mod fingerprint;
 pub mod import;
@@ -24,8 +24,8 @@ pub mod tunnel;
 
 pub use artefact_name::{ArtefactName, Kind};
 pub use artefacts::Store;
-pub use contents::Contents;
 pub use fingerprint::{Digest, Fingerprint};
 pub use in_work::{InWork, Listed, in_work};
+pub use input_digests::InputDigests;
 pub use log::Log;
 pub use nights::{Night, Nights};

@@ -1,18 +1,23 @@
 //! Archives good and bad: what is found, what is read, and what is said about files that cannot be.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::sync::Arc;
 
 use arrow::array::{
-    ArrayRef, BooleanArray, Float32Array, Float64Array, Int8Array, Int64Array, StringArray,
-    TimestampMillisecondArray,
+    ArrayRef, BooleanArray, Float32Array, Float64Array, Int8Array, Int64Array, RecordBatch,
+    StringArray, TimestampMillisecondArray,
 };
-use arrow::datatypes::Schema;
+use arrow::datatypes::{DataType, Field, Schema};
 use parquet::arrow::ArrowWriter;
 use proptest::prelude::*;
 use tempfile::TempDir;
 
 use super::*;
+use crate::error::Problem;
+use crate::flight::{Channel, RawFlight};
+use crate::ingest::ColumnSource;
+use crate::store::recorder::UNIT;
 
 type Column = (&'static str, Option<&'static str>, ArrayRef);
 

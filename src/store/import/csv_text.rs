@@ -4,8 +4,8 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
-use super::contents::{Contents, ImportedColumn, refused};
 use super::flight_file::{BATCH_ROWS, write};
+use super::imported_contents::{ImportedColumn, ImportedContents, refused};
 use crate::error::{Error, Result};
 
 /// Bytes at the beginning from which the layout follows.
@@ -37,7 +37,7 @@ enum Delimiter {
 }
 
 /// Imports a delimited text.
-pub fn import(source: &Path, file: &Path) -> Result<Contents> {
+pub fn import(source: &Path, file: &Path) -> Result<ImportedContents> {
     let unreadable = |e| Error::io(source, "cannot read it")(e);
     let opened = || File::open(source).map_err(Error::io(source, "cannot open it"));
     let mut head = Vec::new();
@@ -89,7 +89,7 @@ pub fn import(source: &Path, file: &Path) -> Result<Contents> {
             layout.dropped.join(", ")
         ));
     }
-    Ok(Contents {
+    Ok(ImportedContents {
         rows,
         columns,
         notes,

@@ -5,7 +5,7 @@ use std::path::Path;
 use arrow::array::RecordBatch;
 use parquet::arrow::ArrowWriter;
 
-use super::contents::ImportedColumn;
+use super::imported_contents::ImportedColumn;
 use crate::error::{Error, Result};
 use crate::store::atomic::Draft;
 use crate::store::recorder::{array, properties, schema};

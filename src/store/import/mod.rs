@@ -4,7 +4,7 @@
 //! CSV and tall Parquet pass row by row, in bounded memory. A MATLAB or HDF5 file is in memory whole: its
 //! columns stand one after the other.
 
-mod contents;
+mod imported_contents;
 mod csv_text;
 mod flight_file;
 mod matlab;
@@ -17,9 +17,9 @@ use std::path::{Path, PathBuf};
 use super::{Digest, atomic};
 use crate::error::{Error, Result};
 
-use contents::refused;
+use imported_contents::refused;
 
-pub use contents::{Imported, ImportedColumn};
+pub use imported_contents::{Imported, ImportedColumn};
 
 /// Name of the manifest in the folder of imported files.
 pub const MANIFEST: &str = "import.json";

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use super::super::contents::ImportedColumn;
+use super::super::imported_contents::ImportedColumn;
 
 /// Deepest nesting of structs.
 pub const DEEPEST: usize = 16;

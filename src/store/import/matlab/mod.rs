@@ -7,8 +7,8 @@ mod level_5;
 use std::io::Read;
 use std::path::Path;
 
-use super::contents::{Contents, ImportedColumn, refused};
 use super::flight_file::{BATCH_ROWS, write};
+use super::imported_contents::{ImportedColumn, ImportedContents, refused};
 use crate::error::{Error, Result};
 use columns::{Table, Value};
 
@@ -18,13 +18,13 @@ const LARGEST: u64 = 4 << 30;
 type Variables = std::result::Result<Vec<(String, Value)>, String>;
 
 /// Imports a MATLAB file of level 5.
-pub fn import_level_5(source: &Path, file: &Path) -> Result<Contents> {
+pub fn import_level_5(source: &Path, file: &Path) -> Result<ImportedContents> {
     let variables = level_5::variables(&bytes(source)?);
     write_columns(source, file, variables)
 }
 
 /// Imports an HDF5 file: MATLAB 7.3, or another program's.
-pub fn import_hdf5(source: &Path, file: &Path) -> Result<Contents> {
+pub fn import_hdf5(source: &Path, file: &Path) -> Result<ImportedContents> {
     let variables = hdf5::variables(bytes(source)?);
     write_columns(source, file, variables)
 }
@@ -39,7 +39,7 @@ fn bytes(source: &Path) -> Result<Vec<u8>> {
 }
 
 /// Writes the columns that the variables of a file make.
-fn write_columns(source: &Path, file: &Path, variables: Variables) -> Result<Contents> {
+fn write_columns(source: &Path, file: &Path, variables: Variables) -> Result<ImportedContents> {
     let variables = variables.map_err(|what| refused(source, &what))?;
     let mut table = Table::default();
     let single = variables.len() == 1;
@@ -65,7 +65,7 @@ fn write_columns(source: &Path, file: &Path, variables: Variables) -> Result<Con
         }
         Ok(())
     })?;
-    Ok(Contents {
+    Ok(ImportedContents {
         rows,
         columns: heads,
         notes,

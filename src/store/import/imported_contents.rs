@@ -28,7 +28,7 @@ pub struct ImportedColumn {
 
 /// Rows, columns and notes of one source.
 #[derive(Debug, Default)]
-pub struct Contents {
+pub struct ImportedContents {
     pub rows: usize,
     pub columns: Vec<ImportedColumn>,
     pub notes: Vec<String>,

@@ -7,7 +7,7 @@
 //! system's clock. A system without such times (not Unix) reads every file each time.
 //!
 //! An object is unchanged while its size and its ETag are. That holds on every machine, so the
-//! digests of objects are shared with the store ([`Contents::objects`]).
+//! digests of objects are shared with the store ([`InputDigests::objects`]).
 
 use std::collections::BTreeMap;
 use std::fs::{File, Metadata};
@@ -40,22 +40,22 @@ struct Remembered {
 
 /// Remembered digests, shared between threads.
 #[derive(Debug)]
-pub struct Contents {
+pub struct InputDigests {
     path: PathBuf,
     remembered: BTreeMap<PathBuf, Remembered>,
     /// Files of this run: their state when read, and the digest to remember, if any.
     seen: Mutex<BTreeMap<PathBuf, (Stamp, Option<Remembered>)>>,
 }
 
-impl Contents {
+impl InputDigests {
     /// Loads the digests saved at `path`; none from a missing or damaged file.
     #[must_use]
-    pub fn load(path: &Path) -> Contents {
+    pub fn load(path: &Path) -> InputDigests {
         let remembered = std::fs::read(path)
             .ok()
             .and_then(|bytes| serde_json::from_slice(unsealed(SEALED_AS, &bytes)?).ok());
         let remembered = remembered.unwrap_or_default();
-        Contents {
+        InputDigests {
             path: path.to_owned(),
             remembered,
             seen: Mutex::default(),
@@ -64,18 +64,18 @@ impl Contents {
 
     /// No remembered digests: every file is read.
     #[must_use]
-    pub fn empty() -> Contents {
-        Contents {
+    pub fn empty() -> InputDigests {
+        InputDigests {
             path: PathBuf::new(),
             remembered: BTreeMap::new(),
             seen: Mutex::default(),
         }
     }
 
-    /// Adds the digests of objects that another machine shared by [`Contents::objects`]; none from
+    /// Adds the digests of objects that another machine shared by [`InputDigests::objects`]; none from
     /// damaged text.
     #[must_use]
-    pub fn with_objects(mut self, text: &[u8]) -> Contents {
+    pub fn with_objects(mut self, text: &[u8]) -> InputDigests {
         let shared = unsealed(SEALED_AS, text).and_then(|text| serde_json::from_slice(text).ok());
         let shared: BTreeMap<PathBuf, Remembered> = shared.unwrap_or_default();
         let unknown = shared
@@ -301,17 +301,17 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (file, cache) = (folder.path().join("f"), folder.path().join("contents.json"));
         std::fs::write(&file, "one").unwrap();
-        let contents = Contents::load(&cache);
+        let contents = InputDigests::load(&cache);
         let one = contents.of(&file).unwrap();
         assert!(contents.is_unchanged(&file));
         contents.save().unwrap();
         assert!(
-            Contents::load(&cache).remembered.is_empty(),
+            InputDigests::load(&cache).remembered.is_empty(),
             "it has not settled"
         );
         std::fs::write(&file, "two").unwrap();
         assert!(!contents.is_unchanged(&file));
-        assert_ne!(Contents::load(&cache).of(&file).unwrap(), one);
+        assert_ne!(InputDigests::load(&cache).of(&file).unwrap(), one);
     }
 
     #[cfg(unix)]
@@ -341,7 +341,7 @@ mod tests {
             .unwrap();
         };
         remember();
-        assert_eq!(Contents::load(&cache).of(&file).unwrap(), remembered);
+        assert_eq!(InputDigests::load(&cache).of(&file).unwrap(), remembered);
         // Same size and time of last write: the time of last change reveals the edit.
         let written = std::fs::metadata(&file).unwrap().modified().unwrap();
         std::thread::sleep(Duration::from_millis(20));
@@ -352,13 +352,13 @@ mod tests {
             .unwrap()
             .set_modified(written)
             .unwrap();
-        assert_ne!(Contents::load(&cache).of(&file).unwrap(), remembered);
+        assert_ne!(InputDigests::load(&cache).of(&file).unwrap(), remembered);
     }
 
     #[test]
     fn a_path_that_is_no_file_is_not_opened() {
         let folder = tempfile::tempdir().unwrap();
-        let contents = Contents::empty();
+        let contents = InputDigests::empty();
         assert!(
             contents
                 .of(folder.path())

@@ -1,0 +1,91 @@
+//! Tall Parquet (time, name, value) as one column a name: written by import, and beside its records by
+//! ingest, which then reads it as any flight.
+//!
+//! Names whose times are mostly times of the name with the most values are one part, with a value where
+//! they have one. The other names are further parts, one for each set of times: files with clocks of
+//! their own.
+
+mod ordering;
+mod parts;
+mod source;
+mod survey;
+mod wide_table;
+
+use std::path::{Path, PathBuf};
+
+use super::flight_file::{Sink, write, write_draft};
+use super::imported_contents::{ImportedContents, refused};
+use crate::error::Result;
+use crate::store::atomic::Draft;
+use wide_table::RowsOfTime;
+
+pub use source::Tall;
+
+/// Imports a Parquet file of three or four columns. One of several parts becomes a folder of files.
+pub fn import(source: &Path, file: &Path) -> Result<ImportedContents> {
+    let Some(tall) = Tall::open(source)? else {
+        let what = "Parquet with one column a channel is read as it is: name it as the archive, or give it to `harvest \
+                    init --from`; import takes tall files with the columns time, name, value and perhaps unit";
+        return Err(refused(source, what));
+    };
+    let survey = tall.survey()?;
+    let parts = tall.parts(&survey)?;
+    let folder = (parts.len() > 1).then(|| folder_of(file));
+    let mut contents = ImportedContents::default();
+    let mut replaced = 0;
+    for (k, part) in parts.iter().enumerate() {
+        let columns = tall.columns(&survey, |name| part.contains(name));
+        let mut table = RowsOfTime::new(columns.len());
+        let own = folder
+            .as_ref()
+            .map(|folder| folder.join(format!("part_{:03}.parquet", k + 1)));
+        contents.rows += write(own.as_deref().unwrap_or(file), &columns, |sink| {
+            tall.fill(&survey, part, &columns, &mut table, sink)
+        })?;
+        replaced += table.replaced;
+        contents
+            .columns
+            .extend(columns.into_iter().skip(usize::from(k > 0)));
+    }
+    if replaced > 0 {
+        contents.notes.push(format!(
+            "{replaced} values came twice for a time and a name; the last one counts"
+        ));
+    }
+    if folder.is_some() {
+        contents.notes.push(format!(
+            "{} files: the names have values at {} sets of times",
+            parts.len(),
+            parts.len()
+        ));
+    }
+    Ok(ImportedContents { folder, ..contents })
+}
+
+/// Folder whose files are one flight, in the place of a file.
+fn folder_of(file: &Path) -> PathBuf {
+    let stem = file.file_stem().map(|s| s.to_string_lossy().into_owned());
+    file.with_file_name(format!("flight={}", stem.unwrap_or_default()))
+}
+
+impl Tall {
+    /// Writes a draft beside `place` for each part that has a name which is wanted, with one column
+    /// for each of these names.
+    ///
+    /// # Errors
+    /// [`Error::Archive`] for the file; [`Error::Io`] or [`Error::Store`] for the disk.
+    pub fn widened(&self, place: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<Vec<Draft>> {
+        let survey = self.survey()?;
+        let mut drafts = Vec::new();
+        for part in self.parts(&survey)? {
+            let columns = self.columns(&survey, |name| part.contains(name) && is_wanted(name));
+            if columns.len() > 1 {
+                let mut table = RowsOfTime::new(columns.len());
+                let filled =
+                    |sink: &mut Sink| self.fill(&survey, &part, &columns, &mut table, sink);
+                drafts.push(write_draft(place, &columns, filled)?.0);
+            }
+        }
+        Ok(drafts)
+    }
+}

@@ -1,0 +1,245 @@
+//! Reading of a record: signals and windows of time, with the corrections of the instruments.
+
+use std::collections::BTreeSet;
+use std::fmt::Display;
+use std::fs::File;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use arrow::array::{Array, AsArray, RecordBatch};
+use arrow::datatypes::{Float64Type, UInt8Type};
+use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::{
+    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder, RowSelection,
+};
+use parquet::file::metadata::PageIndexPolicy;
+
+use super::header::RecordHeader;
+use super::layout::{MARK, PAGE};
+use crate::error::Error;
+use crate::flight::record::{Series, with_margin};
+use crate::flight::{Correction, Mark, Record, StandIn};
+
+/// A record on the disk, read by signals and windows of time.
+#[derive(Clone, Debug)]
+pub struct RecordFile {
+    path: PathBuf,
+    pub(super) metadata: ArrowReaderMetadata,
+    pub header: RecordHeader,
+    /// Corrections applied as samples are read.
+    corrections: Vec<Correction>,
+    /// Stand-ins of signals, in the order in which they are computed.
+    stand_ins: Vec<(String, StandIn)>,
+}
+
+/// Opens a record.
+///
+/// # Errors
+/// The file cannot be opened, is no Parquet file, or is not a record.
+pub fn open(path: &Path) -> Result<RecordFile, Error> {
+    let file = File::open(path).map_err(Error::io(path, "cannot open the record"))?;
+    let bad = |what: &dyn Display| not_a_record(path, what);
+    let options = ArrowReaderOptions::new().with_offset_index_policy(PageIndexPolicy::Optional);
+    let metadata = ArrowReaderMetadata::load(&file, options).map_err(|e| bad(&e))?;
+    let header = RecordHeader::parse(metadata.schema().metadata()).map_err(|e| bad(&e))?;
+    Ok(RecordFile {
+        path: path.to_owned(),
+        metadata,
+        header,
+        corrections: vec![],
+        stand_ins: vec![],
+    })
+}
+
+fn not_a_record(path: &Path, what: &dyn Display) -> Error {
+    Error::damaged(
+        path,
+        &format!("not a record; remove it and run again: {what}"),
+    )
+}
+
+impl RecordFile {
+    /// Applies corrections to the record as it is read.
+    #[must_use]
+    pub fn corrected(self, corrections: Vec<Correction>) -> RecordFile {
+        RecordFile {
+            corrections,
+            ..self
+        }
+    }
+
+    /// Puts stand-ins in the place of signals, computed from the corrected others.
+    #[must_use]
+    pub fn completed(self, stand_ins: Vec<(String, StandIn)>) -> RecordFile {
+        RecordFile { stand_ins, ..self }
+    }
+
+    /// Applies further corrections.
+    #[must_use]
+    pub fn corrected_further(mut self, further: impl Iterator<Item = Correction>) -> RecordFile {
+        self.corrections.extend(further);
+        self
+    }
+
+    /// Index of the sample nearest to a time, inside the record.
+    #[must_use]
+    pub fn sample_at(&self, time_s: f64) -> usize {
+        self.header
+            .record(&(0..self.header.samples))
+            .sample_at(time_s)
+    }
+
+    /// Reads from one time to another with a few samples more on each side, as [`Record::part`]
+    /// does.
+    ///
+    /// # Errors
+    /// As [`RecordFile::window`].
+    pub fn part(
+        &self,
+        signals: Option<&BTreeSet<String>>,
+        start_s: f64,
+        end_s: f64,
+    ) -> Result<Record, Error> {
+        let (first, last) = (self.sample_at(start_s), self.sample_at(end_s));
+        let (samples, step_s) = (self.header.samples, self.header.step_s);
+        self.window(signals, with_margin(first, last, samples, step_s))
+    }
+
+    /// Reads a range of samples of some signals, or of all. Signals that the record lacks are left
+    /// out.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Store`] naming the file.
+    pub fn window(
+        &self,
+        signals: Option<&BTreeSet<String>>,
+        samples: Range<usize>,
+    ) -> Result<Record, Error> {
+        let samples = samples.start.min(self.header.samples)..samples.end.min(self.header.samples);
+        let reach = self
+            .corrections
+            .iter()
+            .map(|c| c.reach(self.header.step_s))
+            .max()
+            .unwrap_or(0);
+        let wide =
+            samples.start.saturating_sub(reach)..(samples.end + reach).min(self.header.samples);
+        let sources = signals.map(|signals| self.with_sources(signals));
+        let mut record = self.as_written(sources.as_ref(), wide.clone())?;
+        self.corrections
+            .iter()
+            .for_each(|correction| correction.apply(&mut record));
+        for (signal, stand_in) in &self.stand_ins {
+            stand_in.fill(signal, &mut record);
+        }
+        if let Some(signals) = signals {
+            record.signals.retain(|name, _| signals.contains(name));
+        }
+        if wide == samples {
+            return Ok(record);
+        }
+        let inside = samples.start - wide.start..samples.end - wide.start;
+        Ok(Record {
+            start_s: self.header.record(&samples).start_s,
+            ..record.cut(None, inside)
+        })
+    }
+
+    /// Some signals, and those from which the stand-ins of the record are computed.
+    fn with_sources(&self, signals: &BTreeSet<String>) -> BTreeSet<String> {
+        let sources = self.stand_ins.iter().flat_map(|(_, s)| s.sources());
+        let sources = sources.map(|name| (*name).to_owned());
+        signals.iter().cloned().chain(sources).collect()
+    }
+
+    /// Samples as they were written, before corrections and stand-ins.
+    fn as_written(
+        &self,
+        signals: Option<&BTreeSet<String>>,
+        samples: Range<usize>,
+    ) -> Result<Record, Error> {
+        let mut record = self.header.record(&samples);
+        let wanted = |name: &str| signals.is_none_or(|s| s.contains(name));
+        let constants = self.header.constants.iter();
+        for (name, value) in constants.filter(|(name, _)| wanted(name)) {
+            let constant = Series::assumed(vec![*value; samples.len()]);
+            record.signals.insert(name.clone(), constant);
+        }
+        self.add_columns(&mut record, samples, &wanted)?;
+        Ok(record)
+    }
+
+    /// Adds the columns of the signals that are wanted to a record of a range of samples.
+    fn add_columns(
+        &self,
+        record: &mut Record,
+        samples: Range<usize>,
+        wanted: &dyn Fn(&str) -> bool,
+    ) -> Result<(), Error> {
+        let bad = |what: &dyn Display| not_a_record(&self.path, what);
+        let file =
+            File::open(&self.path).map_err(Error::io(&self.path, "cannot open the record"))?;
+        let builder =
+            ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.metadata.clone());
+        let fields = builder.schema().fields().iter().enumerate();
+        let columns: Vec<usize> = fields
+            .filter(|(_, f)| wanted(f.name().strip_suffix(MARK).unwrap_or(f.name())))
+            .map(|(i, _)| i)
+            .collect();
+        let count = samples.len();
+        if count == 0 || columns.is_empty() {
+            return Ok(());
+        }
+        let mask = ProjectionMask::roots(builder.parquet_schema(), columns);
+        let ranges = std::iter::once(samples);
+        let selection = RowSelection::from_consecutive_ranges(ranges, self.header.samples);
+        let reader = builder
+            .with_projection(mask)
+            .with_row_selection(selection)
+            .with_batch_size(PAGE)
+            .build();
+        for batch in reader.map_err(|e| bad(&e))? {
+            add_batch(record, &batch.map_err(|e| bad(&e))?, count).map_err(|e| bad(&e))?;
+        }
+        let whole = |s: &Series| s.values.len() == count && s.marks.len() == count;
+        record
+            .signals
+            .iter()
+            .find(|(_, s)| !whole(s))
+            .map_or(Ok(()), |(name, _)| {
+                let samples = self.header.samples;
+                Err(bad(&format!("signal `{name}` has not {samples} samples")))
+            })
+    }
+}
+
+/// Adds the columns of a batch to the signals of a record.
+fn add_batch(record: &mut Record, batch: &RecordBatch, samples: usize) -> Result<(), String> {
+    for (field, array) in batch.schema().fields().iter().zip(batch.columns()) {
+        let name = field.name().strip_suffix(MARK).unwrap_or(field.name());
+        let empty = || Series {
+            values: Vec::with_capacity(samples),
+            marks: Vec::with_capacity(samples),
+        };
+        let series = record.signals.entry(name.to_owned()).or_insert_with(empty);
+        let other = || format!("column `{}` is of type {}", field.name(), field.data_type());
+        if field.name().ends_with(MARK) {
+            let marks = array.as_primitive_opt::<UInt8Type>().ok_or_else(other)?;
+            if marks.null_count() == marks.len() {
+                series
+                    .marks
+                    .resize(series.marks.len() + marks.len(), Mark::Measured);
+            } else {
+                series.marks.extend(
+                    marks
+                        .iter()
+                        .map(|code| code.map_or(Mark::Measured, Mark::from_u8)),
+                );
+            }
+        } else {
+            let values = array.as_primitive_opt::<Float64Type>().ok_or_else(other)?;
+            series.values.extend_from_slice(values.values());
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,208 @@
+//! Writing of a record: row groups of encoded signals, in whole pages.
+
+use std::io::Write;
+use std::ops::Range;
+use std::sync::Arc;
+
+use arrow::array::{Array, ArrayRef, Float64Array, UInt8Array};
+use arrow::buffer::{BooleanBuffer, NullBuffer};
+use arrow::datatypes::{DataType, Field, Schema};
+use parquet::arrow::ArrowSchemaConverter;
+use parquet::arrow::arrow_writer::{
+    ArrowColumnChunk, ArrowColumnWriter, ArrowRowGroupWriterFactory, compute_leaves,
+};
+use parquet::basic::{Compression, Encoding};
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::types::ColumnPath;
+
+use super::header::RecordHeader;
+use super::layout::{MARK, PAGE};
+use crate::flight::Mark;
+use crate::flight::record::Series;
+
+/// Writer of a record.
+#[expect(missing_debug_implementations, reason = "the writer within has none")]
+pub struct Writer<W: Write + Send> {
+    file: SerializedFileWriter<W>,
+    factory: ArrowRowGroupWriterFactory,
+    groups: usize,
+}
+
+fn refused(e: &dyn std::fmt::Display) -> String {
+    format!("cannot write the record: {e}")
+}
+
+impl<W: Write + Send> Writer<W> {
+    /// Begins a record of these signals.
+    ///
+    /// # Errors
+    /// The reason.
+    pub fn create<'s>(
+        header: &RecordHeader,
+        signals: impl Iterator<Item = &'s str>,
+        out: W,
+    ) -> Result<Writer<W>, String> {
+        let mut fields = Vec::new();
+        // Values stay uncompressed: noise hardly compresses, and writing it is faster. An unchanged
+        // sample has a null mark: pages of nulls cost nothing.
+        let mut properties = WriterProperties::builder()
+            .set_compression(Compression::UNCOMPRESSED)
+            .set_dictionary_enabled(false)
+            .set_statistics_enabled(EnabledStatistics::None)
+            .set_data_page_row_count_limit(PAGE)
+            .set_key_value_metadata(Some(header.metadata()));
+        for signal in signals {
+            fields.push(Field::new(signal, DataType::Float64, false));
+            let marks = format!("{signal}{MARK}");
+            let path = ColumnPath::from(marks.clone());
+            properties = properties.set_column_encoding(path, Encoding::DELTA_BINARY_PACKED);
+            fields.push(Field::new(marks, DataType::UInt8, true));
+        }
+        // Without the serialised Arrow schema the order of the metadata is fixed here.
+        let schema = Arc::new(Schema::new(fields));
+        let parquet = ArrowSchemaConverter::new()
+            .convert(&schema)
+            .map_err(|e| refused(&e))?;
+        let file =
+            SerializedFileWriter::new(out, parquet.root_schema_ptr(), Arc::new(properties.build()));
+        let file = file.map_err(|e| refused(&e))?;
+        let factory = ArrowRowGroupWriterFactory::new(&file, schema);
+        Ok(Writer {
+            file,
+            factory,
+            groups: 0,
+        })
+    }
+
+    /// Begins a row group: one writer for each signal, in their order.
+    ///
+    /// # Errors
+    /// The reason.
+    pub fn group(&mut self) -> Result<Vec<SignalWriter>, String> {
+        let mut columns = self
+            .factory
+            .create_column_writers(self.groups)
+            .map_err(|e| refused(&e))?
+            .into_iter();
+        self.groups += 1;
+        let mut signals = Vec::new();
+        while let (Some(values), Some(marks)) = (columns.next(), columns.next()) {
+            signals.push(SignalWriter {
+                values,
+                marks,
+                pending: Series {
+                    values: Vec::new(),
+                    marks: Vec::new(),
+                },
+            });
+        }
+        Ok(signals)
+    }
+
+    /// Writes the row group, whose encoded signals `next` yields in batches, in their order. While
+    /// one batch is written the next is encoded.
+    ///
+    /// # Errors
+    /// The reason.
+    pub fn append(
+        &mut self,
+        mut next: impl FnMut() -> Result<Option<Vec<SignalChunk>>, String> + Send,
+    ) -> Result<(), String> {
+        let mut group = self.file.next_row_group().map_err(|e| refused(&e))?;
+        let mut made = next()?;
+        while let Some(chunks) = made {
+            let write = || {
+                chunks
+                    .into_iter()
+                    .flat_map(|c| c.0)
+                    .try_for_each(|c| c.append_to_row_group(&mut group))
+            };
+            let (written, following) = rayon::join(write, &mut next);
+            written.map_err(|e| refused(&e))?;
+            made = following?;
+        }
+        group.close().map_err(|e| refused(&e))?;
+        Ok(())
+    }
+
+    /// Ends the record.
+    ///
+    /// # Errors
+    /// The reason.
+    pub fn finish(self) -> Result<(), String> {
+        self.file.close().map(|_| ()).map_err(|e| refused(&e))
+    }
+}
+
+/// Writer of one signal's part of a row group.
+#[expect(missing_debug_implementations, reason = "the writers within have none")]
+pub struct SignalWriter {
+    values: ArrowColumnWriter,
+    marks: ArrowColumnWriter,
+    pending: Series,
+}
+
+/// Encoded part of one signal in a row group: values and marks.
+#[expect(missing_debug_implementations, reason = "the columns within have none")]
+pub struct SignalChunk([ArrowColumnChunk; 2]);
+
+impl SignalWriter {
+    /// Adds the next samples.
+    ///
+    /// # Errors
+    /// The reason.
+    pub fn push(&mut self, series: &Series) -> Result<(), String> {
+        if series.values.len() != series.marks.len() {
+            return Err(refused(&"a series with more values than marks, or fewer"));
+        }
+        self.pending.values.extend_from_slice(&series.values);
+        self.pending.marks.extend_from_slice(&series.marks);
+        // Whole pages make the bytes independent of the pieces.
+        let whole = self.pending.values.len() / PAGE * PAGE;
+        for from in (0..whole).step_by(PAGE) {
+            self.page(from..from + PAGE)?;
+        }
+        self.pending.values.drain(..whole);
+        self.pending.marks.drain(..whole);
+        Ok(())
+    }
+
+    fn page(&mut self, range: Range<usize>) -> Result<(), String> {
+        let values = self.pending.values.get(range.clone()).unwrap_or_default();
+        let marks = self.pending.marks.get(range).unwrap_or_default();
+        let values: ArrayRef = Arc::new(Float64Array::from(values.to_vec()));
+        let repaired = |k: usize| marks[k] != Mark::Measured;
+        let repaired = BooleanBuffer::collect_bool(marks.len(), repaired);
+        let marks = if repaired.count_set_bits() == 0 {
+            UInt8Array::new_null(marks.len())
+        } else {
+            let codes: Vec<u8> = marks.iter().map(|mark| *mark as u8).collect();
+            UInt8Array::new(codes.into(), Some(NullBuffer::new(repaired)))
+        };
+        let marks: ArrayRef = Arc::new(marks);
+        for (writer, array, nullable) in [
+            (&mut self.values, values, false),
+            (&mut self.marks, marks, true),
+        ] {
+            let field = Field::new("", array.data_type().clone(), nullable);
+            for leaf in compute_leaves(&field, &array).map_err(|e| refused(&e))? {
+                writer.write(&leaf).map_err(|e| refused(&e))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Ends the row group of this signal.
+    ///
+    /// # Errors
+    /// The reason.
+    pub fn close(mut self) -> Result<SignalChunk, String> {
+        let rest = self.pending.values.len();
+        if rest > 0 {
+            self.page(0..rest)?;
+        }
+        let close = |writer: ArrowColumnWriter| writer.close().map_err(|e| refused(&e));
+        Ok(SignalChunk([close(self.values)?, close(self.marks)?]))
+    }
+}
