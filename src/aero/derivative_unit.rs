@@ -60,7 +60,7 @@ impl DerivativeUnit {
 
 /// Quantity of a derivative, besides the angle.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Quantity {
+enum Numerator {
     Number,
     Force,
     Moment,
@@ -85,7 +85,7 @@ impl Angle {
 
 /// A unit as a database spells it, in parts.
 struct ParsedUnit {
-    quantity: Quantity,
+    quantity: Numerator,
     /// Factor to the quantity's own unit: lbf, ft·lbf.
     factor: f64,
     per: Option<Angle>,
@@ -130,14 +130,14 @@ fn split_angle(plain: &str) -> (&str, Option<&str>) {
 }
 
 /// Quantity of a unit, with the factor to the quantity's own unit.
-fn quantity(of: &str) -> Option<(Quantity, f64)> {
+fn quantity(of: &str) -> Option<(Numerator, f64)> {
     let factor = |name: &str, own: &str| Unit::parse(name).ok()?.factor_to(Unit::parse(own).ok()?);
     match of {
-        "" | "1" | "-" | "nd" | "ND" => Some((Quantity::Number, 1.0)),
-        "lbf" => Some((Quantity::Force, 1.0)),
-        "N" => Some((Quantity::Force, factor("N", "lbf")?)),
-        "ftlbf" | "ft_lbf" | "ft-lbf" => Some((Quantity::Moment, 1.0)),
-        "Nm" | "N_m" | "N-m" => Some((Quantity::Moment, factor("N", "lbf")? * factor("m", "ft")?)),
+        "" | "1" | "-" | "nd" | "ND" => Some((Numerator::Number, 1.0)),
+        "lbf" => Some((Numerator::Force, 1.0)),
+        "N" => Some((Numerator::Force, factor("N", "lbf")?)),
+        "ftlbf" | "ft_lbf" | "ft-lbf" => Some((Numerator::Moment, 1.0)),
+        "Nm" | "N_m" | "N-m" => Some((Numerator::Moment, factor("N", "lbf")? * factor("m", "ft")?)),
         _ => None,
     }
 }

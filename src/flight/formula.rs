@@ -6,7 +6,7 @@
 
 use serde::Serialize;
 
-use crate::units::{Conversion, Dimensions, Product, Unit, name_of};
+use crate::units::{Conversion, Dimensions, Unit, UnitProduct, name_of};
 
 /// Most characters of a formula.
 const LONGEST: usize = 500;
@@ -343,7 +343,7 @@ impl<F: Fn(&str) -> Result<Operand, String>> Parser<'_, F> {
         let Some(Token::Unit(unit)) = self.tokens.get(self.next) else {
             return Ok((Node::Number(number), PURE));
         };
-        let product = Product::parse(unit)
+        let product = UnitProduct::parse(unit)
             .ok_or_else(|| format!("`[{unit}]` is no unit and no product of units"))?;
         self.next += 1;
         Ok((Node::Number(number * product.factor), product.dimensions))

@@ -1,0 +1,71 @@
+//! Products of units with exponents: `N m-1 s`, `m2/s2/K`.
+
+use super::quantity::{BASE_NAMES, Dimensions};
+use super::unit::{UNITS, Unit, plain};
+
+/// Product of units with exponents: its dimensions, and the factor to the product of the base units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnitProduct {
+    pub dimensions: Dimensions,
+    pub factor: f64,
+}
+
+impl UnitProduct {
+    /// Parses a product of units, also one of a quantity that no signal has. What stands behind a
+    /// slash divides.
+    #[must_use]
+    pub fn parse(text: &str) -> Option<UnitProduct> {
+        let (mut dimensions, mut factor) = ([0; 6], 1.0);
+        for (n, part) in text.split('/').enumerate() {
+            let side = if n == 0 { 1 } else { -1 };
+            let words = part.split([' ', '*', '·', '.', '(', ')']);
+            let mut words = words.filter(|word| !word.is_empty()).peekable();
+            words.peek()?;
+            for word in words {
+                let (unit, exponent) = power(word)?;
+                let (own, base) = unit.quantity.dimensions();
+                for (sum, own) in dimensions.iter_mut().zip(own) {
+                    *sum += side * exponent * own;
+                }
+                factor *= (unit.factor * base).powi(side * exponent);
+            }
+        }
+        Some(UnitProduct { dimensions, factor })
+    }
+}
+
+/// Name of a quantity's first unit with these dimensions, or their product.
+#[must_use]
+pub fn name_of(dimensions: Dimensions) -> String {
+    let kept = UNITS.iter().find(|u| u.dimensions() == dimensions);
+    if let Some(kept) = kept {
+        return kept.name.to_owned();
+    }
+    let factors = BASE_NAMES.iter().zip(dimensions).filter(|(_, n)| *n != 0);
+    let factors = factors.map(|(name, exponent)| match exponent {
+        1 => (*name).to_owned(),
+        _ => format!("{name}{exponent}"),
+    });
+    factors.collect::<Vec<String>>().join(" ")
+}
+
+/// A unit and its exponent: `s2`, `s^-2`.
+fn power(word: &str) -> Option<(Unit, i32)> {
+    if word == "1" {
+        return Some((Unit::of_signal(""), 1));
+    }
+    let end = word
+        .find(|c: char| c.is_ascii_digit() || "^-+²³".contains(c))
+        .unwrap_or(word.len());
+    let (name, exponent) = word.split_at(end);
+    let exponent = plain(exponent);
+    let exponent = if exponent.is_empty() {
+        1
+    } else {
+        exponent.parse().ok()?
+    };
+    // A product has no zero: degC in it could be a temperature or a difference.
+    let has_no_zero = |unit: &Unit| unit.offset == 0.0;
+    let unit = Unit::named(name).filter(has_no_zero)?;
+    (-4..=4).contains(&exponent).then_some((unit, exponent))
+}
