@@ -8,7 +8,7 @@ use crate::settings::{elements, settings};
 
 settings! {
     /// Sizes of the errors of one instrument.
-    pub struct Instrument {
+    pub struct InstrumentErrors {
         /// Uncertainty that calibration leaves.
         pub uncertainty: Calibration = Calibration::default(),
         /// Errors of the healthy instrument as installed, standard deviations.
@@ -17,7 +17,7 @@ settings! {
         pub fault: FaultyErrors = FaultyErrors::default(),
     }
 }
-elements!(BTreeMap<String, Instrument>: Instrument as "<signal>");
+elements!(BTreeMap<String, InstrumentErrors>: InstrumentErrors as "<signal>");
 
 settings! {
     /// Errors of a healthy instrument, in place of those of its kind.

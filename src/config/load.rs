@@ -4,11 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use super::checked::Config;
-use super::instruments::{self, Instrument};
+use super::instruments::{self, InstrumentErrors};
 use super::source::{Files, Source};
 use super::written::PipelineFile;
-use super::{channel_map, check, moved, places, proof_of_match, qualities, questions, ranges};
-use crate::aero::{Axis, Buildup, WindTunnel};
+use super::{channel_map, check, events, moved, places, questions, tunnel_tables};
+use crate::aero::{Axis, Buildup};
 use crate::error::Result;
 use crate::maneuver::{Class, Status};
 use crate::output_error::calibration_errors::Calibration;
@@ -80,21 +80,20 @@ impl Config {
         let default = || Path::new("reports").join(&name);
         let reports = pipeline.reports.unwrap_or_else(default);
         places::reachable(Path::new(&pipeline.archive))?;
-        let tunnel = match &pipeline.wind_tunnel {
-            Some(file) => check::tunnel(file, &buildup, &pipeline.tunnel)?,
-            None => WindTunnel::new(pipeline.tunnel.clone()),
-        };
+        let read_tables = |file| tunnel_tables::read_optional(file, &buildup, &pipeline.tunnel);
+        let tunnel = read_tables(pipeline.wind_tunnel.as_deref())?;
         let held_at_nothing = match &pipeline.wind_tunnel {
             Some(_) => 0,
             None => classes.iter_mut().map(Class::hold_nothing).sum(),
         };
         name_surfaces(&mut classes, &buildup, &pipeline.segment);
         let proof = files.proof_of_match()?;
-        let match_database = proof_of_match::database(proof.as_ref(), &buildup, &pipeline.tunnel)?;
+        let match_database = proof.as_ref().and_then(|proof| proof.database.as_deref());
+        let match_database = read_tables(match_database)?;
         let config = Config {
             tunnel,
             held_at_nothing,
-            events: check::events(pipeline.events.as_deref(), &classes)?,
+            events: events::read(pipeline.events.as_deref(), &classes)?,
             title: pipeline.title,
             archive: pipeline.archive,
             wind_tunnel: pipeline.wind_tunnel,
@@ -122,19 +121,8 @@ impl Config {
             template,
             files: files.all().map(|file| file.named(folder)).collect(),
         };
-        config.check(&files, &aircraft.instruments)?;
+        check::whole(&config, &files, &aircraft.instruments)?;
         Ok(config)
-    }
-
-    /// Checks what no single file shows, and the numbers of every file.
-    fn check(&self, files: &Files, instruments: &BTreeMap<String, Instrument>) -> Result<()> {
-        check::whole(self, files)?;
-        qualities::check(self, files)?;
-        proof_of_match::check(self, files)?;
-        check::instruments(instruments, self, &files.aircraft)?;
-        files.all().try_for_each(ranges::are_finite)?;
-        ranges::of_pipeline(&files.pipeline)?;
-        files.classes.iter().try_for_each(ranges::of_class)
     }
 }
 
@@ -146,7 +134,7 @@ fn pipeline_file(source: &Source) -> Result<PipelineFile> {
 
 /// Copies keys that several stages share, and the sizes of instrument errors, to the stages that
 /// read them.
-fn share_keys(pipeline: &mut PipelineFile, errors: &BTreeMap<String, Instrument>) {
+fn share_keys(pipeline: &mut PipelineFile, errors: &BTreeMap<String, InstrumentErrors>) {
     pipeline.ingest.share();
     pipeline.model.tunnel_uncertainty_pct = pipeline.estimate.held_uncertainty_pct;
     let compatibility = &mut pipeline.ingest.compatibility;

@@ -10,24 +10,23 @@ mod channel_map;
 mod check;
 mod checked;
 mod cluster;
+mod events;
 mod instruments;
 mod load;
 mod moved;
 mod nesting;
 mod places;
-mod proof_of_match;
-mod qualities;
 mod questions;
-mod ranges;
 mod source;
+mod tunnel_tables;
 mod written;
 
-pub(crate) use check::tunnel_rows;
 pub use checked::Config;
 pub use cluster::ClusterSettings;
 pub use load::Overrides;
 pub use questions::{Note, doubts};
 pub(crate) use source::Source;
+pub(crate) use tunnel_tables::tunnel_rows;
 pub use written::ReportSettings;
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use super::instruments::Instrument;
+use super::instruments::InstrumentErrors;
 use super::source::Source;
 use super::written::{AircraftFile, PipelineFile};
 use crate::settings::{Key, Setting};
@@ -55,7 +55,7 @@ fn sections() -> Vec<(&'static str, Vec<Key>)> {
     }
     let instruments = crate::settings::below(
         &["instruments"],
-        <BTreeMap<String, Instrument> as Setting>::keys(),
+        <BTreeMap<String, InstrumentErrors> as Setting>::keys(),
     );
     sections.push(("instruments", instruments));
     sections

@@ -6,13 +6,13 @@ use std::path::PathBuf;
 use serde::Deserialize;
 
 use super::cluster::ClusterSettings;
-use super::instruments::Instrument;
+use super::instruments::InstrumentErrors;
 use crate::aero::{
     Axis, Bias, Buildup, Coefficient, Combined, Derivative, Output, Regressor, wind_tunnel,
 };
 use crate::aircraft::Aircraft;
 use crate::maneuver::class::Recognition;
-use crate::maneuver::{Class, Overrides, Status};
+use crate::maneuver::{Class, ClassOverrides, Status};
 use crate::settings::settings;
 use crate::{compare, estimate, export, ingest, model, segment, trend};
 
@@ -99,7 +99,7 @@ pub struct AircraftFile {
     #[serde(default)]
     pub constants: BTreeMap<String, f64>,
     #[serde(default)]
-    pub instruments: BTreeMap<String, Instrument>,
+    pub instruments: BTreeMap<String, InstrumentErrors>,
 }
 
 /// Line of the channel map: a column with its signal; a formula with its signal; or a column that
@@ -255,7 +255,7 @@ fn statuses(
 
 impl From<ClassFile> for Class {
     fn from(file: ClassFile) -> Class {
-        let overrides = file.overrides.into_iter().map(|line| Overrides {
+        let overrides = file.overrides.into_iter().map(|line| ClassOverrides {
             above_alpha_deg: line.above_alpha_deg,
             statuses: statuses(&line.estimated, &line.held, &line.inactive),
             weights: line.weights,

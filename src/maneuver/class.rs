@@ -137,7 +137,7 @@ impl Recognition {
 
 /// Weights and statuses that replace the class's own in part of the α range.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Overrides {
+pub struct ClassOverrides {
     /// For maneuvers whose mean α is above this.
     pub above_alpha_deg: f64,
     pub weights: BTreeMap<Output, f64>,
@@ -155,7 +155,7 @@ pub struct Class {
     pub statuses: BTreeMap<String, Status>,
     /// The diagonal of W₁ (Tables 2 and 4), on residuals in deg, deg/s and g.
     pub weights: BTreeMap<Output, f64>,
-    pub overrides: Vec<Overrides>,
+    pub overrides: Vec<ClassOverrides>,
 }
 
 impl Class {
@@ -217,7 +217,7 @@ impl Class {
         held.map(|status| *status = Status::Inactive).count()
     }
 
-    fn overrides_at(&self, alpha_deg: f64) -> impl Iterator<Item = &Overrides> {
+    fn overrides_at(&self, alpha_deg: f64) -> impl Iterator<Item = &ClassOverrides> {
         self.overrides
             .iter()
             .filter(move |o| alpha_deg > o.above_alpha_deg)
@@ -237,7 +237,7 @@ mod tests {
             recognition: Recognition::default(),
             statuses: [("CY_da".to_owned(), Status::Held)].into(),
             weights: [(Output::P, 3.0)].into(),
-            overrides: vec![Overrides {
+            overrides: vec![ClassOverrides {
                 above_alpha_deg: 22.5,
                 weights: [(Output::P, 6.0)].into(),
                 statuses: [("CY_da".to_owned(), Status::Estimated)].into(),

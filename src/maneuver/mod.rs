@@ -5,6 +5,6 @@ pub mod class;
 pub mod found;
 mod means;
 
-pub use class::{Class, Overrides, Pulses, Recognition, Status, StepCount, Sweep};
+pub use class::{Class, ClassOverrides, Pulses, Recognition, Status, StepCount, Sweep};
 pub use found::{Acceptance, Event, Maneuver, ManeuverOrigin, Quality, Recognised, Unknown};
 pub use means::Means;

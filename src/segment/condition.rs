@@ -9,7 +9,7 @@ use crate::numerics::mean::finite_mean;
 use crate::units::DEG;
 
 use super::quality;
-use super::settings::Limits;
+use super::settings::QualityLimits;
 
 /// Signals of a flight condition.
 pub(super) const SIGNALS: &[&str] = &[
@@ -39,7 +39,7 @@ pub(super) fn maneuver(
     class: &Class,
     (start_s, end_s): (f64, f64),
     recognised: Option<Recognised>,
-    limits: &Limits,
+    limits: &QualityLimits,
 ) -> Result<Maneuver, String> {
     let (first, last) = (record.sample_at(start_s), record.sample_at(end_s));
     if last <= first {

@@ -7,7 +7,7 @@ use crate::maneuver::{Class, Event, Maneuver, Unknown};
 use crate::tables::{EventRow, EventVerdict};
 
 use super::segmented::Segmented;
-use super::settings::Limits;
+use super::settings::QualityLimits;
 use super::{condition, problems};
 
 /// Difference up to which starts and ends of a found maneuver and an event agree, s: coarse enough
@@ -31,7 +31,7 @@ pub fn with_events(
     events: &[Event],
     classes: &[Class],
     aircraft: &Aircraft,
-    limits: &Limits,
+    limits: &QualityLimits,
 ) -> (Segmented, Vec<EventRow>) {
     if events.is_empty() {
         return (segmented, Vec::new());
@@ -132,7 +132,7 @@ fn maneuver_of_event(
     record: &Record,
     classes: &[Class],
     aircraft: &Aircraft,
-    limits: &Limits,
+    limits: &QualityLimits,
 ) -> Result<Maneuver, String> {
     let class = classes
         .iter()

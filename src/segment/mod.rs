@@ -34,7 +34,7 @@ use recognition::windows::windows;
 
 pub use events::with_events;
 pub use segmented::Segmented;
-pub use settings::{Actuator, Limits, Settings};
+pub use settings::{Actuator, QualityLimits, Settings};
 
 /// Names of the signals that segment needs: those of the classes' recognition, of the flight
 /// condition, and of the quality.

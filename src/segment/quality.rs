@@ -4,7 +4,7 @@
 
 use std::ops::RangeInclusive;
 
-use super::settings::{Actuator, Limits};
+use super::settings::{Actuator, QualityLimits};
 use crate::aero::{Axis, Output};
 use crate::flight::record::Series;
 use crate::flight::{Record, signal};
@@ -40,7 +40,7 @@ pub(super) fn measure(
     record: &Record,
     class: &Class,
     maneuver: &Maneuver,
-    limits: &Limits,
+    limits: &QualityLimits,
     is_given: bool,
 ) -> Quality {
     let whole = record.sample_at(maneuver.start_s)..=record.sample_at(maneuver.end_s);
@@ -136,7 +136,7 @@ fn coupling(record: &Record, axis: Axis, part: &RangeInclusive<usize>) -> Option
 type UpperLimit = (Option<f64>, f64, fn(f64) -> String);
 
 /// The reason for each measure beyond its limit, in words.
-fn reasons(q: &Quality, limits: &Limits) -> Vec<String> {
+fn reasons(q: &Quality, limits: &QualityLimits) -> Vec<String> {
     let upper: [UpperLimit; 6] = [
         (q.lead_in_motion, limits.lead_in_motion, |v| {
             format!(
@@ -256,7 +256,7 @@ fn signal_to_noise(record: &Record, signals: &[&str], part: &RangeInclusive<usiz
 /// The largest share of samples of a surface for which a condition holds.
 fn largest_share(
     record: &Record,
-    limits: &Limits,
+    limits: &QualityLimits,
     part: &RangeInclusive<usize>,
     holds: fn(&Actuator, &[f64], f64) -> bool,
 ) -> Option<f64> {

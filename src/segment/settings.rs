@@ -20,7 +20,7 @@ settings! {
         /// count steps of these signals only.
         pub steps: BTreeMap<String, f64> = BTreeMap::new(),
         /// Limits beyond which a maneuver is rejected.
-        pub quality: Limits = Limits::default(),
+        pub quality: QualityLimits = QualityLimits::default(),
     }
     expert {
         /// Smallest first and last pilot step of a maneuver, as a share of the smallest step. They
@@ -82,7 +82,7 @@ elements!(BTreeMap<String, Actuator>: Actuator as "<surface>");
 
 settings! {
     /// Limits beyond which a maneuver is not estimated.
-    pub struct Limits {
+    pub struct QualityLimits {
         /// Largest motion in the lead-in over motion in the maneuver. Larger: maneuvers with
         /// residual motion before their inputs pass, whose initial state dominates the derivatives.
         pub lead_in_motion: f64 = 0.5,

@@ -1247,7 +1247,7 @@ fn a_surface_at_its_stop_or_its_full_rate_is_measured_and_rejected_beyond_the_li
     );
     limited.quality.saturated_share = 0.1;
     assert!(measured(&limited).reason.contains("rests at its stop"));
-    limited.quality = Limits::default();
+    limited.quality = QualityLimits::default();
     limited
         .quality
         .actuators

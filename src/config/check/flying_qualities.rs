@@ -1,7 +1,7 @@
-//! Checks of the specification of flying qualities: names resolve, limits are numbers.
+//! Checks of `qualities.yaml`: names resolve, limits are numbers.
 
-use super::checked::Config;
-use super::source::{Files, Source};
+use crate::config::checked::Config;
+use crate::config::source::{Files, Source};
 use crate::error::{Result, did_you_mean};
 use crate::qualities::{FEEDBACK_STATES, Specification};
 

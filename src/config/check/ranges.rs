@@ -3,7 +3,7 @@
 
 use serde_yaml::Value;
 
-use super::source::Source;
+use crate::config::source::Source;
 use crate::error::Result;
 
 /// Least and largest value of a number.

@@ -1,10 +1,9 @@
-//! Checks of the proof of match: names resolve, tolerances have a width.
+//! Checks of `match.yaml`: names resolve, tolerances have a width.
 
-use super::check;
-use super::checked::Config;
-use super::source::{Files, Source};
-use crate::aero::{Buildup, WindTunnel, wind_tunnel};
-use crate::error::{Result, did_you_mean};
+use super::names::known_class;
+use crate::config::checked::Config;
+use crate::config::source::{Files, Source};
+use crate::error::Result;
 use crate::proof_of_match::{Specification, Test, Tolerance};
 use crate::tables::ModelSource;
 
@@ -43,19 +42,6 @@ pub(super) fn check(config: &Config, files: &Files) -> Result<()> {
     Ok(())
 }
 
-/// Reads the file of the model `database`; an empty database without one.
-pub(super) fn database(
-    specification: Option<&Specification>,
-    buildup: &Buildup,
-    settings: &wind_tunnel::Settings,
-) -> Result<WindTunnel> {
-    let file = specification.and_then(|s| s.database.as_ref());
-    file.map_or_else(
-        || Ok(WindTunnel::new(settings.clone())),
-        |file| check::tunnel(file, buildup, settings),
-    )
-}
-
 fn check_numbers(specification: &Specification, source: &Source) -> Result<()> {
     if specification.models.is_empty() {
         return Err(source.error("models", "`models` names no model"));
@@ -88,13 +74,8 @@ fn check_numbers(specification: &Specification, source: &Source) -> Result<()> {
 }
 
 fn check_classes(test: &Test, config: &Config, source: &Source) -> Result<()> {
-    for name in test.classes.iter().flatten() {
-        if config.class(name).is_none() {
-            let near = did_you_mean(name, config.classes.iter().map(|c| c.name.as_str()));
-            return Err(source.error(name, format!("unknown class `{name}`{near}")));
-        }
-    }
-    Ok(())
+    let mut classes = test.classes.iter().flatten();
+    classes.try_for_each(|name| known_class(config, source, name))
 }
 
 fn has_width(tolerance: &Tolerance) -> bool {

@@ -1,0 +1,136 @@
+//! Checks of `aircraft.yaml`: geometry, channel map, sizes of instrument errors.
+
+use std::collections::BTreeMap;
+
+use super::names::known_signal;
+use super::numbers;
+use crate::aircraft::ThrustLine;
+use crate::config::checked::Config;
+use crate::config::instruments::InstrumentErrors;
+use crate::config::source::Source;
+use crate::config::tunnel_tables::MISSPELT;
+use crate::error::{Result, did_you_mean, similarity};
+use crate::flight::{Channel, StandIn, signal};
+use crate::ingest;
+use crate::units::Unit;
+
+/// Checks the numbers of the geometry.
+pub(super) fn geometry(config: &Config, source: &Source) -> Result<()> {
+    let a = &config.aircraft;
+    let positive = [
+        ("aircraft", "wing_area_ft2", a.wing_area_ft2),
+        ("aircraft", "span_ft", a.span_ft),
+        ("aircraft", "chord_ft", a.chord_ft),
+        ("alpha_vane", "factor", a.sensors.alpha_vane.factor),
+        ("beta_vane", "factor", a.sensors.beta_vane.factor),
+    ];
+    for (key, name, value) in positive {
+        numbers::positive(source, key, name, value)?;
+    }
+    if !(-90.0..=90.0).contains(&a.latitude_deg) {
+        return Err(source.error("latitude_deg", "`latitude_deg` must lie between -90 and 90"));
+    }
+    a.thrust_line
+        .map_or(Ok(()), |line| thrust_line(line, source))
+}
+
+fn thrust_line(line: ThrustLine, source: &Source) -> Result<()> {
+    let inclination = line.inclination_deg;
+    if !(-45.0..=45.0).contains(&inclination) {
+        let what = format!("`inclination_deg` must lie between -45 and 45, not {inclination}");
+        return Err(source.error_under("thrust_line", "inclination_deg", what));
+    }
+    Ok(())
+}
+
+/// Checks the channel map and the constants: units fit, each signal has one source, none that is required lacks.
+pub(super) fn channels(config: &Config, source: &Source) -> Result<()> {
+    let mut signals: Vec<&str> = config.constants.keys().map(String::as_str).collect();
+    for (column, channel) in &config.channels {
+        if let Some(what) = mistake(column, channel) {
+            return Err(source.error_under("channels", column, what));
+        }
+        if signals.contains(&channel.signal.as_str()) {
+            let what = format!("signal `{}` has two sources", channel.signal);
+            return Err(source.error_under("channels", column, what));
+        }
+        signals.push(&channel.signal);
+    }
+    for name in signal::POSITIVE {
+        if let Some(value) = config.constants.get(*name) {
+            numbers::positive(source, "constants", name, *value)?;
+        }
+    }
+    for required in std::iter::once(&"time_s").chain(signal::REQUIRED) {
+        let has = |name: &str| signals.contains(&name);
+        let is_needed = StandIn::of(required, has).is_none() || is_misspelt(required, &signals);
+        if !has(required) && is_needed {
+            let near = did_you_mean(required, signals.iter().copied());
+            let what = format!("no channel or constant gives the signal `{required}`{near}");
+            return Err(source.error("channels", what));
+        }
+    }
+    Ok(())
+}
+
+/// The first mistake of a channel: its unit, its sign, its scale.
+fn mistake(column: &str, channel: &Channel) -> Option<String> {
+    let unit = match Unit::parse(&channel.unit) {
+        Ok(unit) => unit,
+        Err(what) => return Some(format!("channel `{column}`: {what}")),
+    };
+    let target = Unit::of_signal(&channel.signal);
+    if unit.conversion_to(target).is_none() {
+        let (unit, target, signal) = (unit.name, target.name, &channel.signal);
+        return Some(format!(
+            "channel `{column}`: `{unit}` cannot become {target} of `{signal}`"
+        ));
+    }
+    if ![1.0, -1.0].contains(&channel.sign) {
+        let sign = channel.sign;
+        return Some(format!("channel `{column}`: sign is 1 or -1, not {sign}"));
+    }
+    let is_scale = channel.scale.is_finite() && channel.scale > 0.0;
+    (!is_scale)
+        .then(|| format!("channel `{column}`: scale must be greater than zero; a sign is `sign`"))
+}
+
+/// `true` where a signal of the channel map is probably this required one, misspelt.
+fn is_misspelt(required: &str, signals: &[&str]) -> bool {
+    let mut others = signals
+        .iter()
+        .filter(|name| !signal::REQUIRED.contains(name));
+    others.any(|name| similarity(name, required) >= MISSPELT)
+}
+
+/// Sizes of instrument errors: known signals, no negative sizes.
+pub(super) fn instruments(
+    errors: &BTreeMap<String, InstrumentErrors>,
+    config: &Config,
+    source: &Source,
+) -> Result<()> {
+    let mut examined = ingest::Settings::default().compatibility.ordinary;
+    for (name, instrument) in errors {
+        let error = |what: String| Err(source.error_under("instruments", name, what));
+        known_signal(config, source, name, "instruments")?;
+        let uncertainty = instrument.uncertainty;
+        let (ordinary, fault) = (instrument.ordinary.given(), instrument.fault.given());
+        let sizes = [uncertainty.bias, uncertainty.scale_pct].map(Some);
+        let sizes = sizes.iter().chain(&ordinary).chain(&fault).flatten();
+        if let Some(size) = sizes
+            .copied()
+            .find(|size| !(size.is_finite() && *size >= 0.0))
+        {
+            return error(format!(
+                "`{name}`: sizes of errors are not negative, not {size}"
+            ));
+        }
+        let has_sizes = ordinary.iter().chain(&fault).any(Option::is_some);
+        if has_sizes && examined.of_signal(name).is_none() {
+            return error(format!(
+                "`{name}`: no kinematic equation has this signal, so `ordinary` and `fault` have no effect"
+            ));
+        }
+    }
+    Ok(())
+}

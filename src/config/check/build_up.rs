@@ -1,0 +1,62 @@
+//! Checks of `model.yaml`: names stand once and resolve, the kernel has room for the products.
+
+use super::names::known_signal;
+use crate::aero::{Axis, Regressor};
+use crate::config::checked::Config;
+use crate::config::source::Source;
+use crate::error::{Result, did_you_mean};
+use crate::output_error::MOST_PRODUCTS;
+
+/// Checks the derivatives, biases and sums of the model.
+pub(super) fn buildup(config: &Config, source: &Source) -> Result<()> {
+    let buildup = &config.buildup;
+    let derivatives = buildup.derivatives.iter().map(|d| &d.name);
+    let mut names: Vec<&String> = derivatives
+        .chain(buildup.biases.iter().map(|b| &b.name))
+        .collect();
+    names.extend(buildup.combined.iter().map(|c| &c.name));
+    names.sort();
+    if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Err(source.error(twice[0], format!("`{}` is defined twice", twice[0])));
+    }
+    for derivative in &buildup.derivatives {
+        for signal in derivative.regressor.signals() {
+            known_signal(config, source, signal, &derivative.name)?;
+        }
+    }
+    few_products(config, source)?;
+    for combined in &buildup.combined {
+        for part in [&combined.constant, &combined.slope] {
+            if buildup.derivative(part).is_none() {
+                let near = did_you_mean(part, buildup.derivatives.iter().map(|d| d.name.as_str()));
+                return Err(source.error(
+                    part,
+                    format!("{}: unknown derivative `{part}`{near}", combined.name),
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Checks that the kernel has room for the products in which states are.
+fn few_products(config: &Config, source: &Source) -> Result<()> {
+    for axis in [Axis::Longitudinal, Axis::Lateral] {
+        let mut products: Vec<&Regressor> = Vec::new();
+        for derivative in config.buildup.derivatives_of(axis) {
+            let regressor = &derivative.regressor;
+            let is_composed = matches!(regressor, Regressor::Product(_) | Regressor::Magnitude(_));
+            if is_composed && !products.contains(&regressor) {
+                products.push(regressor);
+            }
+            if products.len() > MOST_PRODUCTS {
+                let what = format!(
+                    "{}: the {axis} axis has more than {MOST_PRODUCTS} products and magnitudes as regressors",
+                    derivative.name
+                );
+                return Err(source.error(&derivative.name, what));
+            }
+        }
+    }
+    Ok(())
+}

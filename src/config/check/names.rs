@@ -1,0 +1,33 @@
+//! Checks of names that one file gives and another uses: signals and classes.
+
+use crate::config::checked::Config;
+use crate::config::source::Source;
+use crate::error::{Result, did_you_mean};
+
+/// Names of all signals of the channel map and the constants.
+fn signals(config: &Config) -> impl Iterator<Item = &str> + Clone {
+    config
+        .channels
+        .values()
+        .map(|c| c.signal.as_str())
+        .chain(config.constants.keys().map(String::as_str))
+}
+
+/// Refuses a signal that neither a channel nor a constant gives; `user` names what needs it.
+pub(super) fn known_signal(config: &Config, source: &Source, name: &str, user: &str) -> Result<()> {
+    if signals(config).any(|s| s == name) {
+        return Ok(());
+    }
+    let near = did_you_mean(name, signals(config));
+    let what = format!("{user}: no channel gives the signal `{name}`{near}");
+    Err(source.error(name, what))
+}
+
+/// Refuses a class that the pipeline does not have.
+pub(super) fn known_class(config: &Config, source: &Source, name: &str) -> Result<()> {
+    if config.class(name).is_some() {
+        return Ok(());
+    }
+    let near = did_you_mean(name, config.classes.iter().map(|c| c.name.as_str()));
+    Err(source.error(name, format!("unknown class `{name}`{near}")))
+}
