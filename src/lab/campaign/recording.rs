@@ -50,7 +50,8 @@ impl Recorder {
     pub fn new(
         card: &RecorderCard,
         channels: &BTreeMap<String, Channel>,
-        (signals, rate_hz): (&[&str], f64),
+        signals: &[&str],
+        rate_hz: f64,
     ) -> Result<Recorder, (String, String)> {
         let recorded = columns(channels);
         let mut given = card.columns.keys().chain(&card.slow.columns);
@@ -65,7 +66,7 @@ impl Recorder {
             Ok(RecordedColumn {
                 name: name.clone(),
                 unit: channel.unit.clone(),
-                content: content(card, channels, signals, (name, channel))
+                content: content(card, channels, signals, name, channel)
                     .map_err(|what| (name.clone(), what))?,
                 every: if is_slow { of_slow } else { 1 },
             })
@@ -116,11 +117,13 @@ fn every(rate_hz: f64, slow: &super::cards::SlowColumns) -> Result<usize, String
     Ok(every)
 }
 
+/// Content of a column of the channel map: a signal of the simulator, or the formula of the card.
 fn content(
     card: &RecorderCard,
     channels: &BTreeMap<String, Channel>,
     signals: &[&str],
-    (name, channel): (&str, &Channel),
+    name: &str,
+    channel: &Channel,
 ) -> Result<Content, String> {
     let unit = Unit::parse(&channel.unit)?;
     let Some(text) = card.columns.get(name) else {

@@ -56,7 +56,7 @@ impl SimulatedCampaign {
         check_instruments(cards, &names, source)?;
         let rate_hz = simulator.settings().rate_hz;
         let names: Vec<&str> = names.into_iter().collect();
-        let recorder = Recorder::new(&cards.recorder, &config.channels, (&names, rate_hz))
+        let recorder = Recorder::new(&cards.recorder, &config.channels, &names, rate_hz)
             .map_err(|(name, what)| source.error_under("recorder", &name, what))?;
         let names: Vec<&str> = config.classes.iter().map(|c| c.name.as_str()).collect();
         read.check_programs(&names)?;

@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 
 use serde::{Deserialize, Serialize};
 
-use super::gust::Gust;
+use super::gust::{Gust, GustPath};
 use crate::numerics::random::RandomStream;
 
 /// Size, length and frequency of discrete gusts.
@@ -49,10 +49,11 @@ impl DiscreteGusts {
         Ok(())
     }
 
-    /// Draws `count` gusts at multiples of `step_s`, for an aircraft at this airspeed.
+    /// Draws the gusts along a path.
     #[must_use]
-    pub fn gusts(&self, speed_ft_s: f64, (step_s, count): (f64, usize), seed: u64) -> Vec<Gust> {
-        let duration_s = step_s * count as f64;
+    pub fn gusts(&self, path: &GustPath, seed: u64) -> Vec<Gust> {
+        let (speed_ft_s, step_s) = (path.speed_ft_s, path.step_s);
+        let duration_s = step_s * path.count as f64;
         let across = self.edges(
             speed_ft_s,
             duration_s,
@@ -63,7 +64,7 @@ impl DiscreteGusts {
             duration_s,
             &mut RandomStream::new(seed, "discrete gust down"),
         );
-        (0..count)
+        (0..path.count)
             .map(|k| {
                 let place_ft = speed_ft_s * step_s * k as f64;
                 let (v, v_by_x) = self.sum(&across, place_ft);
@@ -141,10 +142,19 @@ mod tests {
         }
     }
 
+    fn path(speed_ft_s: f64, step_s: f64, count: usize) -> GustPath {
+        GustPath {
+            speed_ft_s,
+            span_ft: 40.0,
+            step_s,
+            count,
+        }
+    }
+
     #[test]
     fn the_air_turns_with_the_gradient_that_the_aircraft_meets() {
         let (speed, step) = (400.0, 0.001);
-        let gusts = GUSTS.gusts(speed, (step, 30_000), 4);
+        let gusts = GUSTS.gusts(&path(speed, step, 30_000), 4);
         for three in gusts.windows(3) {
             let by_x = (three[2].velocity - three[0].velocity) / (2.0 * step * speed);
             // Edges of gusts bend the gradient within a step.
@@ -158,7 +168,7 @@ mod tests {
     fn gusts_come_at_their_rate_with_the_mean_square_of_a_random_train() {
         // Rate times duration times the mean square of one: 3/8 U².
         let speed = 300.0;
-        let gusts = GUSTS.gusts(speed, (0.05, 400_000), 6);
+        let gusts = GUSTS.gusts(&path(speed, 0.05, 400_000), 6);
         let expected = 0.4 * (2.0 * 150.0 / speed) * 3.0 / 8.0 * 144.0;
         for axis in [1, 2] {
             let square = gusts.iter().map(|g| g.velocity[axis].powi(2)).sum::<f64>();

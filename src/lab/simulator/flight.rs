@@ -6,7 +6,7 @@ use super::actuators::SurfaceState;
 use super::card::{Card, DerivativeLookup, FlightCondition};
 use super::control::Feedback;
 use super::flown::{FlownManeuver, TrueDerivative};
-use super::gust::Gust;
+use super::gust::{Gust, GustPath};
 use super::law::ControlLaw;
 use super::plant::{Plant, PlantInputs, PlantOutputs};
 use super::sensors;
@@ -76,19 +76,14 @@ pub fn fly(plant: &Plant, settings: &Settings, card: &Card) -> Result<FlownManeu
     Ok(flight.flown(signals, &alphas_deg))
 }
 
-/// Gusts of turbulence and discrete gusts together, for an airspeed and span.
-fn gusts(
-    condition: &FlightCondition,
-    (speed_ft_s, span_ft): (f64, f64),
-    (step_s, steps): (f64, usize),
-    seed: u64,
-) -> Vec<Gust> {
-    let mut sum = vec![Gust::default(); steps];
+/// Gusts of turbulence and discrete gusts together, along a path.
+fn gusts(condition: &FlightCondition, path: &GustPath, seed: u64) -> Vec<Gust> {
+    let mut sum = vec![Gust::default(); path.count];
     let turbulence = condition.turbulence.iter();
     let discrete = condition.discrete_gusts.iter();
     let parts = turbulence
-        .map(|t| t.gusts((speed_ft_s, span_ft), (step_s, steps), seed))
-        .chain(discrete.map(|d| d.gusts(speed_ft_s, (step_s, steps), seed)));
+        .map(|t| t.gusts(path, seed))
+        .chain(discrete.map(|d| d.gusts(path, seed)));
     for part in parts {
         for (total, gust) in sum.iter_mut().zip(&part) {
             *total = total.plus(gust);
@@ -139,8 +134,13 @@ impl<'a> CardFlight<'a> {
         let step_s = 1.0 / settings.control_hz;
         let steps =
             (nearest(card.program.duration_s * settings.rate_hz) + 2) * settings.steps_per_sample();
-        let flow = (trim.air.velocity_ft_s, plant.aircraft.span_ft);
-        let gusts = gusts(&card.condition, flow, (step_s, steps), card.seed);
+        let path = GustPath {
+            speed_ft_s: trim.air.velocity_ft_s,
+            span_ft: plant.aircraft.span_ft,
+            step_s,
+            count: steps,
+        };
+        let gusts = gusts(&card.condition, &path, card.seed);
         let frozen = (card.condition.derivatives == DerivativeLookup::Frozen).then_some(at_trim);
         Ok(CardFlight {
             plant,

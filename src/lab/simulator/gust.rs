@@ -2,6 +2,17 @@
 
 use nalgebra::Vector3;
 
+/// Straight path at a constant airspeed, with the instants at which gusts are drawn: multiples of `step_s`
+/// from zero on.
+#[derive(Clone, Copy, Debug)]
+pub struct GustPath {
+    pub speed_ft_s: f64,
+    /// Span of the aircraft, over which gusts of roll are averaged.
+    pub span_ft: f64,
+    pub step_s: f64,
+    pub count: usize,
+}
+
 /// Velocity and rotation of the air over the ground in body axes. The aerodynamics feel the
 /// velocities and rates of the aircraft less these; gyros and attitudes do not.
 ///

@@ -20,7 +20,7 @@ use std::f64::consts::PI;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::gust::Gust;
+use super::gust::{Gust, GustPath};
 use super::shaping_filter::ShapingFilter;
 use crate::numerics::random::RandomStream;
 
@@ -81,24 +81,18 @@ impl Turbulence {
         Ok(())
     }
 
-    /// Draws `count` gusts at multiples of `step_s` from the stationary distribution, for an aircraft
-    /// of this span at this airspeed.
+    /// Draws the gusts along a path from the stationary distribution.
     #[must_use]
-    pub fn gusts(
-        &self,
-        (speed_ft_s, span_ft): (f64, f64),
-        (step_s, count): (f64, usize),
-        seed: u64,
-    ) -> Vec<Gust> {
-        let filters = self.filters(speed_ft_s, span_ft);
+    pub fn gusts(&self, path: &GustPath, seed: u64) -> Vec<Gust> {
+        let filters = self.filters(path.speed_ft_s, path.span_ft);
         let draw = |filter: &ShapingFilter, name: &str| {
-            filter.draw(step_s, count, &mut RandomStream::new(seed, name))
+            filter.draw(path.step_s, path.count, &mut RandomStream::new(seed, name))
         };
         let along = draw(&filters.along, "gust along");
         let across = draw(&filters.across, "gust across");
         let down = draw(&filters.down, "gust down");
         let roll = draw(&filters.roll, "gust roll");
-        (0..count)
+        (0..path.count)
             .map(|k| Gust {
                 velocity: Vector3::new(along[k][0], across[k][0], down[k][0]),
                 rates: Vector3::new(roll[k][0], down[k][1], across[k][1]),
@@ -277,12 +271,22 @@ mod tests {
         }
     }
 
+    /// Path at the speed and span of these tests.
+    fn path(step_s: f64, count: usize) -> GustPath {
+        GustPath {
+            speed_ft_s: SPEED,
+            span_ft: SPAN,
+            step_s,
+            count,
+        }
+    }
+
     #[test]
     fn drawn_gusts_have_the_variance_and_correlation_of_their_filters() {
         let model = turbulence(TurbulenceModel::VonKarman);
         let filters = model.filters(SPEED, SPAN);
         for (step_s, lag) in [(0.1_f64, 8_u32), (0.2, 4)] {
-            let gusts = model.gusts((SPEED, SPAN), (step_s, 60_000), 3);
+            let gusts = model.gusts(&path(step_s, 60_000), 3);
             for (axis, filter) in [
                 (0, &filters.along),
                 (1, &filters.across),
@@ -311,7 +315,7 @@ mod tests {
     fn the_air_turns_as_the_gusts_change_along_the_path() {
         // A downdraught that grows ahead pitches the air about the c.g. nose down: q_g = −ẇ/V.
         // Yawing, r_g = v̇/V. The roll rate is independent.
-        let gusts = turbulence(TurbulenceModel::Dryden).gusts((SPEED, SPAN), (0.01, 100_000), 8);
+        let gusts = turbulence(TurbulenceModel::Dryden).gusts(&path(0.01, 100_000), 8);
         let mut sums = [0.0; 4];
         for pair in gusts.windows(2) {
             let rate = (pair[1].velocity - pair[0].velocity) / 0.01;
@@ -334,8 +338,7 @@ mod tests {
 
     #[test]
     fn the_same_seed_gives_the_same_gusts() {
-        let draw =
-            |seed| turbulence(TurbulenceModel::VonKarman).gusts((300.0, SPAN), (0.0125, 50), seed);
+        let draw = |seed| turbulence(TurbulenceModel::VonKarman).gusts(&path(0.0125, 50), seed);
         assert_eq!(draw(1), draw(1));
         assert_ne!(draw(1), draw(2));
     }
