@@ -9,8 +9,8 @@ use clap::{Args, ValueEnum};
 use super::bars::Bars;
 use super::options::{ATTENTION, Options, Patience, REJECTED, TRY_AGAIN, exit_code, start_threads};
 use super::run_summary::print_summary;
-use crate::cluster::plan::{Dealt, Plan, Shard, array};
-use crate::cluster::scripts::{self, CampaignCommands, Engine, LARGEST_ARRAY};
+use crate::cluster::plan::{Dealt, Shard, ShardPlan, array};
+use crate::cluster::scripts::{self, CampaignCommands, LARGEST_ARRAY};
 use crate::cluster::shard;
 use crate::config::Config;
 use crate::error::Error;
@@ -119,7 +119,7 @@ pub fn plan(options: &PlanOptions) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn print_plan(plan: &Plan, file: &Path) {
+fn print_plan(plan: &ShardPlan, file: &Path) {
     let costs = plan.costs();
     let dearest = costs.values().copied().fold(0.0, f64::max);
     let mean = costs.values().sum::<f64>() / costs.len() as f64;
@@ -255,8 +255,8 @@ pub fn submit(options: &SubmitOptions) -> anyhow::Result<ExitCode> {
         out: shown(&folder.join(&out)),
     };
     let engine = match options.engine {
-        Scheduler::Slurm => Engine::Slurm,
-        Scheduler::Pbs => Engine::Pbs,
+        Scheduler::Slurm => scripts::Scheduler::Slurm,
+        Scheduler::Pbs => scripts::Scheduler::Pbs,
     };
     for script in scripts::scripts(engine, &config.cluster, &campaign) {
         atomic::place(&out.join(script.name), script.text.as_bytes())?;

@@ -7,7 +7,7 @@ use clap::{Args, Subcommand};
 
 use super::bars::Bars;
 use super::options::{Options, REJECTED, exit_code, start_threads};
-use crate::pipeline::show::{self, Subject};
+use crate::pipeline::show::{self, ChartSubject};
 
 #[derive(Debug, Subcommand)]
 pub enum Show {
@@ -57,8 +57,8 @@ pub struct ShowOptions {
 /// Draws a flight or a maneuver and prints the file.
 pub fn show(command: &Show) -> anyhow::Result<ExitCode> {
     let (subject, options) = match command {
-        Show::Flight(options) => (Subject::Flight(options.id.clone()), options),
-        Show::Maneuver(options) => (Subject::Maneuver(options.id.clone()), options),
+        Show::Flight(options) => (ChartSubject::Flight(options.id.clone()), options),
+        Show::Maneuver(options) => (ChartSubject::Maneuver(options.id.clone()), options),
     };
     start_threads(options.options.threads)?;
     let config = options.options.load()?;

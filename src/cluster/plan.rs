@@ -57,7 +57,7 @@ pub struct Item {
 
 /// A flight or maneuver to be dealt.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Work {
+pub struct DealtWork {
     /// Id of the flight or maneuver.
     pub id: String,
     /// Flight of the archive.
@@ -69,7 +69,7 @@ pub struct Work {
 /// A campaign's work, dealt to shards.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Plan {
+pub struct ShardPlan {
     form: u32,
     pub of: Dealt,
     pub shards: usize,
@@ -82,7 +82,7 @@ pub struct Plan {
     pub lineage: Lineage,
 }
 
-impl Plan {
+impl ShardPlan {
     /// Deals work, in its order, to shards of about equal cost.
     ///
     /// A shard gets neighbours: the maneuvers of a flight share its record. Its cost differs from the
@@ -91,14 +91,14 @@ impl Plan {
     pub fn deal(
         of: Dealt,
         shards: usize,
-        work: Vec<Work>,
+        work: Vec<DealtWork>,
         delays: Vec<DelayCorrection>,
         lineage: &Lineage,
-    ) -> Plan {
+    ) -> ShardPlan {
         let shards = shards.max(1);
         let total: f64 = work.iter().map(|work| work.cost).sum();
         let mut before = 0.0;
-        let item = |work: Work| {
+        let item = |work: DealtWork| {
             let middle = (before + 0.5 * work.cost) / total.max(f64::MIN_POSITIVE);
             before += work.cost;
             #[expect(
@@ -114,7 +114,7 @@ impl Plan {
                 shard: shard.min(shards - 1) + 1,
             }
         };
-        Plan {
+        ShardPlan {
             form: FORM,
             of,
             shards,
@@ -129,8 +129,8 @@ impl Plan {
     ///
     /// # Errors
     /// The reason that the text is no valid plan: another program's, an item twice or in no shard.
-    pub fn read(text: &str) -> Result<Plan, String> {
-        let plan: Plan =
+    pub fn read(text: &str) -> Result<ShardPlan, String> {
+        let plan: ShardPlan =
             serde_json::from_str(text).map_err(|e| format!("is no plan of this program: {e}"))?;
         if plan.form != FORM {
             return Err(format!(
@@ -229,11 +229,11 @@ impl FromStr for Shard {
 mod tests {
     use super::*;
 
-    fn work(costs: &[f64]) -> Vec<Work> {
+    fn work(costs: &[f64]) -> Vec<DealtWork> {
         costs
             .iter()
             .enumerate()
-            .map(|(i, cost)| Work {
+            .map(|(i, cost)| DealtWork {
                 id: format!("m{i:03}"),
                 flight_id: "f".to_owned(),
                 cost: *cost,
@@ -245,7 +245,7 @@ mod tests {
     fn every_item_is_dealt_once_and_no_shard_is_dearer_than_the_mean_and_one_item() {
         for n in [1, 4, 24, 200] {
             let costs: Vec<f64> = (0..106).map(|i| 1.0 + f64::from(i * i % 17)).collect();
-            let plan = Plan::deal(
+            let plan = ShardPlan::deal(
                 Dealt::Maneuvers,
                 n,
                 work(&costs),
@@ -267,34 +267,34 @@ mod tests {
 
     #[test]
     fn items_that_cost_nothing_are_dealt_all_the_same() {
-        let plan = Plan::deal(
+        let plan = ShardPlan::deal(
             Dealt::Flights,
             3,
             work(&[0.0, 0.0]),
             vec![],
             &Lineage::default(),
         );
-        assert_eq!(Plan::read(&plan.text()), Ok(plan));
+        assert_eq!(ShardPlan::read(&plan.text()), Ok(plan));
     }
 
     #[test]
     fn a_plan_with_an_item_twice_or_in_no_shard_is_refused() {
-        let plan = Plan::deal(
+        let plan = ShardPlan::deal(
             Dealt::Maneuvers,
             2,
             work(&[1.0, 1.0]),
             vec![],
             &Lineage::default(),
         );
-        let refused = |change: &dyn Fn(&mut Plan)| {
+        let refused = |change: &dyn Fn(&mut ShardPlan)| {
             let mut other = plan.clone();
             change(&mut other);
-            Plan::read(&other.text()).unwrap_err()
+            ShardPlan::read(&other.text()).unwrap_err()
         };
         assert!(refused(&|p| p.items[1].id = "m000".into()).contains("`m000` is dealt twice"));
         assert!(refused(&|p| p.items[1].shard = 3).contains("shard 3 of 2"));
         assert!(refused(&|p| p.form = 1).contains("form 1"));
-        assert!(Plan::read("{").unwrap_err().contains("no plan"));
+        assert!(ShardPlan::read("{").unwrap_err().contains("no plan"));
     }
 
     #[test]

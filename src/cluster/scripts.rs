@@ -9,7 +9,7 @@ use crate::config::ClusterSettings;
 
 /// Batch scheduler.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Engine {
+pub enum Scheduler {
     Slurm,
     Pbs,
 }
@@ -83,7 +83,7 @@ fn quoted(word: &str) -> String {
 /// Writes all scripts; the last submits the others.
 #[must_use]
 pub fn scripts(
-    engine: Engine,
+    engine: Scheduler,
     settings: &ClusterSettings,
     campaign: &CampaignCommands,
 ) -> Vec<Script> {
@@ -102,7 +102,7 @@ pub fn scripts(
 }
 
 fn script(
-    engine: Engine,
+    engine: Scheduler,
     settings: &ClusterSettings,
     campaign: &CampaignCommands,
     job: Job,
@@ -126,7 +126,7 @@ fn script(
 
 /// The command of a job, without the program.
 fn command(
-    engine: Engine,
+    engine: Scheduler,
     settings: &ClusterSettings,
     campaign: &CampaignCommands,
     job: Job,
@@ -136,8 +136,8 @@ fn command(
     let arguments = arguments.join(" ");
     let (flights, maneuvers) = (quoted(&campaign.flights), quoted(&campaign.maneuvers));
     let task = match engine {
-        Engine::Slurm => "$SLURM_ARRAY_TASK_ID",
-        Engine::Pbs => "$PBS_ARRAY_INDEX",
+        Scheduler::Slurm => "$SLURM_ARRAY_TASK_ID",
+        Scheduler::Pbs => "$PBS_ARRAY_INDEX",
     };
     let shard = format!("--shard \"{task}/{shards}\" --threads {threads}");
     match job {
@@ -150,14 +150,14 @@ fn command(
 
 /// Directives for the scheduler.
 fn directives(
-    engine: Engine,
+    engine: Scheduler,
     settings: &ClusterSettings,
     campaign: &CampaignCommands,
     job: Job,
 ) -> Vec<String> {
     let (mark, mut options) = match engine {
-        Engine::Slurm => ("#SBATCH", slurm_options(settings, campaign, job)),
-        Engine::Pbs => ("#PBS", pbs_options(settings, campaign, job)),
+        Scheduler::Slurm => ("#SBATCH", slurm_options(settings, campaign, job)),
+        Scheduler::Pbs => ("#PBS", pbs_options(settings, campaign, job)),
     };
     options.extend(settings.options.iter().cloned());
     let lines = options.into_iter();
@@ -200,10 +200,10 @@ fn pbs_options(s: &ClusterSettings, campaign: &CampaignCommands, job: Job) -> Ve
 }
 
 /// The command, repeated after exit code 75.
-fn retried(engine: Engine, settings: &ClusterSettings, job: Job, command: &str) -> String {
+fn retried(engine: Scheduler, settings: &ClusterSettings, job: Job, command: &str) -> String {
     let retries = settings.retries;
     match engine {
-        Engine::Slurm => {
+        Scheduler::Slurm => {
             let task = if job.is_array() {
                 "${SLURM_ARRAY_JOB_ID}_${SLURM_ARRAY_TASK_ID}"
             } else {
@@ -216,7 +216,7 @@ fn retried(engine: Engine, settings: &ClusterSettings, job: Job, command: &str) 
                  scontrol requeue \"{task}\" && sleep 300\nfi"
             )
         }
-        Engine::Pbs => format!(
+        Scheduler::Pbs => format!(
             "code=75\nfor try in $(seq 0 {retries}); do\n  \"$harvest\" {command} --quiet\n  code=$?\n  \
              [ $code -eq 75 ] || break\n  sleep 60\ndone"
         ),
@@ -224,14 +224,14 @@ fn retried(engine: Engine, settings: &ClusterSettings, job: Job, command: &str) 
 }
 
 /// Script that submits the jobs, each after the one before, and prints their numbers.
-fn submit(engine: Engine, campaign: &CampaignCommands) -> String {
+fn submit(engine: Scheduler, campaign: &CampaignCommands) -> String {
     let out = quoted(&campaign.out);
     let (first, next) = match engine {
-        Engine::Slurm => (
+        Scheduler::Slurm => (
             "sbatch --parsable",
             "sbatch --parsable --dependency=afterok:$job --kill-on-invalid-dep=yes",
         ),
-        Engine::Pbs => ("qsub", "qsub -W depend=afterok:$job"),
+        Scheduler::Pbs => ("qsub", "qsub -W depend=afterok:$job"),
     };
     let line = |job: Job| {
         let command = if job == Job::Flights { first } else { next };
@@ -261,7 +261,7 @@ mod tests {
         }
     }
 
-    fn text(engine: Engine, name: &str) -> String {
+    fn text(engine: Scheduler, name: &str) -> String {
         let settings = ClusterSettings {
             shards: 7,
             partition: Some("flight".into()),
@@ -275,7 +275,7 @@ mod tests {
 
     #[test]
     fn a_slurm_task_knows_its_shard_and_requeues_itself_when_it_wants_another_try() {
-        let flights = text(Engine::Slurm, "flights.sh");
+        let flights = text(Scheduler::Slurm, "flights.sh");
         assert!(
             flights.starts_with("#!/bin/bash\n#SBATCH --job-name=harvest-flights\n"),
             "{flights}"
@@ -290,7 +290,7 @@ mod tests {
             assert!(flights.contains(line), "{line}\n{flights}");
         }
         assert!(!flights.contains("RequeueExit="));
-        let merge = text(Engine::Slurm, "merge.sh");
+        let merge = text(Scheduler::Slurm, "merge.sh");
         assert!(
             !merge.contains("--array") && merge.contains("[ $code -eq 2 ] && code=0"),
             "{merge}"
@@ -299,7 +299,7 @@ mod tests {
 
     #[test]
     fn each_job_waits_for_the_one_before() {
-        let submit = text(Engine::Slurm, "submit.sh");
+        let submit = text(Scheduler::Slurm, "submit.sh");
         assert_eq!(submit.matches("--dependency=afterok:$job").count(), 3);
         let places: Vec<usize> = Job::ALL
             .iter()
@@ -311,7 +311,7 @@ mod tests {
             .collect();
         assert!(places.is_sorted());
         assert_eq!(
-            text(Engine::Pbs, "submit.sh")
+            text(Scheduler::Pbs, "submit.sh")
                 .matches("depend=afterok:$job")
                 .count(),
             3

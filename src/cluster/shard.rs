@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::time::Duration;
 
-use super::plan::{Dealt, Item, Plan, Shard, Work, array};
+use super::plan::{Dealt, DealtWork, Item, Shard, ShardPlan, array};
 use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::flight::is_stretch;
@@ -26,8 +26,8 @@ use crate::surfaces::DelayCorrection;
 ///
 /// # Errors
 /// [`Error::Config`] naming the file that cannot be read or is no valid plan.
-pub fn read_plan(file: &Path) -> Result<Plan> {
-    Plan::read(&files::text(file)?).map_err(|why| Error::config(file, None, why))
+pub fn read_plan(file: &Path) -> Result<ShardPlan> {
+    ShardPlan::read(&files::text(file)?).map_err(|why| Error::config(file, None, why))
 }
 
 /// Deals the campaign's flights, or the maneuvers found in them, to shards, and writes the plan.
@@ -40,7 +40,7 @@ pub fn deal(
     shards: usize,
     file: &Path,
     progress: &dyn Progress,
-) -> Result<Plan> {
+) -> Result<ShardPlan> {
     let archive = archive::find(&config.archive)?;
     let mut conductor = Conductor::join(config, archive, Absent::Report, Duration::ZERO, progress)?;
     conductor.remember_contents()?;
@@ -48,7 +48,7 @@ pub fn deal(
         Dealt::Flights => (flights(&conductor), vec![], vec![]),
         Dealt::Maneuvers => maneuvers(&mut conductor)?,
     };
-    let mut plan = Plan::deal(dealt, shards, work, delays, &campaign_lineage(&conductor));
+    let mut plan = ShardPlan::deal(dealt, shards, work, delays, &campaign_lineage(&conductor));
     plan.corrections = corrections;
     conductor.runner.store.check_transfers()?;
     files::place_text(file, &plan.text())?;
@@ -63,7 +63,7 @@ pub fn deal(
 /// ([`Error::is_transient`]).
 pub fn compute(
     config: &Config,
-    plan: &Plan,
+    plan: &ShardPlan,
     shard: Shard,
     until: Stage,
     wait: Duration,
@@ -106,7 +106,7 @@ pub fn compute(
 /// No archive, or the plan has another lineage.
 pub fn missing_items(
     config: &Config,
-    plan: &Plan,
+    plan: &ShardPlan,
     progress: &dyn Progress,
 ) -> Result<BTreeSet<String>> {
     let conductor = Conductor::look(config, progress)?;
@@ -135,7 +135,7 @@ pub fn missing_items(
 /// Something is missing; then with its shards. Else as [`run`].
 pub fn merge(
     config: &Config,
-    plan: &Plan,
+    plan: &ShardPlan,
     wait: Duration,
     progress: &dyn Progress,
 ) -> Result<RunOutcome> {
@@ -157,7 +157,7 @@ pub fn merge(
 /// Checks that a plan has the lineage of this archive, configuration and code; with `flights`, only
 /// of these flights.
 fn check_lineage(
-    plan: &Plan,
+    plan: &ShardPlan,
     conductor: &Conductor,
     flights: Option<&BTreeSet<&str>>,
 ) -> Result<()> {
@@ -183,7 +183,7 @@ fn check_lineage(
 }
 
 /// Every flight whose files can be read, at the cost of its bytes.
-fn flights(conductor: &Conductor) -> Vec<Work> {
+fn flights(conductor: &Conductor) -> Vec<DealtWork> {
     let contents = &conductor.runner.contents;
     let bytes = |file: &FlightFiles| -> f64 {
         let digests = file.files.iter().filter_map(|path| contents.of(path).ok());
@@ -195,7 +195,7 @@ fn flights(conductor: &Conductor) -> Vec<Work> {
             .fingerprint(&file.flight_id)
             .is_ok()
     };
-    let work = |file: &FlightFiles| Work {
+    let work = |file: &FlightFiles| DealtWork {
         id: file.flight_id.clone(),
         flight_id: file.flight_id.clone(),
         cost: bytes(file),
@@ -205,7 +205,7 @@ fn flights(conductor: &Conductor) -> Vec<Work> {
 }
 
 /// Work on maneuvers, with the corrections that all flights together decide.
-type ManeuverWork = (Vec<Work>, Vec<DelayCorrection>, Vec<FlightCorrections>);
+type ManeuverWork = (Vec<DealtWork>, Vec<DelayCorrection>, Vec<FlightCorrections>);
 
 /// Every maneuver of the campaign, and the corrections of surfaces and instruments.
 fn maneuvers(conductor: &mut Conductor) -> Result<ManeuverWork> {
@@ -229,7 +229,7 @@ fn maneuvers(conductor: &mut Conductor) -> Result<ManeuverWork> {
     let work = |m: &Maneuver| {
         let mut archive = conductor.archive.iter();
         let file = archive.find(|f| is_stretch(&m.flight_id, &f.flight_id))?;
-        Some(Work {
+        Some(DealtWork {
             id: m.maneuver_id.clone(),
             flight_id: file.flight_id.clone(),
             cost: cost(config, m),
@@ -254,7 +254,7 @@ fn cost(config: &Config, maneuver: &Maneuver) -> f64 {
 fn estimate(
     conductor: &Conductor,
     campaign: &Campaign,
-    plan: &Plan,
+    plan: &ShardPlan,
     items: &[&Item],
 ) -> Result<()> {
     let by_id: BTreeMap<&str, &Maneuver> = campaign

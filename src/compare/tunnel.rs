@@ -370,10 +370,10 @@ mod tests {
 
     #[test]
     fn the_point_nearest_to_the_flown_mach_number_is_compared() {
-        let group = trend::Group {
+        let group = trend::TrendGroup {
             name: "A".into(),
             classes: vec!["A".into()],
-            ..trend::Group::default()
+            ..trend::TrendGroup::default()
         };
         let groups = trend::Settings {
             groups: vec![group],

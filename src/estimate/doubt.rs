@@ -9,7 +9,7 @@ use crate::aero::Output;
 use crate::dynamics::{Equations, OUTPUTS};
 use crate::numerics::student::NORMAL_95;
 use crate::output_error::equation_error::Regression;
-use crate::output_error::theil::Agreement;
+use crate::output_error::theil::OutputAgreement;
 use crate::output_error::{Case, Fit, InitialState, Outcome};
 use crate::units::{DEG, Unit};
 
@@ -34,7 +34,7 @@ impl Task<'_> {
         estimated: &mut Estimated,
     ) {
         let outputs = explanation.outputs;
-        let agreements = outputs.map(|y| Agreement::of_outputs(&case.measurements, y));
+        let agreements = outputs.map(|y| OutputAgreement::of_outputs(&case.measurements, y));
         let named = E::AXIS
             .outputs()
             .into_iter()
@@ -65,7 +65,7 @@ impl Task<'_> {
         &self,
         fit: &Fit,
         explanation: &Explanation,
-        agreements: Option<&[Agreement; OUTPUTS]>,
+        agreements: Option<&[OutputAgreement; OUTPUTS]>,
     ) -> Vec<String> {
         let Some(agreements) = agreements else {
             return vec!["its equations diverge along the maneuver".to_owned()];

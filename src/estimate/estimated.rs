@@ -83,24 +83,7 @@ impl Estimated {
 /// Row of `fits` of a maneuver that was not estimated.
 pub(super) fn rejected_fit(maneuver: &Maneuver, reason: String) -> FitRow {
     FitRow {
-        maneuver_id: maneuver.maneuver_id.clone(),
-        class: maneuver.class.clone(),
-        outcome: Outcome::Rejected,
         reason,
-        start: None,
-        iterations: 0,
-        initial_cost: None,
-        final_cost: None,
-        condition_number: None,
-        left_out: None,
-        largest_condition_index: None,
-        confounded: None,
-        method: None,
-        gust_ft_s: None,
-        rotary_gust_deg_s: None,
-        gust_corner_rad_s: None,
-        autocorrelation: None,
-        likelihood_gain: None,
-        equation_error_distance: None,
+        ..FitRow::without_numbers(&maneuver.maneuver_id, &maneuver.class, Outcome::Rejected)
     }
 }

@@ -32,7 +32,7 @@ use crate::filter_error::scoring::minimise;
 use crate::flight::Record;
 use crate::maneuver::{Class, Maneuver, Status};
 use crate::output_error::sharing::SharedParameters;
-use crate::output_error::theil::{self, Agreement};
+use crate::output_error::theil::{self, OutputAgreement};
 use crate::output_error::{Case, Fit, Model, Outcome, cost, estimation, mean};
 use crate::tables::{AgreementRow, EstimateRow, FitRow, PredictedRow, PredictionStatus};
 
@@ -338,8 +338,8 @@ fn rows<const NX: usize, E: Equations<NX>>(
     prediction: &Prediction,
     others: usize,
 ) -> Predicted {
-    let agreements = Agreement::of_outputs(&case.measurements, &prediction.outputs);
-    let weighted: Vec<(Agreement, f64)> =
+    let agreements = OutputAgreement::of_outputs(&case.measurements, &prediction.outputs);
+    let weighted: Vec<(OutputAgreement, f64)> =
         agreements.iter().copied().zip(prediction.weights).collect();
     let named = || task.class.axis.outputs().into_iter().zip(&agreements);
     let whole = theil::theil(&weighted);

@@ -7,7 +7,7 @@ use super::task::Task;
 use crate::aero::{Combined, Output};
 use crate::dynamics::motion::Window;
 use crate::maneuver::Status;
-use crate::output_error::theil::Agreement;
+use crate::output_error::theil::OutputAgreement;
 use crate::output_error::{Fit, Measurements};
 use crate::tables::{AgreementRow, EstimateRow, FitRow, History, HistoryOutput, StartingValues};
 use crate::units::Unit;
@@ -104,9 +104,6 @@ impl<'a> Task<'a> {
     /// Row of `fits`.
     pub(super) fn fit_row(&self, fit: &Fit, left_out: f64, start: StartingValues) -> FitRow {
         FitRow {
-            maneuver_id: self.maneuver.maneuver_id.clone(),
-            class: self.class.name.clone(),
-            outcome: fit.outcome,
             reason: fit.reason.clone(),
             start: Some(start),
             iterations: fit.iterations,
@@ -114,20 +111,16 @@ impl<'a> Task<'a> {
             final_cost: fit.final_cost,
             condition_number: fit.condition_number,
             left_out: Some(left_out),
-            largest_condition_index: None,
-            confounded: None,
-            method: None,
-            gust_ft_s: None,
-            rotary_gust_deg_s: None,
-            gust_corner_rad_s: None,
-            autocorrelation: None,
-            likelihood_gain: None,
-            equation_error_distance: None,
+            ..FitRow::without_numbers(&self.maneuver.maneuver_id, &self.class.name, fit.outcome)
         }
     }
 
     /// Row of an output's agreement with a computed one.
-    pub(super) fn agreement_row(&self, output: Output, agreement: &Agreement) -> AgreementRow {
+    pub(super) fn agreement_row(
+        &self,
+        output: Output,
+        agreement: &OutputAgreement,
+    ) -> AgreementRow {
         let theil = agreement.theil();
         AgreementRow {
             maneuver_id: self.maneuver.maneuver_id.clone(),

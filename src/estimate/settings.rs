@@ -169,7 +169,7 @@ settings! {
         /// End of the iteration of filter error.
         pub filter: scoring::Settings = scoring::Settings::default(),
         /// Limits of the identifiability measures.
-        pub identifiability: identifiability::Limits = identifiability::Limits::default(),
+        pub identifiability: identifiability::CollinearityLimits = identifiability::CollinearityLimits::default(),
         /// Limits beyond which a fit is doubtful.
         pub doubt: DoubtLimits = DoubtLimits::default(),
     }

@@ -3,8 +3,8 @@
 //! Each derivative is a gridded function, with a second function that is 1 where the value is
 //! flight's. The coefficients are sums of them.
 
-use super::contents::{COEFFICIENTS, Contents, terms};
-use super::derivative_table::{DerivativeTable, GridCell};
+use super::export_contents::{COEFFICIENTS, ExportContents, terms};
+use super::export_table::{ExportTable, GridCell};
 use super::xml::{Xml, escaped};
 use crate::aero::{Coefficient, Derivative, Regressor};
 use crate::flight::signal;
@@ -41,7 +41,7 @@ const RATES: [(Regressor, &str, &str); 4] = [
 
 /// The whole document.
 #[must_use]
-pub fn document(contents: &Contents, tables: &[DerivativeTable]) -> String {
+pub fn document(contents: &ExportContents, tables: &[ExportTable]) -> String {
     let mut xml = Xml::new(DECLARATION);
     xml.open("DAVEfunc", &[("xmlns", "http://daveml.org/2010/DAVEML")]);
     header(contents, &mut xml);
@@ -85,7 +85,7 @@ pub fn document(contents: &Contents, tables: &[DerivativeTable]) -> String {
     xml.finish()
 }
 
-fn header(contents: &Contents, xml: &mut Xml) {
+fn header(contents: &ExportContents, xml: &mut Xml) {
     let (settings, a) = (contents.settings, contents.aircraft);
     xml.open("fileHeader", &[("name", contents.title)]);
     xml.empty(
@@ -129,7 +129,7 @@ fn variable(xml: &mut Xml, name: &str, id: &str, units: &str, words: &str, mark:
     xml.close();
 }
 
-fn inputs(contents: &Contents, tables: &[DerivativeTable], xml: &mut Xml) {
+fn inputs(contents: &ExportContents, tables: &[ExportTable], xml: &mut Xml) {
     variable(
         xml,
         "angleOfAttack",
@@ -189,7 +189,7 @@ fn inputs(contents: &Contents, tables: &[DerivativeTable], xml: &mut Xml) {
     }
 }
 
-fn third<'a>(contents: &'a Contents, tables: &[DerivativeTable]) -> Option<&'a str> {
+fn third<'a>(contents: &'a ExportContents, tables: &[ExportTable]) -> Option<&'a str> {
     let depends = tables.iter().any(|t| !t.thirds.is_empty());
     contents
         .tunnel
@@ -202,8 +202,8 @@ fn third<'a>(contents: &'a Contents, tables: &[DerivativeTable]) -> Option<&'a s
 
 /// Writes a coefficient without vanes as the sum of its terms, and the load of its vanes, if any.
 fn coefficients(
-    contents: &Contents,
-    tables: &[DerivativeTable],
+    contents: &ExportContents,
+    tables: &[ExportTable],
     coefficient: Coefficient,
     xml: &mut Xml,
 ) {
@@ -274,11 +274,11 @@ fn factors(regressor: &Regressor, xml: &mut Xml) {
 
 /// Writes the breakpoints of every variable of a table.
 fn breakpoints<'a>(
-    contents: &Contents,
-    tables: &'a [DerivativeTable],
+    contents: &ExportContents,
+    tables: &'a [ExportTable],
 ) -> Vec<(String, &'a [f64], &'static str)> {
     let third = third(contents, tables).is_some();
-    let of = |table: &'a DerivativeTable| {
+    let of = |table: &'a ExportTable| {
         let id = |variable: &str| format!("{}_{variable}", table.derivative);
         let mut all = vec![
             (id("alpha"), table.alphas_deg.as_slice(), "deg"),
@@ -294,7 +294,7 @@ fn breakpoints<'a>(
 
 /// Variables that a table depends on, slowest first: name of the breakpoints, identifier of the
 /// variable.
-fn variables<'a>(table: &DerivativeTable, third: Option<&'a str>) -> Vec<(&'static str, &'a str)> {
+fn variables<'a>(table: &ExportTable, third: Option<&'a str>) -> Vec<(&'static str, &'a str)> {
     let mut variables = Vec::new();
     if !table.thirds.is_empty() {
         variables.push(("third", third.unwrap_or_default()));
@@ -308,7 +308,7 @@ fn variables<'a>(table: &DerivativeTable, third: Option<&'a str>) -> Vec<(&'stat
 
 /// Writes a table's correlations: first the derivatives that name it below their own table, then those
 /// before it with the coefficient.
-fn correlations(contents: &Contents, table: &DerivativeTable, xml: &mut Xml) {
+fn correlations(contents: &ExportContents, table: &ExportTable, xml: &mut Xml) {
     let own = |pair: &&CorrelatedDerivatives| pair.first == table.derivative;
     for pair in contents.correlations.iter().filter(own) {
         xml.empty("correlatesWith", &[("varID", &pair.second)]);
@@ -321,7 +321,7 @@ fn correlations(contents: &Contents, table: &DerivativeTable, xml: &mut Xml) {
     }
 }
 
-fn gridded(contents: &Contents, table: &DerivativeTable, xml: &mut Xml) {
+fn gridded(contents: &ExportContents, table: &ExportTable, xml: &mut Xml) {
     let n = table.alphas_deg.len().max(1);
     let lines = |of: &dyn Fn(&GridCell) -> f64| -> Vec<String> {
         let values: Vec<f64> = table.cells.iter().map(of).collect();
@@ -389,8 +389,8 @@ fn gridded(contents: &Contents, table: &DerivativeTable, xml: &mut Xml) {
 }
 
 fn function(
-    contents: &Contents,
-    table: &DerivativeTable,
+    contents: &ExportContents,
+    table: &ExportTable,
     variable: &str,
     gridded: &str,
     xml: &mut Xml,

@@ -1,7 +1,7 @@
 //! Tables of the export: the posterior, and the tunnel where it has no row.
 
-use super::contents::Contents;
-use super::derivative_table::{DerivativeTable, GridCell, is_same_breakpoint};
+use super::export_contents::ExportContents;
+use super::export_table::{ExportTable, GridCell, is_same_breakpoint};
 use crate::aero::Condition;
 use crate::aero::wind_tunnel::each_or_none;
 use crate::tables::PosteriorRow;
@@ -12,14 +12,14 @@ const MOSTLY: f64 = 50.0;
 /// Tables of all derivatives and combined sums that have a value anywhere, in the order of the
 /// model.
 #[must_use]
-pub fn tables(contents: &Contents) -> Vec<DerivativeTable> {
+pub fn tables(contents: &ExportContents) -> Vec<ExportTable> {
     let derivatives = contents.buildup.derivatives.iter().map(|d| &d.name);
     let names = derivatives.chain(contents.buildup.combined.iter().map(|c| &c.name));
     names.filter_map(|name| contents.table(name)).collect()
 }
 
-impl Contents<'_> {
-    fn table(&self, name: &str) -> Option<DerivativeTable> {
+impl ExportContents<'_> {
+    fn table(&self, name: &str) -> Option<ExportTable> {
         let rows = self.posterior.iter().filter(|row| row.derivative == name);
         let rows: Vec<&PosteriorRow> = rows.collect();
         if rows.is_empty() {
@@ -30,7 +30,7 @@ impl Contents<'_> {
     }
 
     /// Table of the tunnel over its own breakpoints; `None` without one.
-    fn of_tunnel(&self, name: &str) -> Option<DerivativeTable> {
+    fn of_tunnel(&self, name: &str) -> Option<ExportTable> {
         let tunnel = self.tunnel.clamped();
         let (alphas_deg, machs) = (tunnel.alphas_deg(name), tunnel.machs(name));
         let thirds = tunnel.thirds(name);
@@ -59,7 +59,7 @@ impl Contents<'_> {
                 }
             }
         }
-        (!cells.is_empty()).then_some(DerivativeTable {
+        (!cells.is_empty()).then_some(ExportTable {
             derivative: name.to_owned(),
             unit: self.buildup.unit_of(name)?.name().to_owned(),
             alphas_deg,
@@ -71,9 +71,9 @@ impl Contents<'_> {
 }
 
 /// Table of the posterior's rows of one derivative, which are in the order of the cells.
-fn of_posterior(rows: &[&PosteriorRow]) -> DerivativeTable {
+fn of_posterior(rows: &[&PosteriorRow]) -> ExportTable {
     let first = rows[0];
-    DerivativeTable {
+    ExportTable {
         derivative: first.derivative.clone(),
         unit: first.unit.clone(),
         alphas_deg: breakpoints(rows.iter().map(|row| row.alpha_deg)),

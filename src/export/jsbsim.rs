@@ -6,14 +6,14 @@
 //! q, which are p b/2V, r b/2V and q c̄/2V in radians. Vanes are forces in lbf and moments in ft
 //! lbf and are not multiplied by q̄S.
 
-use super::contents::{COEFFICIENTS, Contents, terms};
-use super::derivative_table::DerivativeTable;
+use super::export_contents::{COEFFICIENTS, ExportContents, terms};
+use super::export_table::ExportTable;
 use super::xml::Xml;
 use crate::aero::{Coefficient, Derivative, Regressor};
 
 /// JSBSim's `<aerodynamics>` section.
 #[must_use]
-pub fn section(contents: &Contents, tables: &[DerivativeTable]) -> String {
+pub fn section(contents: &ExportContents, tables: &[ExportTable]) -> String {
     let mut xml = Xml::new("<?xml version=\"1.0\" encoding=\"UTF-8\"?>");
     xml.open("aerodynamics", &[]);
     let a = contents.aircraft;
@@ -70,7 +70,7 @@ fn axis_of(coefficient: Coefficient) -> (&'static str, Option<&'static str>) {
 }
 
 /// Property of a signal.
-fn property(contents: &Contents, signal: &str) -> String {
+fn property(contents: &ExportContents, signal: &str) -> String {
     let given = contents.settings.jsbsim_properties.get(signal);
     given.cloned().unwrap_or_else(|| match signal {
         "altitude_ft" => "position/h-sl-ft".to_owned(),
@@ -83,7 +83,7 @@ fn property(contents: &Contents, signal: &str) -> String {
 }
 
 /// Property of the third variable, if a table depends on one.
-fn third(contents: &Contents, tables: &[DerivativeTable]) -> Option<String> {
+fn third(contents: &ExportContents, tables: &[ExportTable]) -> Option<String> {
     let depends = tables.iter().any(|t| !t.thirds.is_empty());
     let third = contents
         .tunnel
@@ -95,7 +95,7 @@ fn third(contents: &Contents, tables: &[DerivativeTable]) -> Option<String> {
 }
 
 /// Properties that JSBSim itself lacks, each once.
-fn own_properties(contents: &Contents, tables: &[DerivativeTable]) -> Vec<String> {
+fn own_properties(contents: &ExportContents, tables: &[ExportTable]) -> Vec<String> {
     let all = COEFFICIENTS
         .into_iter()
         .flat_map(|c| [false, true].map(|vanes| (c, vanes)));
@@ -130,13 +130,13 @@ impl Factor {
 }
 
 /// Factors of one term: the derivative and its regressor.
-fn factors(contents: &Contents, derivative: &Derivative) -> Vec<Factor> {
+fn factors(contents: &ExportContents, derivative: &Derivative) -> Vec<Factor> {
     let mut factors = vec![Factor::of(format!("aero/harvest/{}", derivative.name))];
     factors.extend(regressor_factors(contents, &derivative.regressor));
     factors
 }
 
-fn regressor_factors(contents: &Contents, regressor: &Regressor) -> Vec<Factor> {
+fn regressor_factors(contents: &ExportContents, regressor: &Regressor) -> Vec<Factor> {
     let all = |properties: &[&str]| properties.iter().map(|p| Factor::of(*p)).collect();
     match regressor {
         Regressor::Constant => vec![],
@@ -164,7 +164,12 @@ fn regressor_factors(contents: &Contents, regressor: &Regressor) -> Vec<Factor> 
     }
 }
 
-fn axis(contents: &Contents, tables: &[DerivativeTable], coefficient: Coefficient, xml: &mut Xml) {
+fn axis(
+    contents: &ExportContents,
+    tables: &[ExportTable],
+    coefficient: Coefficient,
+    xml: &mut Xml,
+) {
     let (name, length) = axis_of(coefficient);
     xml.open("axis", &[("name", name)]);
     let kind = if coefficient.is_moment() {
@@ -221,7 +226,7 @@ fn sum(xml: &mut Xml, products: &[Vec<Factor>]) {
 }
 
 /// Writes the table of one derivative.
-fn function(contents: &Contents, table: &DerivativeTable, xml: &mut Xml) {
+fn function(contents: &ExportContents, table: &ExportTable, xml: &mut Xml) {
     xml.open(
         "function",
         &[("name", &format!("aero/harvest/{}", table.derivative))],

@@ -6,8 +6,8 @@
 //! (`CN_ba = CN_0 + CN_alpha α`), which flight determines best, comes out as flown.
 
 mod settings;
-mod derivative_table;
-mod contents;
+mod export_table;
+mod export_contents;
 mod flight_update;
 mod xml;
 pub mod daveml;
@@ -15,7 +15,7 @@ pub mod jsbsim;
 #[cfg(test)]
 mod tests;
 
-pub use contents::Contents;
-pub use derivative_table::{draw_rows, rows};
+pub use export_contents::ExportContents;
+pub use export_table::{draw_rows, rows};
 pub use flight_update::tables;
 pub use settings::Settings;

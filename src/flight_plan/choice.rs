@@ -32,8 +32,7 @@ const MOST_ROUNDS: usize = 20;
 /// Quantity of which a standard deviation is wanted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Aim {
-    /// Subject, and row of its covariance, of each part.
-    pub parts: Vec<(usize, usize)>,
+    pub parts: Vec<AimPart>,
     pub weight: f64,
     /// Wanted standard deviation; zero where each reduction counts.
     pub wanted: f64,
@@ -41,22 +40,28 @@ pub struct Aim {
     pub point: usize,
 }
 
+/// Part of an aim in one coefficient.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AimPart {
+    /// Place of the coefficient.
+    pub coefficient: usize,
+    /// Row of the coefficient's covariance.
+    pub row: usize,
+}
+
 /// Knowledge of one coefficient, with what the cards observe of it.
 #[derive(Clone, Debug)]
-pub struct Subject {
+pub struct CoefficientKnowledge {
     pub covariance: DMatrix<f64>,
     /// In the order of the cards; `None` for a card that observes nothing of it.
     pub cards: Vec<Option<PlannedRows>>,
 }
 
-/// Variance of an aim's parts, from the covariance of each subject.
-pub fn variance<'c>(
-    parts: &[(usize, usize)],
-    covariance: impl Fn(usize) -> &'c DMatrix<f64>,
-) -> f64 {
+/// Variance of an aim's parts, from the covariance of each coefficient.
+pub fn variance<'c>(parts: &[AimPart], covariance: impl Fn(usize) -> &'c DMatrix<f64>) -> f64 {
     let variances = parts.iter();
     variances
-        .map(|(subject, row)| covariance(*subject)[(*row, *row)])
+        .map(|part| covariance(part.coefficient)[(part.row, part.row)])
         .sum()
 }
 
@@ -93,7 +98,7 @@ impl Budget {
 /// Choice to be made.
 #[derive(Clone, Debug)]
 pub struct CardChoice {
-    pub subjects: Vec<Subject>,
+    pub coefficients: Vec<CoefficientKnowledge>,
     pub aims: Vec<Aim>,
     pub prices: Vec<Price>,
     pub budget: Budget,
@@ -138,10 +143,10 @@ impl<'a> CardSet<'a> {
     /// No card.
     #[must_use]
     pub fn nothing(choice: &'a CardChoice) -> CardSet<'a> {
-        let subjects = choice.subjects.iter();
+        let coefficients = choice.coefficients.iter();
         CardSet {
             choice,
-            covariances: subjects.map(|s| s.covariance.clone()).collect(),
+            covariances: coefficients.map(|c| c.covariance.clone()).collect(),
             times: vec![0; choice.prices.len()],
         }
     }
@@ -160,8 +165,9 @@ impl<'a> CardSet<'a> {
 
     /// Adds a card. One whose noise is not positive definite changes nothing.
     pub fn fly(&mut self, card: usize) {
-        for (subject, covariance) in self.choice.subjects.iter().zip(&mut self.covariances) {
-            let Some((rows, sum)) = predicted(subject, covariance, card) else {
+        for (coefficient, covariance) in self.choice.coefficients.iter().zip(&mut self.covariances)
+        {
+            let Some((rows, sum)) = predicted(coefficient, covariance, card) else {
                 continue;
             };
             let columns = covariance.columns_range(rows.rows.clone()).into_owned();
@@ -174,8 +180,8 @@ impl<'a> CardSet<'a> {
     #[must_use]
     pub fn without(&self, card: usize) -> CardSet<'a> {
         let mut set = self.clone();
-        for (subject, covariance) in self.choice.subjects.iter().zip(&mut set.covariances) {
-            let Some(rows) = &subject.cards[card] else {
+        for (coefficient, covariance) in self.choice.coefficients.iter().zip(&mut set.covariances) {
+            let Some(rows) = &coefficient.cards[card] else {
                 continue;
             };
             let first = rows.rows.start;
@@ -194,7 +200,7 @@ impl<'a> CardSet<'a> {
     #[must_use]
     pub fn worth(&self) -> f64 {
         let aims = self.choice.aims.iter();
-        let before = |subject: usize| &self.choice.subjects[subject].covariance;
+        let before = |coefficient: usize| &self.choice.coefficients[coefficient].covariance;
         aims.map(|aim| aim.worth(variance(&aim.parts, before), self.variance(aim)))
             .sum()
     }
@@ -202,18 +208,18 @@ impl<'a> CardSet<'a> {
     /// Worth that a further card adds, nats.
     #[must_use]
     pub fn gain(&self, card: usize) -> f64 {
-        let both = self.choice.subjects.iter().zip(&self.covariances);
+        let both = self.choice.coefficients.iter().zip(&self.covariances);
         let halves: Vec<Option<DMatrix<f64>>> = both
-            .map(|(subject, covariance)| {
-                let (rows, sum) = predicted(subject, covariance, card)?;
+            .map(|(coefficient, covariance)| {
+                let (rows, sum) = predicted(coefficient, covariance, card)?;
                 let mut halves = covariance.rows_range(rows.rows.clone()).into_owned();
                 solve_lower(sum.l_dirty().as_view(), halves.as_view_mut());
                 Some(halves)
             })
             .collect();
-        let reduction = |(subject, row): &(usize, usize)| {
-            let halves = halves[*subject].as_ref();
-            halves.map_or(0.0, |halves| halves.column(*row).norm_squared())
+        let reduction = |part: &AimPart| {
+            let halves = halves[part.coefficient].as_ref();
+            halves.map_or(0.0, |halves| halves.column(part.row).norm_squared())
         };
         let aims = self.choice.aims.iter();
         aims.map(|aim| {
@@ -225,7 +231,7 @@ impl<'a> CardSet<'a> {
     }
 
     fn variance(&self, aim: &Aim) -> f64 {
-        variance(&aim.parts, |subject| &self.covariances[subject])
+        variance(&aim.parts, |coefficient| &self.covariances[coefficient])
     }
 
     /// Standard deviation of an aim.
@@ -324,13 +330,13 @@ impl Aim {
 }
 
 /// Rows of a card with the covariance of what it will read; `None` where it reads nothing of the
-/// subject.
+/// coefficient.
 fn predicted<'s>(
-    subject: &'s Subject,
+    coefficient: &'s CoefficientKnowledge,
     covariance: &DMatrix<f64>,
     card: usize,
 ) -> Option<(&'s PlannedRows, Cholesky<f64, Dyn>)> {
-    let rows = subject.cards[card].as_ref()?;
+    let rows = coefficient.cards[card].as_ref()?;
     let first = rows.rows.start;
     let own = covariance.view((first, first), rows.noise.shape());
     let sum = Cholesky::new(own + &rows.noise)?;

@@ -35,7 +35,7 @@ pub struct Experience {
 }
 
 impl CampaignHistory<'_> {
-    /// Experience with a class. Of what it has too few maneuvers for, all classes tell.
+    /// Experience with a class; where the class has too few maneuvers, that of the whole campaign.
     #[must_use]
     pub fn of(&self, class: &str) -> Experience {
         let (usable, flown) = self.usable(Some(class));

@@ -7,7 +7,7 @@ use super::goals::{Goal, GoalSubject, Goals};
 use crate::config::{Config, Source};
 use crate::error::{Result, did_you_mean};
 use crate::model::Model;
-use crate::tables::{Airframe, ModelSource, Quantity};
+use crate::tables::{Airframe, FlyingQuality, ModelSource};
 
 /// Reads the goals; without a file each quantity of the posterior is one.
 ///
@@ -76,7 +76,7 @@ fn unknown_derivative(name: &str, model: &Model) -> Option<String> {
 }
 
 /// Reason why the level of a quantity cannot be a goal; `None` where it can.
-fn unknown_level(airframe: Airframe, quantity: Quantity, config: &Config) -> Option<String> {
+fn unknown_level(airframe: Airframe, quantity: FlyingQuality, config: &Config) -> Option<String> {
     let Some(specification) = &config.qualities else {
         return Some(format!(
             "the level of `{quantity}` is decided by the limits of qualities.yaml, which the \

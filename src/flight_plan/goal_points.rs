@@ -8,7 +8,7 @@ use crate::aero::Condition;
 use crate::model::{Model, Point, PointQuantity};
 use crate::proof_of_match::DecisiveDifference;
 use crate::qualities::{self, FlownConditions, judged_quantity};
-use crate::tables::{Airframe, GoalKind, ModelSource, Quantity};
+use crate::tables::{Airframe, FlyingQuality, GoalKind, ModelSource};
 
 /// A goal at one angle of attack.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,7 +59,7 @@ pub type Matches = BTreeMap<usize, (ModelSource, Vec<DecisiveDifference>)>;
 pub struct GoalBasis<'a> {
     pub model: &'a Model,
     /// Qualities whose levels may be goals, with the flown conditions; `None` without a specification.
-    pub qualities: Option<(&'a qualities::Basis<'a>, &'a FlownConditions)>,
+    pub qualities: Option<(&'a qualities::JudgedAircraft<'a>, &'a FlownConditions)>,
     pub matches: &'a Matches,
     /// Lowest and highest angle of attack of the cards.
     pub reach_deg: (f64, f64),
@@ -132,7 +132,7 @@ impl GoalBasis<'_> {
     }
 
     /// Levels of a quantity at the angles of attack at which flying qualities are judged.
-    fn levels(&self, goal: &Goal, airframe: Airframe, quantity: Quantity) -> Vec<GoalPoint> {
+    fn levels(&self, goal: &Goal, airframe: Airframe, quantity: FlyingQuality) -> Vec<GoalPoint> {
         let Some((basis, conditions)) = self.qualities else {
             return vec![];
         };
@@ -140,7 +140,7 @@ impl GoalBasis<'_> {
         let alphas = qualities::angles_deg(self.model).into_iter();
         let inside = alphas.filter(|alpha| (from..=to).contains(alpha));
         let points = inside.filter_map(|alpha_deg| {
-            let own = judged_quantity(basis, conditions, (airframe, quantity), alpha_deg)?;
+            let own = judged_quantity(basis, conditions, airframe, quantity, alpha_deg)?;
             Some(GoalPoint {
                 point: Point {
                     quantity: PointQuantity::Combination(own.slopes),

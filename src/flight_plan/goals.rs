@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::tables::{Airframe, ModelSource, Quantity};
+use crate::tables::{Airframe, FlyingQuality, ModelSource};
 
 /// A file of goals.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -22,7 +22,7 @@ pub struct Goal {
     pub derivative: Option<String>,
     /// Quantity of a mode whose level is to be decided.
     #[serde(default)]
-    pub quantity: Option<Quantity>,
+    pub quantity: Option<FlyingQuality>,
     /// Airframe of the quantity; bare unless given.
     #[serde(default)]
     pub airframe: Option<Airframe>,
@@ -50,7 +50,7 @@ pub struct Goal {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum GoalSubject<'a> {
     Derivative(&'a str),
-    Level(Airframe, Quantity),
+    Level(Airframe, FlyingQuality),
     /// Class, and simulator unless it is the first.
     Match(&'a str, Option<ModelSource>),
 }
@@ -82,7 +82,7 @@ impl Goal {
     /// Name by which messages point at the goal.
     #[must_use]
     pub fn name(&self) -> &str {
-        let quantity = self.quantity.map(Quantity::name);
+        let quantity = self.quantity.map(FlyingQuality::name);
         let name = self.derivative.as_deref().or(quantity);
         name.or(self.class.as_deref()).unwrap_or("goals")
     }

@@ -11,7 +11,7 @@ use crate::config::Config;
 use crate::lab::campaign::{FlightLimits, NextFlight};
 use crate::numerics::order_statistics::median;
 use crate::report::{angle, count, fixed, symbol, unit, well_formed};
-use crate::tables::{GoalKind, NextCardRow, NextGoalRow, Quantity};
+use crate::tables::{FlyingQuality, GoalKind, NextCardRow, NextGoalRow};
 
 /// Most goals on the sheet: those that gain most.
 const MOST_GOALS: usize = 14;
@@ -223,7 +223,7 @@ fn goal_line((kind, goal, of): GoalKey, rows: &[&NextGoalRow]) -> GoalLine {
 
 /// Name of a goal: symbol of a derivative, words of a quantity, class of a match.
 fn goal_symbol(goal: &str) -> String {
-    match Quantity::from_word(goal) {
+    match FlyingQuality::from_word(goal) {
         Some(quantity) => symbol(&quantity.name().replace('_', " ")),
         None => symbol(goal),
     }

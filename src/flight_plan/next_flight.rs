@@ -12,7 +12,7 @@ use super::goal_file;
 use super::goal_points::{GoalBasis, Matches};
 use super::goals::{Goal, GoalSubject};
 use super::kneeboard;
-use super::plan::{Plan, Rehearsal, Tonight, plan};
+use super::plan::{CampaignState, Plan, Rehearsal, plan};
 use super::rehearsal::{self, RehearsalBasis};
 use crate::config::Config;
 use crate::error::{Error, Problem, Result};
@@ -68,7 +68,7 @@ pub fn plan_next_flight(
     let campaign = conductor.campaign(Stage::Model)?;
     let goals = goal_file::read(request.goals, config, &campaign.model)?;
     let specification = config.qualities.as_ref();
-    let qualities = specification.map(|specification| qualities::Basis {
+    let qualities = specification.map(|specification| qualities::JudgedAircraft {
         model: &campaign.model,
         aircraft: &config.aircraft,
         buildup: &config.buildup,
@@ -87,7 +87,7 @@ pub fn plan_next_flight(
     goal_file::check_reached(request.goals, &goals, &reached)?;
     let rehearsals = rehearse(config, &cards, &campaign, progress)?;
     let flown = evidence(&campaign);
-    let tonight = Tonight {
+    let state = CampaignState {
         model: &campaign.model,
         evidence: &flown,
         history: CampaignHistory {
@@ -104,7 +104,7 @@ pub fn plan_next_flight(
     };
     let next = &cards.cards.next;
     let budget = Budget::of(next, request.minutes);
-    let plan = plan(&tonight, &rehearsals, &goals, budget);
+    let plan = plan(&state, &rehearsals, &goals, budget);
     let page = kneeboard::page(config, &plan, request.minutes, next)
         .map_err(|what| Error::store(&folder.join(PAGE), &what))?;
     let shelf = shelf_of_stage(folder, &campaign_lineage(&conductor), Stage::Model);
@@ -187,7 +187,7 @@ fn rehearse(
     let rehearse = |candidate: Candidate| {
         let result = basis.rehearse(&candidate);
         progress.advance(&candidate.card.class);
-        (candidate, result)
+        Rehearsal { candidate, result }
     };
     let rehearsals = all.into_par_iter().map(rehearse).collect();
     progress.end();

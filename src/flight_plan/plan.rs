@@ -1,7 +1,9 @@
 //! Plan of the next flight: candidates and goals to a choice, and the choice to the rows of the tables.
 
 use super::candidate::{Candidate, reach_deg};
-use super::choice::{Aim, Budget, CardChoice, CardSet, Price, Subject, variance};
+use super::choice::{
+    Aim, AimPart, Budget, CardChoice, CardSet, CoefficientKnowledge, Price, variance,
+};
 use super::experience::{CampaignHistory, noise_factors, with_noise};
 use super::goal_points::{GoalBasis, GoalPoint, Matches, Target};
 use super::goals::Goal;
@@ -15,9 +17,9 @@ use crate::tables::{NextCardRow, NextGoalRow};
 /// Number of goals that a card's row names.
 const NAMED_GOALS: usize = 3;
 
-/// The campaign as a plan takes it.
+/// Posterior, history and model of a campaign, from which the next flight is planned.
 #[derive(Clone, Copy, Debug)]
-pub struct Tonight<'a> {
+pub struct CampaignState<'a> {
     pub model: &'a Model,
     pub evidence: &'a [Evidence<'a>],
     pub history: CampaignHistory<'a>,
@@ -25,15 +27,23 @@ pub struct Tonight<'a> {
     pub tunnel: &'a WindTunnel,
     pub settings: &'a model::Settings,
     /// Flying qualities whose levels may be goals, with the flown conditions.
-    pub qualities: Option<(&'a qualities::Basis<'a>, &'a FlownConditions)>,
+    pub qualities: Option<(&'a qualities::JudgedAircraft<'a>, &'a FlownConditions)>,
     pub matches: &'a Matches,
 }
 
 /// A candidate with its rehearsal, or the reason why it is refused.
-pub type Rehearsal = (Candidate, Result<Rehearsed, String>);
+#[derive(Debug)]
+pub struct Rehearsal {
+    pub candidate: Candidate,
+    pub result: Result<Rehearsed, String>,
+}
 
 /// A candidate that is not refused.
-type Kept<'a> = (&'a Candidate, &'a Rehearsed);
+#[derive(Clone, Copy)]
+struct KeptCard<'a> {
+    candidate: &'a Candidate,
+    rehearsed: &'a Rehearsed,
+}
 
 /// Rows of the next flight.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -56,32 +66,42 @@ impl Plan {
 
 /// Plans the next flight.
 #[must_use]
-pub fn plan(tonight: &Tonight, rehearsals: &[Rehearsal], goals: &[Goal], budget: Budget) -> Plan {
-    let kept: Vec<Kept> = rehearsals
+pub fn plan(
+    state: &CampaignState,
+    rehearsals: &[Rehearsal],
+    goals: &[Goal],
+    budget: Budget,
+) -> Plan {
+    let kept: Vec<KeptCard> = rehearsals
         .iter()
-        .filter_map(|(candidate, result)| Some((candidate, result.as_ref().ok()?)))
+        .filter_map(|rehearsal| {
+            Some(KeptCard {
+                candidate: &rehearsal.candidate,
+                rehearsed: rehearsal.result.as_ref().ok()?,
+            })
+        })
         .collect();
-    let points = goal_points(tonight, &kept, goals);
-    let outlooks = outlooks(tonight, &kept, &points);
+    let points = goal_points(state, &kept, goals);
+    let outlooks = outlooks(state, &kept, &points);
     let choice = CardChoice {
         aims: aims(&outlooks, &points),
-        subjects: subjects(tonight, &kept, outlooks),
-        prices: kept.iter().map(|(candidate, _)| price(candidate)).collect(),
+        coefficients: knowledge(state, &kept, outlooks),
+        prices: kept.iter().map(|card| price(card.candidate)).collect(),
         budget,
     };
     let flown = choice.choose();
     let rows = Rows {
-        tonight,
+        state,
         kept: &kept,
         points: &points,
         choice: &choice,
         flown: &flown,
     };
-    let refused = rehearsals.iter().filter_map(|(candidate, result)| {
-        let reason = result.as_ref().err()?;
+    let refused = rehearsals.iter().filter_map(|rehearsal| {
+        let reason = rehearsal.result.as_ref().err()?;
         Some(NextCardRow {
             refused: reason.clone(),
-            ..rows.of_candidate(candidate)
+            ..rows.of_candidate(&rehearsal.candidate)
         })
     });
     Plan {
@@ -100,23 +120,23 @@ fn price(candidate: &Candidate) -> Price {
 }
 
 /// Goals at each of their angles of attack.
-fn goal_points(tonight: &Tonight, kept: &[Kept], goals: &[Goal]) -> Vec<GoalPoint> {
+fn goal_points(state: &CampaignState, kept: &[KeptCard], goals: &[Goal]) -> Vec<GoalPoint> {
     let basis = GoalBasis {
-        model: tonight.model,
-        qualities: tonight.qualities,
-        matches: tonight.matches,
-        reach_deg: reach_deg(kept.iter().map(|(candidate, _)| *candidate)),
+        model: state.model,
+        qualities: state.qualities,
+        matches: state.matches,
+        reach_deg: reach_deg(kept.iter().map(|card| card.candidate)),
     };
-    basis.points(goals, &|alpha_deg| condition(tonight, kept, alpha_deg))
+    basis.points(goals, &|alpha_deg| condition(state, kept, alpha_deg))
 }
 
 /// Flight condition at an angle of attack: that of the nearest card; `None` without cards.
-fn condition(tonight: &Tonight, kept: &[Kept], alpha_deg: f64) -> Option<Condition> {
-    let distance = |(candidate, _): &&Kept| (candidate.card.alpha_deg - alpha_deg).abs();
+fn condition(state: &CampaignState, kept: &[KeptCard], alpha_deg: f64) -> Option<Condition> {
+    let distance = |kept: &&KeptCard| (kept.candidate.card.alpha_deg - alpha_deg).abs();
     let nearest = kept
         .iter()
         .min_by(|a, b| distance(a).total_cmp(&distance(b)));
-    let condition = nearest?.1.maneuver.condition(tonight.tunnel);
+    let condition = nearest?.rehearsed.maneuver.condition(state.tunnel);
     Some(Condition {
         alpha_deg,
         ..condition
@@ -125,11 +145,11 @@ fn condition(tonight: &Tonight, kept: &[Kept], alpha_deg: f64) -> Option<Conditi
 
 /// Outlook of each coefficient on the cards, with the noise of the campaign's maneuvers, and on the
 /// goals.
-fn outlooks(tonight: &Tonight, kept: &[Kept], points: &[GoalPoint]) -> Vec<Outlook> {
-    let covariances = covariances(tonight, kept);
+fn outlooks(state: &CampaignState, kept: &[KeptCard], points: &[GoalPoint]) -> Vec<Outlook> {
+    let covariances = covariances(state, kept);
     let planned = kept.iter().zip(&covariances);
     let planned: Vec<Evidence> = planned
-        .filter_map(|((_, rehearsed), covariance)| {
+        .filter_map(|(KeptCard { rehearsed, .. }, covariance)| {
             Some(Evidence {
                 maneuver: &rehearsed.maneuver,
                 estimates: &rehearsed.estimated.estimates,
@@ -139,27 +159,27 @@ fn outlooks(tonight: &Tonight, kept: &[Kept], points: &[GoalPoint]) -> Vec<Outlo
         })
         .collect();
     let asked: Vec<Point> = points.iter().map(|p| p.point.clone()).collect();
-    tonight.model.outlook(
-        (tonight.evidence, &planned),
+    state.model.outlook(
+        (state.evidence, &planned),
         &asked,
-        (tonight.buildup, tonight.tunnel),
-        tonight.settings,
+        (state.buildup, state.tunnel),
+        state.settings,
     )
 }
 
 /// Aims of the goals: each has a part in every coefficient whose outlook has a row of it.
 fn aims(outlooks: &[Outlook], points: &[GoalPoint]) -> Vec<Aim> {
-    let mut parts: Vec<Vec<(usize, usize)>> = vec![vec![]; points.len()];
-    for (subject, outlook) in outlooks.iter().enumerate() {
-        for (point, row) in &outlook.points {
-            parts[*point].push((subject, *row));
+    let mut parts: Vec<Vec<AimPart>> = vec![vec![]; points.len()];
+    for (coefficient, outlook) in outlooks.iter().enumerate() {
+        for &(point, row) in &outlook.points {
+            parts[point].push(AimPart { coefficient, row });
         }
     }
     let all = points.iter().zip(parts).enumerate();
     let known = all.filter(|(_, (_, parts))| !parts.is_empty());
     known
         .map(|(point, (goal, parts))| {
-            let before = variance(&parts, |subject| &outlooks[subject].covariance);
+            let before = variance(&parts, |coefficient| &outlooks[coefficient].covariance);
             let before = before.max(0.0).sqrt();
             Aim {
                 parts,
@@ -171,39 +191,43 @@ fn aims(outlooks: &[Outlook], points: &[GoalPoint]) -> Vec<Aim> {
         .collect()
 }
 
-/// Knowledge of each coefficient. A card that is usable, and weighs, by a share has that share of its
-/// information: its noise is so much larger.
-fn subjects(tonight: &Tonight, kept: &[Kept], outlooks: Vec<Outlook>) -> Vec<Subject> {
-    let share = |(candidate, _): &Kept| {
-        let experience = tonight.history.of(&candidate.card.class);
+/// Knowledge of each coefficient. Experience with a card's class tells which share of its information is
+/// expected: the noise of its rows is divided by that share.
+fn knowledge(
+    state: &CampaignState,
+    kept: &[KeptCard],
+    outlooks: Vec<Outlook>,
+) -> Vec<CoefficientKnowledge> {
+    let share = |kept: &KeptCard| {
+        let experience = state.history.of(&kept.candidate.card.class);
         experience.usable * experience.weight
     };
     let shares: Vec<f64> = kept.iter().map(share).collect();
-    let subject = |outlook: Outlook| {
+    let of_coefficient = |outlook: Outlook| {
         let mut cards = outlook.planned;
         for (card, share) in cards.iter_mut().zip(&shares) {
             if let Some(card) = card {
                 card.noise /= *share;
             }
         }
-        Subject {
+        CoefficientKnowledge {
             covariance: outlook.covariance,
             cards,
         }
     };
-    outlooks.into_iter().map(subject).collect()
+    outlooks.into_iter().map(of_coefficient).collect()
 }
 
 /// Covariance of each card, with the noise of the campaign's maneuvers of its class.
-fn covariances(tonight: &Tonight, kept: &[Kept]) -> Vec<Option<Covariance>> {
-    let simulated = kept.iter().filter_map(|(candidate, rehearsed)| {
-        let covariance = rehearsed.estimated.covariance.as_ref()?;
-        Some((candidate.card.class.as_str(), covariance))
+fn covariances(state: &CampaignState, kept: &[KeptCard]) -> Vec<Option<Covariance>> {
+    let simulated = kept.iter().filter_map(|kept| {
+        let covariance = kept.rehearsed.estimated.covariance.as_ref()?;
+        Some((kept.candidate.card.class.as_str(), covariance))
     });
-    let factors = noise_factors(&tonight.history, simulated);
-    let own = kept.iter().map(|(candidate, rehearsed)| {
-        let factor = factors.get(candidate.card.class.as_str());
-        let covariance = rehearsed.estimated.covariance.as_ref()?;
+    let factors = noise_factors(&state.history, simulated);
+    let own = kept.iter().map(|kept| {
+        let factor = factors.get(kept.candidate.card.class.as_str());
+        let covariance = kept.rehearsed.estimated.covariance.as_ref()?;
         Some(with_noise(covariance, factor.copied().unwrap_or(1.0)))
     });
     own.collect()
@@ -211,8 +235,8 @@ fn covariances(tonight: &Tonight, kept: &[Kept]) -> Vec<Option<Covariance>> {
 
 /// Choice as rows of the tables.
 struct Rows<'a> {
-    tonight: &'a Tonight<'a>,
-    kept: &'a [Kept<'a>],
+    state: &'a CampaignState<'a>,
+    kept: &'a [KeptCard<'a>],
     points: &'a [GoalPoint],
     choice: &'a CardChoice,
     flown: &'a CardSet<'a>,
@@ -224,7 +248,7 @@ impl Rows<'_> {
         let all = 0..self.kept.len();
         let (mut flown, mut others): (Vec<usize>, Vec<usize>) =
             all.partition(|card| self.flown.times[*card] > 0);
-        let key = |card: &usize| &self.kept[*card].0.card;
+        let key = |card: &usize| &self.kept[*card].candidate.card;
         flown.sort_by(|a, b| {
             let by_alpha = key(a).alpha_deg.total_cmp(&key(b).alpha_deg);
             by_alpha.then_with(|| key(a).class.cmp(&key(b).class))
@@ -242,7 +266,10 @@ impl Rows<'_> {
     }
 
     fn card(&self, card: usize, nothing: &CardSet) -> NextCardRow {
-        let (candidate, rehearsed) = self.kept[card];
+        let KeptCard {
+            candidate,
+            rehearsed,
+        } = self.kept[card];
         let information = nothing.gain(card);
         let extremes = rehearsed.extremes;
         NextCardRow {
@@ -270,7 +297,7 @@ impl Rows<'_> {
             scale: candidate.scale,
             altitude_ft: card.altitude_ft,
             minutes: candidate.minutes,
-            usable_pct: 100.0 * self.tonight.history.of(&card.class).usable,
+            usable_pct: 100.0 * self.state.history.of(&card.class).usable,
             information: None,
             information_per_minute: None,
             loss_without: None,
@@ -319,15 +346,15 @@ impl Rows<'_> {
     fn goals(&self) -> Vec<NextGoalRow> {
         let nothing = CardSet::nothing(self.choice);
         let row = |aim: &Aim| {
-            let deviations = (nothing.deviation(aim), self.flown.deviation(aim));
-            goal_row(&self.points[aim.point], aim.wanted, deviations)
+            let (before, after) = (nothing.deviation(aim), self.flown.deviation(aim));
+            goal_row(&self.points[aim.point], aim.wanted, before, after)
         };
         self.choice.aims.iter().map(row).collect()
     }
 }
 
 /// Row of a goal with its standard deviations before and after the flight.
-fn goal_row(goal: &GoalPoint, wanted: f64, (before, after): (f64, f64)) -> NextGoalRow {
+fn goal_row(goal: &GoalPoint, wanted: f64, before: f64, after: f64) -> NextGoalRow {
     let decision = match &goal.target {
         Target::Bound(_) => None,
         Target::Decision(decision) => Some(decision),

@@ -404,7 +404,8 @@ fn relation_problem(
     refusal.into_problem(flight_id)
 }
 
-/// Stand-ins of faulty channels that no flight needs; none where the report refuses the stretch.
+/// Faulty channels that a flight can do without, each with its stand-in; none where the report refuses the
+/// stretch.
 fn left_out(report: &FaultReport, faulty: &[FaultyChannel]) -> Vec<(String, StandIn)> {
     if report.required {
         return Vec::new();

@@ -12,7 +12,7 @@ use super::posterior::{Gaussian, gaussian, information, of_differences, reweight
 use super::scale_prior::Scale;
 use super::scales::{centres, most_probable};
 use super::self_check::{self, Agreement};
-use super::term::{Basis, Term};
+use super::term::{Term, TermSources};
 use super::touched::Touched;
 use super::unknowns::Unknowns;
 use crate::aero::WindTunnel;
@@ -52,7 +52,7 @@ impl CoefficientPosterior {
     pub fn of(
         terms: Vec<Term>,
         evidence: &[Evidence],
-        basis: &Basis,
+        basis: &TermSources,
     ) -> Option<CoefficientPosterior> {
         let mut data = Data::new(&terms, evidence, basis);
         let mut weights = vec![1.0; evidence.len()];
@@ -96,7 +96,7 @@ pub struct Data {
 impl Data {
     /// Collects the evidence about a coefficient's terms.
     #[must_use]
-    pub fn new(terms: &[Term], evidence: &[Evidence], basis: &Basis) -> Data {
+    pub fn new(terms: &[Term], evidence: &[Evidence], basis: &TermSources) -> Data {
         Data::with_planned(terms, evidence, &[], basis).0
     }
 
@@ -107,7 +107,7 @@ impl Data {
         terms: &[Term],
         evidence: &[Evidence],
         planned: &[Evidence],
-        basis: &Basis,
+        basis: &TermSources,
     ) -> (Data, Vec<Option<(usize, Observation)>>) {
         let mut classes: BTreeMap<String, usize> = BTreeMap::new();
         let mut observe = |own: &Evidence| {

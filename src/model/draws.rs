@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::campaign_model::Model;
 use super::coefficient::CoefficientPosterior;
-use super::published::Quantity;
+use super::published::PublishedDerivative;
 use crate::numerics::random::RandomStream;
 use crate::numerics::root::{EXACT, root};
 use crate::tables::PosteriorRow;
@@ -31,7 +31,7 @@ pub struct Sampler<'a> {
 /// Differences of one coefficient: mean + root · normal deviates.
 #[derive(Clone, Debug)]
 struct CoefficientSampler {
-    quantities: Vec<Quantity>,
+    quantities: Vec<PublishedDerivative>,
     mean: DVector<f64>,
     root: DMatrix<f64>,
 }

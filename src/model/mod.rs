@@ -42,7 +42,7 @@ use rayon::prelude::*;
 use crate::aero::{Axis, Buildup, Coefficient, WindTunnel};
 use coefficient::CoefficientPosterior;
 use evidence::in_order;
-use term::Basis;
+use term::TermSources;
 
 pub use campaign_model::{Failure, MOST_POINTS, Model};
 pub use draws::CorrelatedDerivatives;
@@ -63,7 +63,7 @@ pub fn model(
 ) -> Model {
     let evidence = in_order(evidence);
     let tunnel = tunnel.clamped();
-    let basis = Basis {
+    let basis = TermSources {
         buildup,
         tunnel: &tunnel,
         settings,

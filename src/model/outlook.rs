@@ -21,7 +21,7 @@ use super::local::{LocalValue, local_shares};
 use super::observation::Observation;
 use super::posterior::{gaussian, information};
 use super::settings::Settings;
-use super::term::{Basis, Term, between_points};
+use super::term::{Term, TermSources, between_points};
 use super::unknowns::{SparseRow, Unknowns, between, is_of_campaign};
 use crate::aero::{Buildup, Condition, WindTunnel};
 use crate::numerics::root::EXACT;
@@ -77,7 +77,7 @@ impl Model {
     ) -> Vec<Outlook> {
         let evidence = in_order(evidence);
         let tunnel = tunnel.clamped();
-        let basis = Basis {
+        let basis = TermSources {
             buildup,
             tunnel: &tunnel,
             settings,
@@ -113,7 +113,7 @@ impl CoefficientPosterior {
         &self,
         (evidence, planned): (&[Evidence], &[Evidence]),
         points: &[Point],
-        basis: &Basis,
+        basis: &TermSources,
     ) -> Option<Outlook> {
         let (mut data, observed) = Data::with_planned(&self.terms, evidence, planned, basis);
         data.set_between(&self.terms, &self.noise_scales);

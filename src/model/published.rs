@@ -10,7 +10,7 @@ use crate::tables::Knowledge;
 
 /// A published derivative or sum over the points of its grid: tunnel + rows · differences.
 #[derive(Clone, Debug)]
-pub struct Quantity {
+pub struct PublishedDerivative {
     pub name: String,
     pub unit: &'static str,
     pub nodes: Vec<Node>,
@@ -26,7 +26,7 @@ pub struct Quantity {
 impl CoefficientPosterior {
     /// Published quantities: each term, and after a sum its constant.
     #[must_use]
-    pub fn quantities(&self) -> Vec<Quantity> {
+    pub fn quantities(&self) -> Vec<PublishedDerivative> {
         let mut quantities = Vec::new();
         for (i, term) in self.terms.iter().enumerate() {
             quantities.push(self.of_term(i, term));
@@ -35,9 +35,9 @@ impl CoefficientPosterior {
         quantities
     }
 
-    fn of_term(&self, i: usize, term: &Term) -> Quantity {
+    fn of_term(&self, i: usize, term: &Term) -> PublishedDerivative {
         let start = self.unknowns.starts[i];
-        Quantity {
+        PublishedDerivative {
             name: term.prior.name.clone(),
             unit: term.unit,
             nodes: term.prior.grid.nodes(),
@@ -51,7 +51,7 @@ impl CoefficientPosterior {
     }
 
     /// Constant of a sum: the sum less the slope times α.
-    fn constant(&self, i: usize, term: &Term) -> Option<Quantity> {
+    fn constant(&self, i: usize, term: &Term) -> Option<PublishedDerivative> {
         let slope = term.slope.as_ref()?;
         let j = self.terms.iter().position(|t| t.derivative == *slope)?;
         let slope = &self.terms[j].prior;
@@ -70,13 +70,17 @@ impl CoefficientPosterior {
 
     /// Value of a quantity at each of its points.
     #[must_use]
-    pub fn values(&self, quantity: &Quantity) -> Vec<f64> {
+    pub fn values(&self, quantity: &PublishedDerivative) -> Vec<f64> {
         quantity.values(&self.gaussian.mean)
     }
 
     /// Mean over the points of the correlation of two quantities on one grid.
     #[must_use]
-    pub fn mean_correlation(&self, first: &Quantity, second: &Quantity) -> f64 {
+    pub fn mean_correlation(
+        &self,
+        first: &PublishedDerivative,
+        second: &PublishedDerivative,
+    ) -> f64 {
         let covariance = &self.gaussian.covariance;
         let correlation = |(a, b): (&SparseRow, &SparseRow)| {
             let variances = between(a, a, covariance) * between(b, b, covariance);
@@ -101,7 +105,7 @@ impl CoefficientPosterior {
     }
 }
 
-impl Quantity {
+impl PublishedDerivative {
     /// Value at each point, of given differences from the tunnel.
     #[must_use]
     pub fn values(&self, differences: &DVector<f64>) -> Vec<f64> {

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::coefficient::CoefficientPosterior;
 use super::evidence::Evidence;
 use super::posterior::prior;
-use super::published::Quantity;
+use super::published::PublishedDerivative;
 use super::self_check::Agreement;
 use super::unknowns::between;
 use crate::aero::Coefficient;
@@ -56,7 +56,7 @@ impl CoefficientPosterior {
 
     fn posterior(
         &self,
-        quantity: &Quantity,
+        quantity: &PublishedDerivative,
         before: &DMatrix<f64>,
         alphas_deg: &[f64],
     ) -> Vec<PosteriorRow> {

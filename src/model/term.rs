@@ -46,14 +46,14 @@ pub fn between_points(
 
 /// Data from which the terms follow.
 #[derive(Clone, Copy, Debug)]
-pub struct Basis<'a> {
+pub struct TermSources<'a> {
     pub buildup: &'a Buildup,
     /// Tunnel, constant beyond its ends.
     pub tunnel: &'a WindTunnel,
     pub settings: &'a Settings,
 }
 
-impl Basis<'_> {
+impl TermSources<'_> {
     /// Terms of a coefficient, in the order of the model.
     #[must_use]
     pub fn terms(&self, coefficient: Coefficient, evidence: &[Evidence]) -> Vec<Term> {

@@ -7,7 +7,7 @@ use super::campaign_lineage::campaign_lineage;
 use super::table_metadata::shelf_of_stage;
 use crate::config::Config;
 use crate::error::{Problem, Result};
-use crate::export::{self, Contents, daveml, jsbsim};
+use crate::export::{self, ExportContents, daveml, jsbsim};
 use crate::lineage::Stage;
 use crate::numerics::random::RandomStream;
 use crate::pipeline::{Campaign, Conductor, Progress};
@@ -52,7 +52,7 @@ pub fn export(
     let campaign = conductor.campaign(Stage::Model)?;
     let shelf = shelf_of_stage(folder, &campaign_lineage(&conductor), Stage::Model);
     let correlations = campaign.model.correlations();
-    let contents = Contents {
+    let contents = ExportContents {
         title: &config.title,
         aircraft: &config.aircraft,
         buildup: &config.buildup,
@@ -72,7 +72,7 @@ pub fn export(
 
 /// Writes the models drawn: one table of all, and a JSBSim section of each.
 fn write_draws(
-    contents: &Contents,
+    contents: &ExportContents,
     campaign: &Campaign,
     folder: &Path,
     shelf: &Shelf,
@@ -86,7 +86,7 @@ fn write_draws(
     let mut stream = RandomStream::new(draws.seed, "draws");
     for draw in 1..=draws.number {
         let posterior = sampler.draw(&mut stream);
-        let drawn = Contents {
+        let drawn = ExportContents {
             posterior: &posterior,
             ..*contents
         };
@@ -101,7 +101,7 @@ fn write_draws(
 }
 
 fn write(
-    contents: &Contents,
+    contents: &ExportContents,
     campaign: &Campaign,
     folder: &Path,
     shelf: &Shelf,

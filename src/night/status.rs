@@ -41,7 +41,7 @@ impl StageStatus {
 
 /// Status of a pipeline.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Status {
+pub struct NightStatus {
     /// Name of the current night.
     pub night: Option<String>,
     /// Name of the current night, if its manifest is missing or damaged.
@@ -51,7 +51,7 @@ pub struct Status {
     pub in_work: InWork,
 }
 
-impl Status {
+impl NightStatus {
     #[must_use]
     pub fn is_fresh(&self) -> bool {
         self.stages.iter().all(|s| s.stale.is_empty())
@@ -67,7 +67,7 @@ impl Status {
 ///
 /// # Errors
 /// There is no archive.
-pub fn status(config: &Config, progress: &dyn Progress) -> Result<Status> {
+pub fn status(config: &Config, progress: &dyn Progress) -> Result<NightStatus> {
     let conductor = Conductor::look(config, progress)?;
     let mut campaign = conductor.campaign(Stage::Estimate)?;
     let comparison = Comparison {
@@ -98,7 +98,7 @@ pub fn status(config: &Config, progress: &dyn Progress) -> Result<Status> {
         let is_upstream_stale = stages.iter().any(|s| !s.stale.is_empty());
         stages.push(comparison.whole_stage(stage, &config.name, is_upstream_stale));
     }
-    Ok(Status {
+    Ok(NightStatus {
         night: comparison.current.map(|night| night.name),
         damaged_night: Nights::look(&config.reports).damaged_current(),
         stages,

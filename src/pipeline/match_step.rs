@@ -19,7 +19,7 @@ use crate::flight::Correction;
 use crate::maneuver::{Maneuver, Means};
 use crate::model::Model;
 use crate::proof_of_match::{
-    self, Basis, DecisiveDifference, Flown, Matched, OwnEstimates, Specification,
+    self, DecisiveDifference, Flown, Matched, OwnEstimates, ProofInputs, Specification,
 };
 use crate::store::{ArtefactName, Fingerprint, Kind};
 use crate::surfaces::DelayCorrection;
@@ -45,7 +45,7 @@ pub struct MatchKey<'a> {
 
 /// Proof of match of one maneuver.
 pub struct MatchStep<'a> {
-    basis: &'a Basis<'a>,
+    basis: &'a ProofInputs<'a>,
     posterior: &'a Model,
     derivatives: &'a str,
     record: &'a LazyRecord<'a>,
@@ -209,8 +209,12 @@ impl Databases {
         }
     }
 
-    fn basis<'a>(&'a self, config: &'a Config, specification: &'a Specification) -> Basis<'a> {
-        Basis {
+    fn basis<'a>(
+        &'a self,
+        config: &'a Config,
+        specification: &'a Specification,
+    ) -> ProofInputs<'a> {
+        ProofInputs {
             aircraft: &config.aircraft,
             buildup: &config.buildup,
             models: &self.models,

@@ -5,7 +5,7 @@ use super::problems::problem;
 use crate::config::Config;
 use crate::error::ProblemStage;
 use crate::maneuver::{Maneuver, Means};
-use crate::qualities::{self, Basis};
+use crate::qualities::{self, JudgedAircraft};
 
 /// Version of the flying qualities.
 pub const QUALITIES_VERSION: u32 = 2;
@@ -16,7 +16,7 @@ pub fn judge_qualities(config: &Config, campaign: &mut Campaign) {
         return;
     };
     let flown = flown_means(campaign);
-    let basis = Basis {
+    let basis = JudgedAircraft {
         model: &campaign.model,
         aircraft: &config.aircraft,
         buildup: &config.buildup,

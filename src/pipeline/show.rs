@@ -27,7 +27,7 @@ const MARGIN_S: f64 = 30.0;
 
 /// Flight or maneuver to draw.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Subject {
+pub enum ChartSubject {
     /// By its `flight_id`.
     Flight(String),
     /// By its `maneuver_id`.
@@ -50,19 +50,19 @@ pub struct Picture {
 /// name.
 pub fn show(
     config: &Config,
-    subject: &Subject,
+    subject: &ChartSubject,
     out: Option<&Path>,
     progress: &dyn Progress,
 ) -> Result<Picture> {
     let conductor = Conductor::open(config, Duration::ZERO, progress)?;
     let (id, svg, problems) = match subject {
-        Subject::Flight(id) => {
+        ChartSubject::Flight(id) => {
             check_flight(&conductor, id)?;
             let campaign = conductor.campaign(Stage::Segment)?;
             let chart = draw_flight(&conductor, &campaign, id)?;
             (id, chart, problems_of(&campaign, |p| p.flight_id == *id))
         }
-        Subject::Maneuver(id) => {
+        ChartSubject::Maneuver(id) => {
             let mut campaign = conductor.campaign(Stage::Segment)?;
             check_maneuver(config, id, &campaign)?;
             conductor.estimate(&mut campaign)?;

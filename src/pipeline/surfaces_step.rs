@@ -19,7 +19,7 @@ use crate::lineage::Stage;
 use crate::maneuver::Maneuver;
 use crate::recorder::{self, ErrorSeries};
 use crate::store::{ArtefactName, Kind, Store};
-use crate::surfaces::{self, Basis, FlightEvidence};
+use crate::surfaces::{self, AircraftModel, FlightEvidence};
 
 /// Everything that decides a stretch's evidence on its surfaces.
 #[derive(Serialize)]
@@ -65,7 +65,7 @@ impl<'a> Step for SurfacesStep<'a> {
         let file = LazyRecord::new(self.flight, self.store, &[]);
         let part = |maneuver: &&'a Maneuver| Ok((file.part(maneuver)?, *maneuver));
         let parts: Result<Vec<(Record, &Maneuver)>> = self.maneuvers.iter().map(part).collect();
-        let basis = Basis {
+        let basis = AircraftModel {
             aircraft: &self.config.aircraft,
             buildup: &self.config.buildup,
             tunnel: &self.config.tunnel,

@@ -16,7 +16,7 @@ use crate::maneuver::{Maneuver, Means};
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
 use crate::numerics::random::RandomStream;
 use crate::qualities::{Controls, Differentiation, Flight, FlownConditions, LinearModel};
-use crate::tables::{MatchedQuantity, Quantity};
+use crate::tables::{FlyingQuality, MatchedQuantity};
 
 /// Estimates of a maneuver.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -244,12 +244,12 @@ fn nothing_by_surface() -> BTreeMap<String, BTreeMap<String, f64>> {
 /// Dutch roll of the equations at values of their derivatives; `None` where it does not oscillate.
 fn dutch_roll(linear: &LinearModel, values: &DVector<f64>) -> Option<DutchRoll> {
     let found = linear.quantities(Axis::Lateral, values, Differentiation::ValuesAlone)?;
-    let value = |quantity: Quantity| {
+    let value = |quantity: FlyingQuality| {
         let own = found.quantities.iter().find(|(q, _)| *q == quantity);
         own.map(|(_, dual)| dual.value)
     };
-    let frequency = value(Quantity::DutchRollFrequency)?;
-    let damping = value(Quantity::DutchRollDamping)?;
+    let frequency = value(FlyingQuality::DutchRollFrequency)?;
+    let damping = value(FlyingQuality::DutchRollDamping)?;
     let damped = frequency * (1.0 - damping * damping).sqrt();
     let found = DutchRoll {
         period_s: 2.0 * std::f64::consts::PI / damped,

@@ -28,7 +28,7 @@ const MOVED_DEG: f64 = 0.5;
 
 /// Aircraft, models and tolerances of the proof.
 #[derive(Clone, Debug)]
-pub struct Basis<'a> {
+pub struct ProofInputs<'a> {
     pub aircraft: &'a Aircraft,
     pub buildup: &'a Buildup,
     /// Models in the order of the specification.
@@ -77,7 +77,7 @@ impl Matched {
 
 /// Flies a maneuver again with each model.
 #[must_use]
-pub fn fly_again(basis: &Basis, flown: &Flown) -> Matched {
+pub fn fly_again(basis: &ProofInputs, flown: &Flown) -> Matched {
     match Flight::new(basis, flown) {
         Ok(flight) => flight.matched(),
         Err(reason) => not_flown(basis, flown.maneuver, &reason),
@@ -88,13 +88,16 @@ pub fn fly_again(basis: &Basis, flown: &Flown) -> Matched {
 ///
 /// # Errors
 /// The reason why there is none.
-pub fn decisive_difference(basis: &Basis, flown: &Flown) -> Result<DecisiveDifference, String> {
+pub fn decisive_difference(
+    basis: &ProofInputs,
+    flown: &Flown,
+) -> Result<DecisiveDifference, String> {
     Flight::new(basis, flown)?.decisive_difference()
 }
 
 /// Dutch roll of a lateral maneuver by its own estimates.
 fn dutch_roll(
-    basis: &Basis,
+    basis: &ProofInputs,
     maneuver: &Maneuver,
     own: Option<(&Means, &OwnEstimates)>,
 ) -> Option<LateralModes> {
@@ -122,7 +125,7 @@ fn predicted_dutch_roll<'a>(
 
 /// Rows of a maneuver that is not flown again.
 #[must_use]
-pub fn not_flown(basis: &Basis, maneuver: &Maneuver, reason: &str) -> Matched {
+pub fn not_flown(basis: &ProofInputs, maneuver: &Maneuver, reason: &str) -> Matched {
     let row = |model: &ModelSource| MatchVerdictRow {
         reason: reason.to_owned(),
         ..verdict_row(maneuver, *model)
@@ -158,7 +161,7 @@ struct Trimmed<'a> {
 
 /// A maneuver that can be flown again.
 struct Flight<'a> {
-    basis: &'a Basis<'a>,
+    basis: &'a ProofInputs<'a>,
     maneuver: &'a Maneuver,
     local: Option<&'a LocalPosterior>,
     modes: Option<LateralModes>,
@@ -171,7 +174,7 @@ impl<'a> Flight<'a> {
     ///
     /// # Errors
     /// The reason why it cannot.
-    fn new(basis: &'a Basis, flown: &Flown<'a>) -> Result<Flight<'a>, String> {
+    fn new(basis: &'a ProofInputs, flown: &Flown<'a>) -> Result<Flight<'a>, String> {
         let Flown {
             record,
             maneuver,

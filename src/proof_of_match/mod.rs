@@ -26,6 +26,6 @@ mod tests;
 
 pub use decisive_difference::DecisiveDifference;
 pub use dutch_roll::OwnEstimates;
-pub use maneuver::{Basis, Flown, Matched, decisive_difference, fly_again, not_flown};
+pub use maneuver::{Flown, Matched, ProofInputs, decisive_difference, fly_again, not_flown};
 pub use models::{of_posterior, of_trends};
 pub use specification::{Specification, Test, Tolerance};

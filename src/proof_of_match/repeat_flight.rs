@@ -285,7 +285,12 @@ impl Effects {
         let limits = judged.iter().map(|own| {
             let output = place(own.tolerance.quantity)?;
             let stated = (&own.tolerance, output);
-            Some(Limits::new(recording, stated, self.stride, required_pct))
+            Some(SampleLimits::new(
+                recording,
+                stated,
+                self.stride,
+                required_pct,
+            ))
         });
         let repeat = Repeat {
             effects: self,
@@ -331,7 +336,7 @@ struct Repeat<'a> {
     effects: &'a Effects,
     judged: &'a [Judged<'a>],
     /// Limits of each tolerance; `None` for one of the Dutch roll.
-    limits: Vec<Option<Limits>>,
+    limits: Vec<Option<SampleLimits>>,
     simulated: &'a Simulated,
     bias: Histories,
 }
@@ -340,7 +345,7 @@ impl Repeat<'_> {
     /// Probabilities of one aircraft and start, over the sensors' noise.
     fn probabilities(&self, draw: &Draw) -> Probabilities {
         let effects = self.effects;
-        let inside = |(own, limits): (&Judged, &Option<Limits>)| match limits {
+        let inside = |(own, limits): (&Judged, &Option<SampleLimits>)| match limits {
             None => f64::from(u8::from(self.meets(draw.dutch_roll, &own.tolerance))),
             Some(limits) => {
                 limits.inside(&effects.drawn(&self.bias, &draw.deviates, limits.output))
@@ -367,38 +372,38 @@ impl Repeat<'_> {
 }
 
 /// Limits of a tolerance at the samples that count.
-struct Limits {
+struct SampleLimits {
     output: usize,
     noise: f64,
     /// Samples that may be outside.
     allowed: usize,
-    samples: Vec<Limit>,
+    samples: Vec<SampleLimit>,
 }
 
 /// Limit at one sample.
-struct Limit {
+struct SampleLimit {
     width: f64,
     /// Samples of the effects around this one, and its share of the way between them.
     between: [usize; 2],
     share: f64,
 }
 
-impl Limits {
+impl SampleLimits {
     fn new(
         recording: &Recording,
         (tolerance, output): (&Tolerance, usize),
         stride: usize,
         required_pct: f64,
-    ) -> Limits {
+    ) -> SampleLimits {
         let last = recording.samples.div_ceil(stride).saturating_sub(1);
-        let limit = |sample: usize| Limit {
+        let limit = |sample: usize| SampleLimit {
             width: tolerance.width(recording.measured[sample][output]),
             between: [sample / stride, (sample / stride + 1).min(last)],
             share: (sample % stride) as f64 / stride as f64,
         };
         let counted = (0..recording.samples).filter(|k| !recording.repaired[*k][output]);
-        let samples: Vec<Limit> = counted.map(limit).collect();
-        Limits {
+        let samples: Vec<SampleLimit> = counted.map(limit).collect();
+        SampleLimits {
             output,
             noise: recording.noise[output],
             allowed: allowed_outside(samples.len(), required_pct),
@@ -411,7 +416,7 @@ impl Limits {
         let noise = self.noise;
         let mut outside = 0;
         let mut doubtful = Vec::new();
-        for Limit {
+        for SampleLimit {
             width,
             between,
             share,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::basis::Basis;
+use super::judged_aircraft::JudgedAircraft;
 use super::levels;
 use super::linear::Differentiation;
 use super::linear::{Controls, Flight, LinearModel};
@@ -18,7 +18,9 @@ use crate::numerics::order_statistics::quantile;
 use crate::numerics::random::RandomStream;
 use crate::numerics::root::continuous_root;
 use crate::numerics::student::NORMAL_95;
-use crate::tables::{Airframe, DeviationBasis, Level, LevelRow, QualityRow, Quantity, RootRow};
+use crate::tables::{
+    Airframe, DeviationBasis, FlyingQuality, Level, LevelRow, QualityRow, RootRow,
+};
 
 /// Seed of the draws. All angles of attack take the same random numbers, so probabilities are as
 /// smooth over α as the posterior.
@@ -45,7 +47,7 @@ pub struct AxisAnalysis {
     pub mean: AxisQuantities,
     pub covariance: DMatrix<f64>,
     /// Values of each draw.
-    pub draws: Vec<BTreeMap<Quantity, f64>>,
+    pub draws: Vec<BTreeMap<FlyingQuality, f64>>,
     /// Share of draws whose modes have another pattern than at the mean.
     pub coalesced: f64,
 }
@@ -82,7 +84,7 @@ impl AxisAnalysis {
         })
     }
 
-    fn values(&self) -> BTreeMap<Quantity, f64> {
+    fn values(&self) -> BTreeMap<FlyingQuality, f64> {
         let quantities = self.mean.quantities.iter();
         quantities.map(|(q, dual)| (*q, dual.value)).collect()
     }
@@ -98,7 +100,7 @@ impl AxisAnalysis {
 
     /// Standard deviation and 95 % interval of a quantity.
     #[must_use]
-    pub fn uncertainty(&self, quantity: Quantity, dual: &Dual) -> Uncertainty {
+    pub fn uncertainty(&self, quantity: FlyingQuality, dual: &Dual) -> Uncertainty {
         let deviation = self.covariance(dual, dual).sqrt();
         if self.coalesced <= COALESCED && deviation.is_finite() {
             return Uncertainty {
@@ -124,10 +126,10 @@ impl AxisAnalysis {
     }
 
     /// Correlation of a quantity with the damping ratio of the same mode.
-    fn damping_correlation(&self, quantity: Quantity, dual: &Dual) -> Option<f64> {
+    fn damping_correlation(&self, quantity: FlyingQuality, dual: &Dual) -> Option<f64> {
         let damping = match quantity {
-            Quantity::ControlAnticipation => Quantity::ShortPeriodDamping,
-            Quantity::DutchRollFrequency => Quantity::DutchRollDamping,
+            FlyingQuality::ControlAnticipation => FlyingQuality::ShortPeriodDamping,
+            FlyingQuality::DutchRollFrequency => FlyingQuality::DutchRollDamping,
             _ => return None,
         };
         let quantities = self.mean.quantities.iter();
@@ -152,7 +154,7 @@ pub struct Uncertainty {
 impl Analysis {
     /// Analyses an airframe in steady flight; `None` where the posterior is not finite.
     #[must_use]
-    pub fn of(basis: &Basis, airframe: Airframe, trim: &Trim) -> Option<Analysis> {
+    pub fn of(basis: &JudgedAircraft, airframe: Airframe, trim: &Trim) -> Option<Analysis> {
         let specification = basis.specification;
         let of_axis = |axis: Axis| {
             let (linear, posterior) = linearised(basis, airframe, trim, axis);
@@ -175,7 +177,7 @@ impl Analysis {
 /// Linear equations of an axis of an airframe in steady flight, with the posterior there.
 #[must_use]
 pub fn linearised(
-    basis: &Basis,
+    basis: &JudgedAircraft,
     airframe: Airframe,
     trim: &Trim,
     axis: Axis,
@@ -210,7 +212,7 @@ struct Place<'a> {
 
 impl Place<'_> {
     fn quality_rows(&self, analysis: &AxisAnalysis) -> Vec<QualityRow> {
-        let row = |(quantity, dual): &(Quantity, Dual)| {
+        let row = |(quantity, dual): &(FlyingQuality, Dual)| {
             let uncertainty = analysis.uncertainty(*quantity, dual);
             // A time to double that is none has no deviation, though some draws may have one.
             let is_some = dual.value.is_finite();
@@ -286,7 +288,7 @@ impl Place<'_> {
     }
 }
 
-fn together(axes: impl Iterator<Item = BTreeMap<Quantity, f64>>) -> Vec<(Quantity, f64)> {
+fn together(axes: impl Iterator<Item = BTreeMap<FlyingQuality, f64>>) -> Vec<(FlyingQuality, f64)> {
     axes.flatten().collect()
 }
 

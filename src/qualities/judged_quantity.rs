@@ -3,15 +3,15 @@
 use std::collections::BTreeMap;
 
 use super::analysis::linearised;
-use super::basis::Basis;
+use super::judged_aircraft::JudgedAircraft;
 use super::levels::{meets, value_of};
 use super::linear::Differentiation;
 use super::linear::LinearModel;
-use super::specification::{Limit, Specification};
+use super::specification::{LevelLimit, Specification};
 use super::trim::FlownConditions;
 use crate::aero::{Axis, Condition};
 use crate::model::{LocalPosterior, LocalValue};
-use crate::tables::{Airframe, Level, Quantity};
+use crate::tables::{Airframe, FlyingQuality, Level};
 
 /// Quantity of a mode at an angle of attack, about the mean of the posterior.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,9 +29,10 @@ pub struct JudgedQuantity {
 /// the mode does not exist or the quantity is not finite.
 #[must_use]
 pub fn judged_quantity(
-    basis: &Basis,
+    basis: &JudgedAircraft,
     conditions: &FlownConditions,
-    (airframe, quantity): (Airframe, Quantity),
+    airframe: Airframe,
+    quantity: FlyingQuality,
     alpha_deg: f64,
 ) -> Option<JudgedQuantity> {
     let trim = conditions.trim(alpha_deg, basis.aircraft)?;
@@ -39,55 +40,62 @@ pub fn judged_quantity(
         .into_iter()
         .find_map(|axis| {
             let (linear, posterior) = linearised(basis, airframe, &trim, axis);
-            let (value, slopes, limits) =
-                at_mean(axis, &linear, &posterior, (basis.specification, quantity))?;
+            let own = at_mean(axis, &linear, &posterior, basis.specification, quantity)?;
             Some(JudgedQuantity {
                 condition: trim.condition,
-                value,
-                slopes,
-                limits,
+                value: own.value,
+                slopes: own.slopes,
+                limits: own.limits,
             })
         })
 }
 
-/// Value, slopes and limits of a quantity.
-type AtMean = (f64, Vec<(LocalValue, f64)>, Vec<f64>);
+/// Value, slopes and limits of a quantity at the mean of a posterior, as in [`JudgedQuantity`].
+pub struct QuantityAtMean {
+    pub value: f64,
+    pub slopes: Vec<(LocalValue, f64)>,
+    pub limits: Vec<f64>,
+}
 
 /// Quantity at the mean of a posterior; `None` where it does not exist or is not finite.
 pub fn at_mean(
     axis: Axis,
     linear: &LinearModel,
     posterior: &LocalPosterior,
-    (specification, quantity): (&Specification, Quantity),
-) -> Option<AtMean> {
+    specification: &Specification,
+    quantity: FlyingQuality,
+) -> Option<QuantityAtMean> {
     let found = linear.quantities(axis, &posterior.mean, Differentiation::Slopes)?;
     let quantities = found.quantities.iter();
-    let means: Vec<(Quantity, f64)> = quantities.map(|(q, dual)| (*q, dual.value)).collect();
+    let means: Vec<(FlyingQuality, f64)> = quantities.map(|(q, dual)| (*q, dual.value)).collect();
     let (_, dual) = found.quantities.into_iter().find(|(q, _)| *q == quantity)?;
     let is_finite = dual.value.is_finite()
         && dual.slopes.len() == posterior.values.len()
         && dual.slopes.iter().all(|slope| slope.is_finite());
     is_finite.then(|| {
         let slopes = posterior.values.iter().cloned().zip(dual.slopes);
-        let limits = level_changes(specification, quantity, &means);
-        (dual.value, slopes.collect(), limits)
+        QuantityAtMean {
+            value: dual.value,
+            slopes: slopes.collect(),
+            limits: level_changes(specification, quantity, &means),
+        }
     })
 }
 
 /// Ascending values of a quantity at which its level changes, with the other quantities at their means.
 fn level_changes(
     specification: &Specification,
-    quantity: Quantity,
-    means: &[(Quantity, f64)],
+    quantity: FlyingQuality,
+    means: &[(FlyingQuality, f64)],
 ) -> Vec<f64> {
-    let limits: Vec<&Limit> = specification.limits_of(quantity).collect();
+    let limits: Vec<&LevelLimit> = specification.limits_of(quantity).collect();
     let mut ends: Vec<f64> = limits.iter().flat_map(|limit| ends(limit, means)).collect();
     ends.sort_by(f64::total_cmp);
     ends.dedup();
     let level = |value: f64| {
-        let mut values: BTreeMap<Quantity, f64> = means.iter().copied().collect();
+        let mut values: BTreeMap<FlyingQuality, f64> = means.iter().copied().collect();
         values.insert(quantity, value);
-        let values: Vec<(Quantity, f64)> = values.into_iter().collect();
+        let values: Vec<(FlyingQuality, f64)> = values.into_iter().collect();
         let levels = [Level::One, Level::Two, Level::Three];
         let mut met = levels.into_iter();
         met.find(|level| limits.iter().all(|limit| meets(limit, *level, &values)))
@@ -103,7 +111,7 @@ fn level_changes(
 }
 
 /// Ends of the ranges of a limit.
-fn ends(limit: &Limit, means: &[(Quantity, f64)]) -> Vec<f64> {
+fn ends(limit: &LevelLimit, means: &[(FlyingQuality, f64)]) -> Vec<f64> {
     let of_level = |level: Level| {
         let range = limit.range(level).unwrap_or_default();
         let rise = limit.raised.and_then(|raised| {

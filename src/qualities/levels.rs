@@ -1,10 +1,10 @@
 //! Level of flying qualities that values meet.
 
-use super::specification::{Limit, Requirement, Specification};
-use crate::tables::{Level, Quantity};
+use super::specification::{LevelLimit, Requirement, Specification};
+use crate::tables::{FlyingQuality, Level};
 
 /// Values of the modes that exist.
-pub type Values = [(Quantity, f64)];
+pub type Values = [(FlyingQuality, f64)];
 
 /// Best level whose limits the values meet, of one requirement.
 ///
@@ -21,7 +21,7 @@ pub fn level(specification: &Specification, requirement: &Requirement, values: &
 
 /// `true` where values are within the limit of a level.
 #[must_use]
-pub fn meets(limit: &Limit, level: Level, values: &Values) -> bool {
+pub fn meets(limit: &LevelLimit, level: Level, values: &Values) -> bool {
     let Some(value) = value_of(values, limit.quantity) else {
         return true;
     };
@@ -41,7 +41,7 @@ pub fn meets(limit: &Limit, level: Level, values: &Values) -> bool {
 
 /// Value of a quantity; `None` where the mode does not exist.
 #[must_use]
-pub fn value_of(values: &Values, quantity: Quantity) -> Option<f64> {
+pub fn value_of(values: &Values, quantity: FlyingQuality) -> Option<f64> {
     let found = values.iter().find(|(other, _)| *other == quantity);
     found.map(|(_, value)| *value)
 }

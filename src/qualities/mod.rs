@@ -9,7 +9,7 @@
 //! as a linear function of the derivatives, from which plans of the next flight follow.
 
 mod specification;
-mod basis;
+mod judged_aircraft;
 mod trim;
 mod linear;
 mod longitudinal;
@@ -29,7 +29,7 @@ use crate::model::Model;
 use crate::tables::{LevelRow, QualityRow, RootRow};
 use analysis::Analysis;
 
-pub use basis::Basis;
+pub use judged_aircraft::JudgedAircraft;
 pub use judged_quantity::judged_quantity;
 pub use linear::{Controls, Differentiation, Flight, LinearModel};
 pub use specification::{Range, Specification};
@@ -56,7 +56,7 @@ pub struct Qualities {
 
 /// Computes the flying qualities at each angle of attack of the posterior within the flown range.
 #[must_use]
-pub fn qualities(basis: &Basis, flown: &[(&Maneuver, &Means)]) -> Qualities {
+pub fn qualities(basis: &JudgedAircraft, flown: &[(&Maneuver, &Means)]) -> Qualities {
     let conditions = FlownConditions::new(flown, basis.tunnel);
     let alphas = angles_deg(basis.model);
     let analyses: Vec<Analysis> = basis

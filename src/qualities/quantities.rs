@@ -6,13 +6,13 @@ use super::linear::{Differentiation, LinearModel, Solved};
 use super::modes::Modes;
 use crate::aero::Axis;
 use crate::numerics::dual::Dual;
-use crate::tables::Quantity;
+use crate::tables::FlyingQuality;
 
 /// Quantities of an axis at values of the derivatives.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisQuantities {
     /// Quantities of the modes that exist.
-    pub quantities: Vec<(Quantity, Dual)>,
+    pub quantities: Vec<(FlyingQuality, Dual)>,
     pub modes: Modes,
 }
 
@@ -72,52 +72,52 @@ fn longitudinal(
     modes: &Modes,
     entries: &Solved,
     velocity_over_gravity: f64,
-) -> Vec<(Quantity, Dual)> {
+) -> Vec<(FlyingQuality, Dual)> {
     let (fast, slow) = (modes.fast_pair(), modes.slow_pair());
     let load_factor = entries.load_factor(velocity_over_gravity);
     let fastest = modes.slow.iter().map(|i| &modes.roots[*i]);
     let diverging = fastest.max_by(|a, b| a.value.re.total_cmp(&b.value.re));
     vec![
-        (Quantity::ShortPeriodFrequency, fast.frequency()),
-        (Quantity::ShortPeriodDamping, fast.damping()),
-        (Quantity::PhugoidFrequency, slow.frequency()),
-        (Quantity::PhugoidDamping, slow.damping()),
+        (FlyingQuality::ShortPeriodFrequency, fast.frequency()),
+        (FlyingQuality::ShortPeriodDamping, fast.damping()),
+        (FlyingQuality::PhugoidFrequency, slow.frequency()),
+        (FlyingQuality::PhugoidDamping, slow.damping()),
         (
-            Quantity::PhugoidTimeToDouble,
+            FlyingQuality::PhugoidTimeToDouble,
             diverging.map_or_else(|| f64::NAN.into(), |root| time_to_double(root.real())),
         ),
-        (Quantity::AttitudeZero, entries.attitude_zero()),
+        (FlyingQuality::AttitudeZero, entries.attitude_zero()),
         (
-            Quantity::ControlAnticipation,
+            FlyingQuality::ControlAnticipation,
             fast.product.clone() / load_factor.clone(),
         ),
-        (Quantity::LoadFactorPerAlpha, load_factor),
+        (FlyingQuality::LoadFactorPerAlpha, load_factor),
     ]
 }
 
-fn lateral(modes: &Modes) -> Vec<(Quantity, Dual)> {
+fn lateral(modes: &Modes) -> Vec<(FlyingQuality, Dual)> {
     let fast = modes.fast_pair();
     let oscillation = &modes.roots[modes.fast[0]];
     let phi_beta = oscillation.magnitude_of_ratio();
     let mut quantities = vec![
-        (Quantity::DutchRollFrequency, fast.frequency()),
-        (Quantity::DutchRollDamping, fast.damping()),
-        (Quantity::DutchRollDecay, fast.decay()),
+        (FlyingQuality::DutchRollFrequency, fast.frequency()),
+        (FlyingQuality::DutchRollDamping, fast.damping()),
+        (FlyingQuality::DutchRollDecay, fast.decay()),
         (
-            Quantity::DutchRollBank,
+            FlyingQuality::DutchRollBank,
             fast.product.clone() * phi_beta.clone(),
         ),
-        (Quantity::PhiBeta, phi_beta),
+        (FlyingQuality::PhiBeta, phi_beta),
     ];
     if modes.is_slow_oscillation() {
-        quantities.push((Quantity::RollSpiralDecay, modes.slow_pair().decay()));
+        quantities.push((FlyingQuality::RollSpiralDecay, modes.slow_pair().decay()));
         return quantities;
     }
     let [roll, spiral] = modes.slow.map(|i| modes.roots[i].real());
     quantities.extend([
-        (Quantity::RollTimeConstant, time_constant(roll)),
-        (Quantity::SpiralRate, -spiral.clone()),
-        (Quantity::SpiralTimeToDouble, time_to_double(spiral)),
+        (FlyingQuality::RollTimeConstant, time_constant(roll)),
+        (FlyingQuality::SpiralRate, -spiral.clone()),
+        (FlyingQuality::SpiralTimeToDouble, time_to_double(spiral)),
     ]);
     quantities
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::schema::words;
-use crate::tables::{Airframe, Level, Quantity};
+use crate::tables::{Airframe, FlyingQuality, Level};
 
 words! {
     /// Category of flight phases.
@@ -59,14 +59,14 @@ pub struct Specification {
 pub struct Requirement {
     pub paragraph: String,
     pub subject: String,
-    pub limits: Vec<Limit>,
+    pub limits: Vec<LevelLimit>,
 }
 
 /// Limits of one quantity.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-pub struct Limit {
-    pub quantity: Quantity,
+pub struct LevelLimit {
+    pub quantity: FlyingQuality,
     /// Categories and classes to which the limit applies; all unless given.
     #[serde(default)]
     pub categories: Option<Vec<Category>>,
@@ -97,7 +97,7 @@ pub struct Range {
 #[derive(Clone, Copy, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Raised {
-    pub by: Quantity,
+    pub by: FlyingQuality,
     pub above: f64,
     pub level_1: f64,
     pub level_2: f64,
@@ -116,8 +116,11 @@ impl Specification {
     }
 
     /// Limits of a requirement that apply to the class and category.
-    pub fn limits<'a>(&'a self, requirement: &'a Requirement) -> impl Iterator<Item = &'a Limit> {
-        let applies = |limit: &&Limit| {
+    pub fn limits<'a>(
+        &'a self,
+        requirement: &'a Requirement,
+    ) -> impl Iterator<Item = &'a LevelLimit> {
+        let applies = |limit: &&LevelLimit| {
             let categories = limit.categories.as_ref();
             let classes = limit.classes.as_ref();
             categories.is_none_or(|c| c.contains(&self.category))
@@ -129,14 +132,14 @@ impl Specification {
 
 impl Specification {
     /// Limits of a quantity that apply to the class and category.
-    pub fn limits_of(&self, quantity: Quantity) -> impl Iterator<Item = &Limit> {
+    pub fn limits_of(&self, quantity: FlyingQuality) -> impl Iterator<Item = &LevelLimit> {
         let limits = self.requirements.iter().flat_map(|r| self.limits(r));
         limits.filter(move |limit| limit.quantity == quantity)
     }
 
     /// Range of a quantity that a level allows, over all its limits without their rises.
     #[must_use]
-    pub fn range_of(&self, quantity: Quantity, level: Level) -> Range {
+    pub fn range_of(&self, quantity: FlyingQuality, level: Level) -> Range {
         let ranges = self
             .limits_of(quantity)
             .filter_map(|limit| limit.range(level));
@@ -147,7 +150,7 @@ impl Specification {
     }
 }
 
-impl Limit {
+impl LevelLimit {
     /// Range that a level allows; `None` for less than the lowest level.
     #[must_use]
     pub fn range(&self, level: Level) -> Option<Range> {

@@ -8,15 +8,15 @@ use crate::aero::Axis;
 use crate::error::{Problem, ProblemStage};
 use crate::lineage::Changes;
 use crate::maneuver::{Maneuver, Status};
-use crate::output_error::identifiability::Limits;
+use crate::output_error::identifiability::CollinearityLimits;
 use crate::proof_of_match::{self, Matched};
 use crate::qualities::{Qualities, Specification};
 use crate::tables::{
     AgreementRow, Airframe, ChannelRow, ChannelVerdict, CheckRow, CheckVerdict, ComparisonRow,
     CorrelationRow, DeviationBasis, EstimateRow, EventRow, EventVerdict, FitRow, FlightRow,
-    History, HistoryOutput, InstrumentRow, Level, LevelRow, MatchRow, MatchVerdict,
-    MatchVerdictRow, MatchedQuantity, ModelSource, Outcome, PosteriorRow, QualityRow, Quantity,
-    RootRow, TrendRow, TunnelDifference, TunnelVerdict,
+    FlyingQuality, History, HistoryOutput, InstrumentRow, Level, LevelRow, MatchRow, MatchVerdict,
+    MatchVerdictRow, MatchedQuantity, ModelSource, Outcome, PosteriorRow, QualityRow, RootRow,
+    TrendRow, TunnelDifference, TunnelVerdict,
 };
 
 /// Owner of the rows that [`Contents`] borrows.
@@ -27,7 +27,7 @@ pub struct Campaign {
     pub estimates: Vec<EstimateRow>,
     pub predictions: Vec<AgreementRow>,
     pub correlations: Vec<CorrelationRow>,
-    pub limits: Limits,
+    pub limits: CollinearityLimits,
     pub trends: Vec<TrendRow>,
     pub specification: Option<Specification>,
     pub qualities: Qualities,
@@ -194,10 +194,10 @@ fn judge(campaign: &mut Campaign) {
     campaign.specification = serde_yaml::from_str(text).ok();
     for (alpha_deg, level_1_pct) in [(10.0, 99.0), (20.0, 60.0), (30.0, 1.0)] {
         for (quantity, axis, value) in [
-            (Quantity::ShortPeriodDamping, Axis::Longitudinal, 0.6),
-            (Quantity::ControlAnticipation, Axis::Longitudinal, 0.4),
-            (Quantity::DutchRollDamping, Axis::Lateral, 0.2),
-            (Quantity::DutchRollFrequency, Axis::Lateral, 1.5),
+            (FlyingQuality::ShortPeriodDamping, Axis::Longitudinal, 0.6),
+            (FlyingQuality::ControlAnticipation, Axis::Longitudinal, 0.4),
+            (FlyingQuality::DutchRollDamping, Axis::Lateral, 0.2),
+            (FlyingQuality::DutchRollFrequency, Axis::Lateral, 1.5),
         ] {
             campaign.qualities.qualities.push(QualityRow {
                 airframe: Airframe::Bare,
@@ -372,25 +372,14 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
         ..Maneuver::example(&maneuver_id, alpha_deg)
     };
     campaign.fits.push(FitRow {
-        maneuver_id: maneuver_id.clone(),
-        class: class.into(),
-        outcome: Outcome::Converged,
         reason: "steps below the tolerance".into(),
-        start: None,
         iterations: 6,
         initial_cost: Some(12.0),
         final_cost: Some(0.4),
         condition_number: Some(150.0),
         left_out: Some(0.0),
         largest_condition_index: Some(12.2),
-        confounded: None,
-        method: None,
-        gust_ft_s: None,
-        rotary_gust_deg_s: None,
-        gust_corner_rad_s: None,
-        autocorrelation: None,
-        likelihood_gain: None,
-        equation_error_distance: None,
+        ..FitRow::without_numbers(&maneuver_id, class, Outcome::Converged)
     });
     for (name, unit) in if axis == Axis::Longitudinal {
         LONGITUDINAL

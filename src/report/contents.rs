@@ -7,7 +7,7 @@ use crate::aero::Axis;
 use crate::error::Problem;
 use crate::lineage::Changes;
 use crate::maneuver::Maneuver;
-use crate::output_error::identifiability::Limits;
+use crate::output_error::identifiability::CollinearityLimits;
 use crate::proof_of_match::{self, Matched};
 use crate::qualities::{Qualities, Specification};
 use crate::tables::{
@@ -39,7 +39,7 @@ pub struct Contents<'a> {
     pub predictions: &'a [AgreementRow],
     pub correlations: &'a [CorrelationRow],
     /// Limits above which a correlation, a variance inflation or a condition index is flagged.
-    pub limits: &'a Limits,
+    pub limits: &'a CollinearityLimits,
     pub posterior: &'a [PosteriorRow],
     pub trends: &'a [TrendRow],
     /// Specification of flying qualities, and what it finds; empty without one.

@@ -3,8 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::evidence::SurfaceDelay;
-use super::settings::{Action, Settings};
+use super::settings::Settings;
 use crate::flight::Correction;
+use crate::ingest::compatibility::Action;
 
 /// Grid of the corrections, s. They decide every estimate of the campaign, so a further flight that
 /// moves a delay by less leaves all estimates as they are. The rounding is part of what stays

@@ -46,7 +46,7 @@ pub struct SurfaceDelay {
 /// Effect of a surface over the effect that the tunnel gives it: one where right, minus one where
 /// its sign is reversed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Effect {
+pub struct SurfaceEffect {
     pub surface: String,
     pub ratio: f64,
     /// Standard deviation.
@@ -64,7 +64,7 @@ pub struct FlightEvidence {
     /// Delays that the flight gives by itself.
     pub own_delays: Vec<SurfaceDelay>,
     /// One entry per maneuver and surface.
-    pub effects: Vec<Effect>,
+    pub effects: Vec<SurfaceEffect>,
 }
 
 impl ManeuverData {
@@ -116,7 +116,7 @@ impl ManeuverData {
 
     /// Effects of the surfaces against the tunnel's, from derivatives that know nothing of the
     /// tunnel's signs.
-    pub fn effects(&self) -> Vec<Effect> {
+    pub fn effects(&self) -> Vec<SurfaceEffect> {
         let mut sums = vec![(0.0, 0.0); self.surfaces.len()];
         for CoefficientData { implied, terms } in &self.coefficients {
             let columns: Vec<Spectrum> = terms
@@ -142,7 +142,7 @@ impl ManeuverData {
         let known = self.surfaces.iter().zip(sums);
         known
             .filter(|(_, (_, information))| *information > 0.0)
-            .map(|(surface, (sum, information))| Effect {
+            .map(|(surface, (sum, information))| SurfaceEffect {
                 surface: surface.clone(),
                 ratio: sum / information,
                 bound: information.sqrt().recip(),

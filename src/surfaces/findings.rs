@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::correction::DelayCorrection;
-use super::evidence::{Effect, FlightEvidence, SurfaceDelay};
+use super::evidence::{FlightEvidence, SurfaceDelay, SurfaceEffect};
 use crate::error::{Problem, ProblemStage};
 use crate::flight::Channel;
 use crate::recorder::{ErrorSample, ErrorSeries};
@@ -24,7 +24,7 @@ struct MeanEffect {
 
 impl MeanEffect {
     /// Mean weighted by the bounds, with the scatter of the maneuvers in its own.
-    fn of<'a>(effects: impl Iterator<Item = &'a Effect> + Clone) -> MeanEffect {
+    fn of<'a>(effects: impl Iterator<Item = &'a SurfaceEffect> + Clone) -> MeanEffect {
         let weights = effects.clone().map(|e| e.bound.powi(-2));
         let information: f64 = weights.clone().sum();
         let both = effects.clone().zip(weights.clone());
@@ -187,9 +187,9 @@ mod tests {
     use super::*;
 
     fn mean(ratios: &[(f64, f64)]) -> MeanEffect {
-        let effects: Vec<Effect> = ratios
+        let effects: Vec<SurfaceEffect> = ratios
             .iter()
-            .map(|(ratio, bound)| Effect {
+            .map(|(ratio, bound)| SurfaceEffect {
                 surface: "da".to_owned(),
                 ratio: *ratio,
                 bound: *bound,

@@ -2,7 +2,7 @@
 
 use super::delays;
 use super::evidence::{FlightEvidence, SurfaceDelay};
-use super::maneuver_data::{Basis, ManeuverData};
+use super::maneuver_data::{AircraftModel, ManeuverData};
 use crate::flight::Record;
 use crate::maneuver::Maneuver;
 
@@ -17,7 +17,7 @@ const SETTLED_S: f64 = 1e-5;
 pub fn flight_evidence(
     flight_id: &str,
     maneuvers: &[(Record, &Maneuver)],
-    basis: Basis,
+    basis: AircraftModel,
 ) -> FlightEvidence {
     let data: Vec<ManeuverData> = maneuvers
         .iter()

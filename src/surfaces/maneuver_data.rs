@@ -46,7 +46,7 @@ pub struct TermData {
 
 /// Aircraft, model and tunnel of a campaign.
 #[derive(Clone, Copy, Debug)]
-pub struct Basis<'a> {
+pub struct AircraftModel<'a> {
     pub aircraft: &'a Aircraft,
     pub buildup: &'a Buildup,
     pub tunnel: &'a WindTunnel,
@@ -54,7 +54,7 @@ pub struct Basis<'a> {
 
 impl ManeuverData {
     /// Lays out a maneuver; `None` where it is too short or a signal is missing.
-    pub fn new(record: &Record, maneuver: &Maneuver, basis: Basis) -> Option<ManeuverData> {
+    pub fn new(record: &Record, maneuver: &Maneuver, basis: AircraftModel) -> Option<ManeuverData> {
         match maneuver.axis {
             Axis::Longitudinal => Self::of_axis::<3, Longitudinal>(record, maneuver, basis),
             Axis::Lateral => Self::of_axis::<4, Lateral>(record, maneuver, basis),
@@ -64,7 +64,7 @@ impl ManeuverData {
     fn of_axis<const NX: usize, E: Equations<NX>>(
         record: &Record,
         maneuver: &Maneuver,
-        basis: Basis,
+        basis: AircraftModel,
     ) -> Option<ManeuverData> {
         let range = record.sample_at(maneuver.start_s)..record.sample_at(maneuver.end_s) + 1;
         let band = Band::new(range.len(), record.step_s)?;

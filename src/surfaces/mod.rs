@@ -29,5 +29,5 @@ pub use delays::of_campaign;
 pub use evidence::FlightEvidence;
 pub use findings::{delay_series, findings};
 pub use flight::flight_evidence;
-pub use maneuver_data::Basis;
+pub use maneuver_data::AircraftModel;
 pub use settings::Settings;

@@ -1,18 +1,7 @@
 //! Settings of the surfaces' delays.
 
-use serde::{Deserialize, Serialize};
-
-use crate::settings::{settings, single_values};
-
-/// Treatment of a delay.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Action {
-    /// The surface is shifted where its delay is sure.
-    Apply,
-    /// The delay is published, and the surface stays as recorded.
-    Report,
-}
+use crate::ingest::compatibility::Action;
+use crate::settings::settings;
 
 settings! {
     /// Settings of the surfaces' delays. Each is one number for the whole campaign, since all flights
@@ -30,4 +19,3 @@ settings! {
         pub standard_errors: f64 = 4.0,
     }
 }
-single_values!(Action);

@@ -68,6 +68,34 @@ table! {
     }
 }
 
+impl FitRow {
+    /// Row of a maneuver with this outcome, and no numbers.
+    #[must_use]
+    pub fn without_numbers(maneuver_id: &str, class: &str, outcome: Outcome) -> FitRow {
+        FitRow {
+            maneuver_id: maneuver_id.to_owned(),
+            class: class.to_owned(),
+            outcome,
+            reason: String::new(),
+            start: None,
+            iterations: 0,
+            initial_cost: None,
+            final_cost: None,
+            condition_number: None,
+            left_out: None,
+            largest_condition_index: None,
+            confounded: None,
+            method: None,
+            gust_ft_s: None,
+            rotary_gust_deg_s: None,
+            gust_corner_rad_s: None,
+            autocorrelation: None,
+            likelihood_gain: None,
+            equation_error_distance: None,
+        }
+    }
+}
+
 words! {
     /// Method of estimation.
     pub enum EstimationMethod {

@@ -44,5 +44,7 @@ pub use posterior::{
 pub use predictions::{AgreementRow, PredictedRow, PredictionStatus};
 pub use proof_of_match::{MatchRow, MatchVerdict, MatchVerdictRow, MatchedQuantity, ModelSource};
 pub use published::{PublishedTrend, PublishedVerdict};
-pub use qualities::{Airframe, DeviationBasis, Level, LevelRow, QualityRow, Quantity, RootRow};
+pub use qualities::{
+    Airframe, DeviationBasis, FlyingQuality, Level, LevelRow, QualityRow, RootRow,
+};
 pub use trends::{OutlierRow, TrendRow};

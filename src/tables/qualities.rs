@@ -14,8 +14,8 @@ words! {
 }
 
 words! {
-    /// Quantity of a mode.
-    pub enum Quantity {
+    /// Flying quality: a quantity of a mode, or of the response to a control.
+    pub enum FlyingQuality {
         /// Undamped natural frequency ω of the short period, rad/s.
         ShortPeriodFrequency = "short_period_frequency",
         /// Damping ratio ζ of the short period; above 1 for two real roots.
@@ -53,28 +53,28 @@ words! {
     }
 }
 
-impl Quantity {
+impl FlyingQuality {
     /// Unit of its values.
     #[must_use]
     pub fn unit(self) -> &'static str {
         match self {
-            Quantity::ShortPeriodFrequency
-            | Quantity::PhugoidFrequency
-            | Quantity::DutchRollFrequency => "rad/s",
-            Quantity::ShortPeriodDamping
-            | Quantity::PhugoidDamping
-            | Quantity::DutchRollDamping
-            | Quantity::PhiBeta => "-",
-            Quantity::PhugoidTimeToDouble
-            | Quantity::RollTimeConstant
-            | Quantity::SpiralTimeToDouble => "s",
-            Quantity::AttitudeZero
-            | Quantity::DutchRollDecay
-            | Quantity::SpiralRate
-            | Quantity::RollSpiralDecay => "1/s",
-            Quantity::LoadFactorPerAlpha => "g/rad",
-            Quantity::ControlAnticipation => "1/(g s²)",
-            Quantity::DutchRollBank => "rad²/s²",
+            FlyingQuality::ShortPeriodFrequency
+            | FlyingQuality::PhugoidFrequency
+            | FlyingQuality::DutchRollFrequency => "rad/s",
+            FlyingQuality::ShortPeriodDamping
+            | FlyingQuality::PhugoidDamping
+            | FlyingQuality::DutchRollDamping
+            | FlyingQuality::PhiBeta => "-",
+            FlyingQuality::PhugoidTimeToDouble
+            | FlyingQuality::RollTimeConstant
+            | FlyingQuality::SpiralTimeToDouble => "s",
+            FlyingQuality::AttitudeZero
+            | FlyingQuality::DutchRollDecay
+            | FlyingQuality::SpiralRate
+            | FlyingQuality::RollSpiralDecay => "1/s",
+            FlyingQuality::LoadFactorPerAlpha => "g/rad",
+            FlyingQuality::ControlAnticipation => "1/(g s²)",
+            FlyingQuality::DutchRollBank => "rad²/s²",
         }
     }
 }
@@ -100,7 +100,7 @@ table! {
         /// Set of equations.
         pub axis: Axis,
         /// Quantity of a mode.
-        pub quantity: Quantity,
+        pub quantity: FlyingQuality,
         /// Unit of the quantity.
         pub unit: String,
         /// Angle of attack.

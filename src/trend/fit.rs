@@ -43,7 +43,7 @@ const OUTLYING: f64 = 3.0;
 
 /// A fitted trend.
 #[derive(Clone, Debug)]
-pub(super) struct Fit {
+pub(super) struct TrendFit {
     basis: Basis,
     coefficients: DVector<f64>,
     covariance: DMatrix<f64>,
@@ -64,9 +64,9 @@ pub(super) struct Fit {
 /// The trend of the order that the criterion chooses, with the other orders for its uncertainty.
 #[derive(Clone, Debug)]
 pub(super) struct Trend {
-    pub best: Fit,
+    pub best: TrendFit,
     /// Every order with its Akaike weight; the weights sum to one.
-    orders: Vec<(f64, Fit)>,
+    orders: Vec<(f64, TrendFit)>,
 }
 
 impl Trend {
@@ -77,7 +77,7 @@ impl Trend {
         settings: &Settings,
         knots_deg: &[f64],
     ) -> Option<Trend> {
-        let fits = Fit::all(points, settings, knots_deg);
+        let fits = TrendFit::all(points, settings, knots_deg);
         let best = fits
             .iter()
             .reduce(|best, next| {
@@ -89,7 +89,7 @@ impl Trend {
             })?
             .clone();
         // Of three maneuvers the criterion has no finite value.
-        let likelihood = |fit: &Fit| {
+        let likelihood = |fit: &TrendFit| {
             if fit.criterion.total_cmp(&best.criterion).is_eq() {
                 1.0
             } else {
@@ -109,7 +109,7 @@ impl Trend {
     /// Value and standard error at an angle of attack.
     pub(super) fn at(&self, alpha_deg: f64) -> (f64, f64) {
         let (value, _) = self.best.at(alpha_deg);
-        let variance = |(weight, fit): &(f64, Fit)| {
+        let variance = |(weight, fit): &(f64, TrendFit)| {
             let (other, error) = fit.at(alpha_deg);
             weight * (error * error + (other - value).powi(2))
         };
@@ -125,7 +125,7 @@ impl Trend {
     }
 }
 
-impl Fit {
+impl TrendFit {
     /// The fits of every order that the data allow. Points are sorted by α.
     ///
     /// At least two degrees of freedom are left to the residuals, and there are no more
@@ -133,7 +133,7 @@ impl Fit {
     /// middle of every cluster, and must be able to where a derivative bends between them. Besides
     /// polynomials there are splines: between the analyst's knots, with polynomials up to the third
     /// order; where he gives none, between the flown α, each or every second.
-    fn all(points: &[Point], settings: &Settings, knots_deg: &[f64]) -> Vec<Fit> {
+    fn all(points: &[Point], settings: &Settings, knots_deg: &[f64]) -> Vec<TrendFit> {
         let (Some(first), Some(last)) = (points.first(), points.last()) else {
             return Vec::new();
         };
@@ -168,12 +168,12 @@ impl Fit {
             .filter(|basis| basis.order() <= highest && basis.size() > basis.order() + 1);
         let bases = polynomials.chain(bent).filter(|basis| basis.size() <= most);
         bases
-            .filter_map(|basis| Fit::of(points, basis, settings.criterion))
+            .filter_map(|basis| TrendFit::of(points, basis, settings.criterion))
             .collect()
     }
 
     /// The fit of one basis; `None` where the normal equations have no solution.
-    pub(super) fn of(points: &[Point], basis: Basis, criterion: Criterion) -> Option<Fit> {
+    pub(super) fn of(points: &[Point], basis: Basis, criterion: Criterion) -> Option<TrendFit> {
         let (n, p) = (points.len(), basis.size());
         let rows: Vec<_> = points.iter().map(|q| basis.row(q.alpha_deg)).collect();
         let design = DMatrix::from_rows(&rows);
@@ -187,7 +187,7 @@ impl Fit {
         let lack = LackOfFit::of(points, &solution.residuals, &bounds2, p);
         let bound2 = upper_median(bounds2.iter().copied()).unwrap_or(0.0);
         let totals = solution.variances.iter().zip(&bounds2);
-        Some(Fit {
+        Some(TrendFit {
             lack_of_fit2: lack.lack2,
             deviation_of_one_more: (bound2 + lack.own2).sqrt(),
             residuals: solution.standardised(&design),
@@ -275,9 +275,9 @@ mod tests {
         points
     }
 
-    fn constant(points: &[Point]) -> Option<Fit> {
+    fn constant(points: &[Point]) -> Option<TrendFit> {
         let range = (points[0].alpha_deg, points[points.len() - 1].alpha_deg);
-        Fit::of(points, Basis::polynomial(range, 0), Criterion::Aicc)
+        TrendFit::of(points, Basis::polynomial(range, 0), Criterion::Aicc)
     }
 
     fn alphas() -> Vec<f64> {
@@ -397,7 +397,7 @@ mod tests {
             between2 - 0.5 * own2,
             max_relative = 1e-3
         );
-        let line = Fit::of(
+        let line = TrendFit::of(
             &pairs(|a| 0.01 * a, 0.02),
             Basis::polynomial((10.0, 50.0), 1),
             Criterion::Aicc,

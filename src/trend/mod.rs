@@ -31,9 +31,9 @@ use fit::Trend;
 use means::{Mean, means};
 use point::{Point, count_flown};
 
-#[cfg(test)]
-pub use settings::Group;
 pub use settings::Settings;
+#[cfg(test)]
+pub use settings::TrendGroup;
 
 /// Fewest maneuvers of a trend: from fewer their scatter cannot be estimated.
 const FEWEST_MANEUVERS: usize = 3;

@@ -30,9 +30,9 @@ settings! {
         pub outlier_z: f64 = 3.0,
         /// Classes whose maneuvers make the trend of each derivative. The first group that names a
         /// derivative, or that names none, is used. Other classes then have trends of their own only.
-        pub groups: Vec<Group> = vec![Group {
+        pub groups: Vec<TrendGroup> = vec![TrendGroup {
             name: "all".into(),
-            ..Group::default()
+            ..TrendGroup::default()
         }],
     }
     expert {
@@ -48,7 +48,7 @@ settings! {
 
 settings! {
     /// Classes that make the trends of some derivatives.
-    pub struct Group {
+    pub struct TrendGroup {
         /// Name of the group, as the tables have it.
         pub name: String,
         /// Derivatives of the group; without any, all that no group before it names.
@@ -62,7 +62,7 @@ settings! {
         pub knots_deg: Option<Vec<f64>>,
     }
 }
-elements!(Vec<Group>: Group as "[]");
+elements!(Vec<TrendGroup>: TrendGroup as "[]");
 single_values!(Criterion);
 
 /// Criterion for the order of a trend. Both weigh the misfit against the number of coefficients.
@@ -79,9 +79,9 @@ pub enum Criterion {
 impl Settings {
     /// The group of a derivative; `None` where no group names it and none takes the rest.
     #[must_use]
-    pub fn group_of(&self, derivative: &str) -> Option<&Group> {
-        let names = |g: &&Group| g.derivatives.iter().any(|d| d == derivative);
-        let rest = |g: &&Group| g.derivatives.is_empty();
+    pub fn group_of(&self, derivative: &str) -> Option<&TrendGroup> {
+        let names = |g: &&TrendGroup| g.derivatives.iter().any(|d| d == derivative);
+        let rest = |g: &&TrendGroup| g.derivatives.is_empty();
         self.groups
             .iter()
             .find(names)
@@ -89,7 +89,7 @@ impl Settings {
     }
 }
 
-impl Group {
+impl TrendGroup {
     #[must_use]
     pub fn has(&self, class: &str) -> bool {
         self.classes.is_empty() || self.classes.iter().any(|c| c == class)

@@ -109,7 +109,7 @@ fn the_order_of_the_maneuvers_does_not_matter_to_the_bit() {
 
 #[test]
 fn the_first_group_that_names_a_derivative_speaks_for_it() {
-    let group = |name: &str, derivatives: &[&str], classes: &[&str]| Group {
+    let group = |name: &str, derivatives: &[&str], classes: &[&str]| TrendGroup {
         name: name.into(),
         derivatives: derivatives.iter().map(|&s| s.to_owned()).collect(),
         classes: classes.iter().map(|&s| s.to_owned()).collect(),
@@ -373,10 +373,10 @@ fn a_spline_follows_a_kink_at_its_knot_or_between_the_flown_alpha() {
         .map(|a| estimate("d", "A", a, kinked(a), 0.002))
         .collect();
     let settings = |knots_deg: Vec<f64>| {
-        let groups = vec![Group {
+        let groups = vec![TrendGroup {
             name: "all".into(),
             knots_deg: Some(knots_deg),
-            ..Group::default()
+            ..TrendGroup::default()
         }];
         Settings {
             per_class: false,

@@ -11,7 +11,7 @@ use std::path::Path;
 use approx::assert_relative_eq;
 use nalgebra::Vector3;
 
-use super::derivative_table::{DerivativeTable, is_same_breakpoint};
+use super::export_table::{ExportTable, is_same_breakpoint};
 use super::*;
 use crate::aero::wind_tunnel::TunnelPoint;
 use crate::aero::{Coefficient, Condition, Derivative, Regressor, WindTunnel, wind_tunnel};
@@ -25,7 +25,7 @@ use crate::store::tunnel;
 use crate::tables::PosteriorRow;
 
 /// A database of the tables, read linearly and clamped, as simulators read them.
-fn database(tables: &[DerivativeTable], settings: &wind_tunnel::Settings) -> WindTunnel {
+fn database(tables: &[ExportTable], settings: &wind_tunnel::Settings) -> WindTunnel {
     let mut database = WindTunnel::new(wind_tunnel::Settings {
         third: settings.third.clone(),
         ..Default::default()
@@ -104,8 +104,8 @@ impl Flown {
         }
     }
 
-    fn contents(&self) -> Contents<'_> {
-        Contents {
+    fn contents(&self) -> ExportContents<'_> {
+        ExportContents {
             title: "F/A-18 & others",
             aircraft: &self.config.aircraft,
             buildup: &self.config.buildup,

@@ -23,7 +23,7 @@ use crate::output_error::sharing::SharedParameters;
 use crate::output_error::tests::{
     Noise as Draws, SAMPLES, biases, nothing_measured, truth, window, with_products,
 };
-use crate::output_error::theil::Agreement;
+use crate::output_error::theil::OutputAgreement;
 use crate::output_error::{Case, InitialState, Model};
 use crate::units::RAD;
 
@@ -218,7 +218,7 @@ fn explained<const NX: usize, E: InGusts<NX>>(
     at: &[f64],
 ) -> [f64; OUTPUTS] {
     let computed = filter.outputs_along_air(at).unwrap();
-    let agreements = Agreement::of_outputs(&filter.case.measurements, &computed);
+    let agreements = OutputAgreement::of_outputs(&filter.case.measurements, &computed);
     agreements.map(|agreement| agreement.r_squared().unwrap())
 }
 

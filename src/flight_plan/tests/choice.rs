@@ -3,20 +3,22 @@
 use approx::assert_relative_eq;
 use nalgebra::DMatrix;
 
-use crate::flight_plan::choice::{Aim, Budget, CardChoice, CardSet, Price, Subject};
+use crate::flight_plan::choice::{
+    Aim, AimPart, Budget, CardChoice, CardSet, CoefficientKnowledge, Price,
+};
 use crate::model::PlannedRows;
 use crate::numerics::random::RandomStream;
 
 const CARDS: usize = 12;
 
-/// Rows that a card observes of a subject.
+/// Rows that a card observes of a coefficient.
 const ROWS: usize = 2;
 
 const AIMS: usize = 8;
 
-/// Random posterior of the subject with a place: covariance G Gᵀ of cards' rows and aims over fewer
+/// Random posterior of the coefficient with a place: covariance G Gᵀ of cards' rows and aims over fewer
 /// unknowns, so that cards overlap and complete each other.
-fn subject(place: usize, random: &mut RandomStream) -> (Subject, Vec<Aim>) {
+fn coefficient(place: usize, random: &mut RandomStream) -> (CoefficientKnowledge, Vec<Aim>) {
     let (rows, unknowns) = (CARDS * ROWS + AIMS, 10);
     let gains = DMatrix::from_fn(rows, unknowns, |_, j| random.normal() / (1.0 + j as f64));
     let noise = |random: &mut RandomStream| {
@@ -32,25 +34,28 @@ fn subject(place: usize, random: &mut RandomStream) -> (Subject, Vec<Aim>) {
     });
     let cards = cards.collect();
     let aims = (0..AIMS).map(|i| Aim {
-        parts: vec![(place, CARDS * ROWS + i)],
+        parts: vec![AimPart {
+            coefficient: place,
+            row: CARDS * ROWS + i,
+        }],
         weight: random.uniform(),
         wanted: if random.uniform() < 0.5 { 0.3 } else { 0.0 },
         point: place * AIMS + i,
     });
     let aims = aims.collect();
-    let subject = Subject {
+    let coefficient = CoefficientKnowledge {
         covariance: &gains * gains.transpose(),
         cards,
     };
-    (subject, aims)
+    (coefficient, aims)
 }
 
 fn choice(seed: u64, minutes: impl Fn(usize) -> f64, budget: Budget) -> CardChoice {
     let mut random = RandomStream::new(seed, "posterior");
-    let both = [0, 1].map(|place| subject(place, &mut random));
+    let both = [0, 1].map(|place| coefficient(place, &mut random));
     let [(first, of_first), (second, of_second)] = both;
     CardChoice {
-        subjects: vec![first, second],
+        coefficients: vec![first, second],
         aims: of_first.into_iter().chain(of_second).collect(),
         prices: (0..CARDS)
             .map(|card| Price {
@@ -62,11 +67,14 @@ fn choice(seed: u64, minutes: impl Fn(usize) -> f64, budget: Budget) -> CardChoi
     }
 }
 
-/// A choice with each aim of the first subject in the second as well.
+/// A choice with each aim of the first coefficient in the second as well.
 fn with_shared_aims(mut choice: CardChoice) -> CardChoice {
     for aim in &mut choice.aims[..AIMS] {
-        let (_, row) = aim.parts[0];
-        aim.parts.push((1, row));
+        let row = aim.parts[0].row;
+        aim.parts.push(AimPart {
+            coefficient: 1,
+            row,
+        });
     }
     choice
 }
@@ -143,10 +151,10 @@ fn a_card_updates_the_covariance_as_a_gaussian_observation_does() {
     for card in [1, 4, 4, 9] {
         times[card] += 1;
     }
-    let updated = |subject: &Subject| {
-        let mut expected = subject.covariance.clone();
+    let updated = |coefficient: &CoefficientKnowledge| {
+        let mut expected = coefficient.covariance.clone();
         for card in [1, 4, 4, 9] {
-            let Some(rows) = &subject.cards[card] else {
+            let Some(rows) = &coefficient.cards[card] else {
                 continue;
             };
             let pick = DMatrix::from_fn(ROWS, expected.nrows(), |i, j| {
@@ -158,11 +166,13 @@ fn a_card_updates_the_covariance_as_a_gaussian_observation_does() {
         }
         expected
     };
-    let expected: Vec<DMatrix<f64>> = choice.subjects.iter().map(updated).collect();
+    let expected: Vec<DMatrix<f64>> = choice.coefficients.iter().map(updated).collect();
     let flown = CardSet::times(&choice, &times);
     for aim in &choice.aims {
         let parts = aim.parts.iter();
-        let variance: f64 = parts.map(|(s, row)| expected[*s][(*row, *row)]).sum();
+        let variance: f64 = parts
+            .map(|part| expected[part.coefficient][(part.row, part.row)])
+            .sum();
         assert_relative_eq!(flown.deviation(aim), variance.sqrt(), max_relative = 1e-9);
     }
     times[4] = 1;

@@ -12,7 +12,7 @@ use crate::flight_plan::candidate::{Candidate, candidates};
 use crate::flight_plan::choice::Budget;
 use crate::flight_plan::experience::CampaignHistory;
 use crate::flight_plan::goals::Goal;
-use crate::flight_plan::plan::{Plan, Rehearsal, Tonight, plan};
+use crate::flight_plan::plan::{CampaignState, Plan, Rehearsal, plan};
 use crate::flight_plan::rehearsal::{RehearsalBasis, derivatives, instruments};
 use crate::lab::campaign::{FlightLimits, SimulatedCampaign, TestPoint, tunnel_rows};
 use crate::lab::simulator::{Instruments, Simulator};
@@ -123,13 +123,13 @@ impl World {
         };
         let rehearse = |candidate: Candidate| {
             let result = basis.rehearse(&candidate);
-            (candidate, result)
+            Rehearsal { candidate, result }
         };
         let rehearsals: Vec<Rehearsal> = self.candidates().into_par_iter().map(rehearse).collect();
         let maneuvers: Vec<Maneuver> = flown.iter().map(|(m, _)| m.clone()).collect();
         let fits: Vec<_> = flown.iter().map(|(_, e)| e.fit.clone()).collect();
         let covariances: Vec<_> = flown.iter().map(|(_, e)| e.covariance.clone()).collect();
-        let tonight = Tonight {
+        let state = CampaignState {
             model: &model,
             evidence: &evidence,
             history: CampaignHistory {
@@ -145,7 +145,7 @@ impl World {
             matches: &BTreeMap::new(),
         };
         let goals: Vec<Goal> = model.quantities().map(Goal::of).collect();
-        plan(&tonight, &rehearsals, &goals, budget)
+        plan(&state, &rehearsals, &goals, budget)
     }
 
     /// Cards of a plan, each as often as it is flown.

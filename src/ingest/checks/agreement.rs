@@ -19,7 +19,7 @@ const LEAST_SELECTED: usize = 5;
 /// which it holds a jump of the record: far beyond noise, gusts and turbulence.
 const JUMP_DEVIATIONS: f64 = 10.0;
 
-/// Limit in its place for a relation that gusts excite: from there on it holds a motion of a control.
+/// The same limit for a relation that only gusts excite: a window beyond it holds the motion of a control.
 const MANEUVER_DEVIATIONS: f64 = 3.0;
 
 /// Least change of the gusts' velocity with which a relation that they excite is checked, ft/s²:
@@ -41,7 +41,7 @@ const LEAST_FOR_FIT: usize = 2;
 pub struct Check {
     pub relation: Relation,
     pub verdict: CheckVerdict,
-    pub fit: Option<Fit>,
+    pub fit: Option<LineFit>,
     /// Number of windows in which the record jumps.
     pub jumps: usize,
 }
@@ -61,7 +61,7 @@ impl Check {
 
 /// Least-squares line through the origin, measured over predicted.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fit {
+pub struct LineFit {
     pub slope: f64,
     pub standard_error: f64,
     pub correlation: f64,
@@ -316,14 +316,14 @@ fn median_slope(pairs: &[WindowPair]) -> f64 {
 
 /// Fits the windows without jumps; the misfit is that of `all` windows. `None` where a side is
 /// nothing but zeros.
-fn fit(pairs: &[WindowPair], all: &[WindowPair]) -> Option<Fit> {
+fn fit(pairs: &[WindowPair], all: &[WindowPair]) -> Option<LineFit> {
     let (xx, yy) = (sum(pairs, |x, _| x * x), sum(pairs, |_, y| y * y));
     let xy = sum(pairs, |x, y| x * y);
     let slope = xy / xx;
     let residual = sum(pairs, |x, y| (y - slope * x).powi(2));
     let (all_xx, all_yy) = (sum(all, |x, _| x * x), sum(all, |_, y| y * y));
     let difference = sum(all, |x, y| (y - x).powi(2));
-    let fit = Fit {
+    let fit = LineFit {
         slope,
         standard_error: (residual / (pairs.len() - 1) as f64 / xx).sqrt(),
         correlation: xy / (xx * yy).sqrt(),
@@ -345,7 +345,7 @@ fn sum(pairs: &[WindowPair], term: impl Fn(f64, f64) -> f64) -> f64 {
 /// biases and gusts can make it. Correlation counts only where windows are selected by a level that
 /// noise does not reach, and as far as gusts leave it.
 fn verdict_of(
-    fit: &Fit,
+    fit: &LineFit,
     relation: &Relation,
     disturbance: Disturbance,
     settings: &Checks,
@@ -393,7 +393,7 @@ mod tests {
             ..relations::all(&settings)[0]
         };
         verdict_of(
-            &Fit {
+            &LineFit {
                 slope,
                 standard_error,
                 correlation,

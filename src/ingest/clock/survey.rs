@@ -84,7 +84,8 @@ struct Stream {
 }
 
 impl Stream {
-    /// `true` where a file holds at least half of the stream's columns, or the stream half of its.
+    /// `true` where a file holds at least half of the stream's columns, or the stream at least half of the
+    /// file's.
     fn shares_half(&self, columns: &BTreeSet<String>) -> bool {
         let common = self.columns.intersection(columns).count();
         2 * common >= self.columns.len().min(columns.len())

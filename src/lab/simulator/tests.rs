@@ -24,7 +24,7 @@ use crate::lab::campaign::SimulatedCampaign;
 use crate::maneuver::{Maneuver, Status};
 use crate::numerics::random::RandomStream;
 use crate::rigid_body::{AirData, BodyState, Euler};
-use crate::surfaces::{self, Basis};
+use crate::surfaces::{self, AircraftModel};
 use crate::tables::Outcome;
 use crate::units::DEG;
 
@@ -665,7 +665,7 @@ fn late(campaign: &SimulatedCampaign, delays_s: &[(&str, f64)]) -> Instruments {
 fn delays_of_a_recorder_s_buses_are_found_within_their_bounds() {
     let campaign = shipped_campaign();
     let config = &campaign.config;
-    let basis = Basis {
+    let basis = AircraftModel {
         aircraft: &config.aircraft,
         buildup: &config.buildup,
         tunnel: &config.tunnel,

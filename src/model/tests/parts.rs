@@ -12,7 +12,7 @@ use crate::model::open_scales::add_open_scales;
 use crate::model::posterior::{LeavingOut, gaussian, information, of_differences};
 use crate::model::scale_prior::Scale;
 use crate::model::scales::{logarithms_of, most_probable, negative_log_posterior, scales_of};
-use crate::model::term::{Basis, Term};
+use crate::model::term::{Term, TermSources};
 use crate::model::touched::Touched;
 use crate::model::unknowns::root_of_differences;
 use crate::model::{Evidence, Settings};
@@ -50,7 +50,7 @@ pub fn campaign() -> Vec<Flown> {
 pub fn data(flown: &[Flown], settings: &Settings) -> (Vec<Term>, Data) {
     let evidence: Vec<Evidence> = flown.iter().map(Flown::evidence).collect();
     let (buildup, tunnel) = (buildup(), tunnel(None));
-    let basis = Basis {
+    let basis = TermSources {
         buildup: &buildup,
         tunnel: &tunnel,
         settings,

@@ -73,25 +73,8 @@ impl Campaign {
 
 fn fit(maneuver_id: &str, class: &str) -> FitRow {
     FitRow {
-        maneuver_id: maneuver_id.to_owned(),
-        class: class.to_owned(),
-        outcome: Outcome::Converged,
-        reason: String::new(),
-        start: None,
         iterations: 5,
-        initial_cost: None,
-        final_cost: None,
-        condition_number: None,
-        left_out: None,
-        largest_condition_index: None,
-        confounded: None,
-        method: None,
-        gust_ft_s: None,
-        rotary_gust_deg_s: None,
-        gust_corner_rad_s: None,
-        autocorrelation: None,
-        likelihood_gain: None,
-        equation_error_distance: None,
+        ..FitRow::without_numbers(maneuver_id, class, Outcome::Converged)
     }
 }
 

@@ -20,7 +20,7 @@ use crate::settings::settings;
 settings! {
     /// Limits of the identifiability measures.
     #[derive(Copy)]
-    pub struct Limits {
+    pub struct CollinearityLimits {
         /// Smallest absolute correlation of two estimates that is published. Smaller: more rows in
         /// `correlations`.
         pub published_correlation: f64 = 0.5,
@@ -38,7 +38,7 @@ settings! {
 
 /// Group of parameters that the data hardly separate.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Group {
+pub struct CollinearGroup {
     /// Condition index; infinite where the data do not separate them at all.
     pub condition_index: f64,
     pub parameters: Vec<usize>,
@@ -54,7 +54,7 @@ pub struct Collinearity {
     /// Largest condition index, `√(λ_max/λ_min)`; infinite where a direction is undetermined.
     pub largest_index: f64,
     /// Groups, worst first.
-    pub groups: Vec<Group>,
+    pub groups: Vec<CollinearGroup>,
 }
 
 /// Computes the collinearity of an information matrix; `None` where it is empty or not finite. A
@@ -63,7 +63,7 @@ pub struct Collinearity {
 pub fn collinearity(
     information: &DMatrix<f64>,
     max_condition_number: f64,
-    limits: &Limits,
+    limits: &CollinearityLimits,
 ) -> Option<Collinearity> {
     let n = information.nrows();
     if n == 0 || !information.iter().all(|h| h.is_finite()) {
@@ -144,7 +144,7 @@ impl Directions {
         self.eigen.eigenvalues[k] <= self.floor
     }
 
-    fn groups(&self, limits: &Limits) -> Vec<Group> {
+    fn groups(&self, limits: &CollinearityLimits) -> Vec<CollinearGroup> {
         let n = self.eigen.eigenvalues.len();
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by(|a, b| self.eigen.eigenvalues[*a].total_cmp(&self.eigen.eigenvalues[*b]));
@@ -153,7 +153,7 @@ impl Directions {
     }
 
     /// Group of a direction; `None` below the limits.
-    fn group(&self, k: usize, limits: &Limits) -> Option<Group> {
+    fn group(&self, k: usize, limits: &CollinearityLimits) -> Option<CollinearGroup> {
         let index = (self.most / self.eigenvalue(k)).sqrt();
         let parameters: Vec<usize> = (0..self.eigen.eigenvalues.len())
             .filter(|&j| self.part(j, k) / self.variance(j) >= limits.variance_proportion)
@@ -163,7 +163,7 @@ impl Directions {
         } else {
             index
         };
-        (index >= limits.condition_index && parameters.len() >= 2).then_some(Group {
+        (index >= limits.condition_index && parameters.len() >= 2).then_some(CollinearGroup {
             condition_index,
             parameters,
         })
@@ -231,7 +231,7 @@ mod tests {
     }
 
     fn measured(information: &DMatrix<f64>) -> Collinearity {
-        collinearity(information, 1e10, &Limits::default()).unwrap()
+        collinearity(information, 1e10, &CollinearityLimits::default()).unwrap()
     }
 
     #[test]
@@ -278,7 +278,7 @@ mod tests {
         assert!(c.correlation.is_none() && c.largest_index.is_infinite());
         assert_eq!(
             c.groups,
-            [Group {
+            [CollinearGroup {
                 condition_index: f64::INFINITY,
                 parameters: vec![0, 1]
             }]

@@ -4,4 +4,6 @@
 pub mod collinearity;
 pub mod holding;
 
-pub use collinearity::{Collinearity, Group, Limits, collinearity, correlation, excitation};
+pub use collinearity::{
+    CollinearGroup, Collinearity, CollinearityLimits, collinearity, correlation, excitation,
+};

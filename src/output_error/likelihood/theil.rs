@@ -22,7 +22,7 @@ pub struct Theil {
 
 /// Moments of pairs of measured z and computed y of one output.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Agreement {
+pub struct OutputAgreement {
     pub samples: usize,
     mean_measured: f64,
     mean_computed: f64,
@@ -34,13 +34,13 @@ pub struct Agreement {
     product: f64,
 }
 
-impl Agreement {
+impl OutputAgreement {
     /// Moments of pairs (measured, computed).
     #[must_use]
-    pub fn of(pairs: &[(f64, f64)]) -> Agreement {
+    pub fn of(pairs: &[(f64, f64)]) -> OutputAgreement {
         let mean_measured = mean(pairs, |z, _| z);
         let mean_computed = mean(pairs, |_, y| y);
-        Agreement {
+        OutputAgreement {
             samples: pairs.len(),
             mean_measured,
             mean_computed,
@@ -55,12 +55,12 @@ impl Agreement {
     pub fn of_outputs(
         measured: &Measurements,
         computed: &[[f64; OUTPUTS]],
-    ) -> [Agreement; OUTPUTS] {
+    ) -> [OutputAgreement; OUTPUTS] {
         let samples = measured.values.iter().zip(&measured.used).zip(computed);
         std::array::from_fn(|o| {
             let counted = samples.clone().filter(|((_, used), _)| used[o]);
             let pairs: Vec<(f64, f64)> = counted.map(|((z, _), y)| (z[o], y[o])).collect();
-            Agreement::of(&pairs)
+            OutputAgreement::of(&pairs)
         })
     }
 
@@ -109,7 +109,7 @@ fn mean(pairs: &[(f64, f64)], value: impl Fn(f64, f64) -> f64) -> f64 {
 /// Theil's coefficient of several outputs together, weighted as in the cost; `None` where all are
 /// zero. An exact prediction has no difference to divide: its parts are zero.
 #[must_use]
-pub fn theil(outputs: &[(Agreement, f64)]) -> Option<Theil> {
+pub fn theil(outputs: &[(OutputAgreement, f64)]) -> Option<Theil> {
     let (mut parts, mut measured, mut computed) = ([0.0; 3], 0.0, 0.0);
     for (output, weight) in outputs {
         let weight = weight * output.samples as f64;
@@ -147,8 +147,8 @@ mod tests {
         (std::f64::consts::TAU * k as f64 / 100.0).cos()
     }
 
-    fn agreement(z: impl Fn(usize) -> f64, y: impl Fn(usize) -> f64) -> Agreement {
-        Agreement::of(&(0..400).map(|k| (z(k), y(k))).collect::<Vec<_>>())
+    fn agreement(z: impl Fn(usize) -> f64, y: impl Fn(usize) -> f64) -> OutputAgreement {
+        OutputAgreement::of(&(0..400).map(|k| (z(k), y(k))).collect::<Vec<_>>())
     }
 
     #[test]
@@ -200,7 +200,7 @@ mod tests {
         let pairs: Vec<(f64, f64)> = (0..57)
             .map(|k| (sine(k) + 0.3, 0.7 * cosine(3 * k) - 0.1 * sine(k)))
             .collect();
-        let a = Agreement::of(&pairs);
+        let a = OutputAgreement::of(&pairs);
         let u = a.theil().unwrap();
         assert_relative_eq!(
             u.bias + u.variance + u.covariance,
@@ -221,7 +221,7 @@ mod tests {
         );
         let both = theil(&[(good, 1.0), (bad, 1.0)]).unwrap();
         assert!(both.coefficient < bad.theil().unwrap().coefficient && both.bias > 0.999);
-        assert_eq!(Agreement::of(&[]).theil(), None);
+        assert_eq!(OutputAgreement::of(&[]).theil(), None);
         assert_eq!(agreement(|_| 2.0, sine).r_squared(), None);
     }
 }

@@ -11,7 +11,7 @@ use crate::estimate;
 use crate::model::LocalPosterior;
 use crate::numerics::random::RandomStream;
 use crate::proof_of_match::outputs::place;
-use crate::proof_of_match::{Basis, Flown, decisive_difference};
+use crate::proof_of_match::{Flown, ProofInputs, decisive_difference};
 use crate::tables::{MatchedQuantity, ModelSource};
 
 /// Decisive difference of a class at 20 deg when a database predicts it, about the truth.
@@ -24,7 +24,7 @@ fn decisive(
     let flown = flown(class, 20.0);
     let record = noisy(&flown, 1);
     let mean = truth(&flown, "", 1.0);
-    let basis = Basis {
+    let basis = ProofInputs {
         aircraft: &shipped().config.aircraft,
         buildup: &shipped().config.buildup,
         models: &[(model, database)],
@@ -147,7 +147,7 @@ fn a_dutch_roll_that_is_wrong_decides_with_its_difference_in_tolerances() {
     let record = noisy(&flown, 1);
     let mean = truth(&flown, "", 1.0);
     let decisive = |database: WindTunnel, own| {
-        let basis = Basis {
+        let basis = ProofInputs {
             aircraft: &config.aircraft,
             buildup: &config.buildup,
             models: &[(ModelSource::Tunnel, database)],

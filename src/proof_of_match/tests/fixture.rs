@@ -16,7 +16,7 @@ use crate::proof_of_match::aerodynamics::Aerodynamics;
 use crate::proof_of_match::derivative_table::DerivativeTable;
 use crate::proof_of_match::free_run::Simulation;
 use crate::proof_of_match::recording::Recording;
-use crate::proof_of_match::{Basis, Flown, Matched, OwnEstimates, Specification, fly_again};
+use crate::proof_of_match::{Flown, Matched, OwnEstimates, ProofInputs, Specification, fly_again};
 use crate::tables::{MatchVerdictRow, ModelSource};
 
 pub fn shipped() -> &'static SimulatedCampaign {
@@ -118,7 +118,7 @@ pub fn proof_with(
     specification: &Specification,
 ) -> Matched {
     let models = [(ModelSource::Tunnel, database)];
-    let basis = Basis {
+    let basis = ProofInputs {
         aircraft: &shipped().config.aircraft,
         buildup: &shipped().config.buildup,
         models: &models,

@@ -14,7 +14,7 @@ use crate::aero::Axis;
 use crate::aircraft::Aircraft;
 use crate::qualities::linear::{Differentiation, LinearModel, Solved, Vector};
 use crate::qualities::trim::Trim;
-use crate::tables::Quantity;
+use crate::tables::FlyingQuality;
 
 const VELOCITY: f64 = 774.0;
 const GRAVITY: f64 = 32.2;
@@ -102,7 +102,7 @@ fn the_zeros_and_the_load_factor_are_those_of_the_transfer_functions() {
         all.find(|(q, _)| *q == quantity).unwrap().1.value
     };
     // Where the transfer function is zero, the system matrix is singular.
-    let zero = -value(Quantity::AttitudeZero);
+    let zero = -value(FlyingQuality::AttitudeZero);
     let mut system = DMatrix::<f64>::zeros(5, 5);
     let Solved {
         matrix: a, control, ..
@@ -117,16 +117,16 @@ fn the_zeros_and_the_load_factor_are_those_of_the_transfer_functions() {
     let size = system.clone().singular_values();
     assert!(size.min() < 1e-9 * size.max(), "{size}");
     // The usual approximation of n/α: V/g times the larger zero.
-    let usual = VELOCITY / GRAVITY * value(Quantity::AttitudeZero);
+    let usual = VELOCITY / GRAVITY * value(FlyingQuality::AttitudeZero);
     assert_relative_eq!(
-        value(Quantity::LoadFactorPerAlpha),
+        value(FlyingQuality::LoadFactorPerAlpha),
         usual,
         max_relative = 0.02
     );
-    let frequency = value(Quantity::ShortPeriodFrequency);
+    let frequency = value(FlyingQuality::ShortPeriodFrequency);
     assert_relative_eq!(
-        value(Quantity::ControlAnticipation),
-        frequency * frequency / value(Quantity::LoadFactorPerAlpha),
+        value(FlyingQuality::ControlAnticipation),
+        frequency * frequency / value(FlyingQuality::LoadFactorPerAlpha),
         max_relative = 1e-12
     );
 }

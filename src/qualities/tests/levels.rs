@@ -3,9 +3,9 @@
 use super::fixture::specification;
 use crate::qualities::levels::level;
 use crate::qualities::specification::{AirplaneClass, Category, Specification};
-use crate::tables::{Level, Quantity};
+use crate::tables::{FlyingQuality, Level};
 
-fn found(specification: &Specification, paragraph: &str, values: &[(Quantity, f64)]) -> Level {
+fn found(specification: &Specification, paragraph: &str, values: &[(FlyingQuality, f64)]) -> Level {
     let mut all = specification.requirements.iter();
     let requirement = all.find(|r| r.paragraph == paragraph).unwrap();
     level(specification, requirement, values)
@@ -30,7 +30,7 @@ fn short_period_damping_has_the_levels_of_table_iv() {
             category,
             ..specification()
         };
-        let values = [(Quantity::ShortPeriodDamping, damping)];
+        let values = [(FlyingQuality::ShortPeriodDamping, damping)];
         assert_eq!(
             found(&specification, "3.2.2.1.2", &values),
             expected,
@@ -53,19 +53,22 @@ fn limits_follow_the_class_of_the_aircraft() {
             class,
             ..specification()
         };
-        let values = [(Quantity::RollTimeConstant, constant)];
+        let values = [(FlyingQuality::RollTimeConstant, constant)];
         assert_eq!(found(&specification, "3.3.1.2", &values), expected);
     }
 }
 
 /// Dutch roll of a frequency of 2.5 rad/s.
-fn dutch_roll(decay: f64, phi_beta: f64) -> [(Quantity, f64); 4] {
+fn dutch_roll(decay: f64, phi_beta: f64) -> [(FlyingQuality, f64); 4] {
     let frequency = 2.5;
     [
-        (Quantity::DutchRollFrequency, frequency),
-        (Quantity::DutchRollDamping, decay / frequency),
-        (Quantity::DutchRollDecay, decay),
-        (Quantity::DutchRollBank, frequency * frequency * phi_beta),
+        (FlyingQuality::DutchRollFrequency, frequency),
+        (FlyingQuality::DutchRollDamping, decay / frequency),
+        (FlyingQuality::DutchRollDecay, decay),
+        (
+            FlyingQuality::DutchRollBank,
+            frequency * frequency * phi_beta,
+        ),
     ]
 }
 
@@ -90,7 +93,7 @@ fn a_dutch_roll_that_rolls_much_needs_more_damping() {
 fn a_mode_that_does_not_exist_has_no_limit() {
     let specification = specification();
     assert_eq!(found(&specification, "3.3.1.2", &[]), Level::One);
-    let coupled = [(Quantity::RollSpiralDecay, 0.6)];
+    let coupled = [(FlyingQuality::RollSpiralDecay, 0.6)];
     assert_eq!(found(&specification, "3.3.1.4", &coupled), Level::Worse);
     let loiter = Specification {
         category: Category::B,
@@ -109,8 +112,8 @@ fn a_phugoid_that_diverges_slowly_is_level_3() {
         (-0.1, 50.0, Level::Worse),
     ] {
         let values = [
-            (Quantity::PhugoidDamping, damping),
-            (Quantity::PhugoidTimeToDouble, time),
+            (FlyingQuality::PhugoidDamping, damping),
+            (FlyingQuality::PhugoidTimeToDouble, time),
         ];
         assert_eq!(
             found(&specification, "3.2.1.2", &values),

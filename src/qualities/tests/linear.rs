@@ -12,7 +12,7 @@ use crate::model::{LocalKind, LocalPosterior, LocalValue};
 use crate::qualities::linear::{
     AxisStates, Controls, Differentiation, Effect, Flight, Lag, LinearModel, Matrix, Vector,
 };
-use crate::tables::Quantity;
+use crate::tables::FlyingQuality;
 use crate::units::DEG;
 
 /// Rates of velocity, α, q, θ from forces and moment in flight without sideslip, at constant density
@@ -361,7 +361,7 @@ fn the_fighter_has_every_mode() {
         let found = linear.quantities(axis, &posterior.mean, Differentiation::ValuesAlone);
         found.unwrap().quantities
     };
-    let all: BTreeMap<Quantity, f64> = [Axis::Longitudinal, Axis::Lateral]
+    let all: BTreeMap<FlyingQuality, f64> = [Axis::Longitudinal, Axis::Lateral]
         .into_iter()
         .flat_map(quantities)
         .map(|(q, dual)| (q, dual.value))
@@ -373,15 +373,15 @@ fn the_fighter_has_every_mode() {
             all[&quantity]
         );
     };
-    near(Quantity::ShortPeriodFrequency, 0.5..2.0);
-    near(Quantity::PhugoidFrequency, 0.05..0.2);
-    near(Quantity::DutchRollFrequency, 0.8..2.5);
-    near(Quantity::RollTimeConstant, 0.2..3.0);
-    near(Quantity::PhiBeta, 0.5..8.0);
+    near(FlyingQuality::ShortPeriodFrequency, 0.5..2.0);
+    near(FlyingQuality::PhugoidFrequency, 0.05..0.2);
+    near(FlyingQuality::DutchRollFrequency, 0.8..2.5);
+    near(FlyingQuality::RollTimeConstant, 0.2..3.0);
+    near(FlyingQuality::PhiBeta, 0.5..8.0);
     // V/g times the lift slope: 360/32.1 · q̄S CN_α/(m V) times 57.3.
     let lift = 70.0 * 400.0 * 0.055 * DEG * 15f64.to_radians().cos() / (1040.0 * 360.0);
     assert_relative_eq!(
-        all[&Quantity::LoadFactorPerAlpha],
+        all[&FlyingQuality::LoadFactorPerAlpha],
         360.0 / 32.1 * lift,
         max_relative = 0.15
     );

@@ -13,7 +13,7 @@ use crate::numerics::root::{EXACT, root};
 use crate::qualities::analysis::AxisAnalysis;
 use crate::qualities::levels::level;
 use crate::qualities::linear::Differentiation;
-use crate::tables::{DeviationBasis, Level, Quantity};
+use crate::tables::{DeviationBasis, FlyingQuality, Level};
 
 /// A draw from a Gaussian.
 fn drawn(mean: &DVector<f64>, root: &DMatrix<f64>, stream: &mut RandomStream) -> DVector<f64> {
@@ -42,7 +42,7 @@ fn the_95_percent_intervals_of_all_quantities_hold_in_1000_campaigns() {
         let truth = correlated(axis, 0.04);
         let linear = linear(axis, &truth);
         let of_truth = linear.quantities(axis, &truth.mean, Differentiation::ValuesAlone);
-        let of_truth: BTreeMap<Quantity, f64> = of_truth
+        let of_truth: BTreeMap<FlyingQuality, f64> = of_truth
             .unwrap()
             .quantities
             .into_iter()
@@ -50,7 +50,7 @@ fn the_95_percent_intervals_of_all_quantities_hold_in_1000_campaigns() {
             .collect();
         let root = root(&truth.covariance, EXACT);
         let mut stream = RandomStream::new(5, axis.name());
-        let mut inside: BTreeMap<Quantity, usize> = BTreeMap::new();
+        let mut inside: BTreeMap<FlyingQuality, usize> = BTreeMap::new();
         for _ in 0..CAMPAIGNS {
             let estimated = LocalPosterior {
                 mean: drawn(&truth.mean, &root, &mut stream),
@@ -125,7 +125,7 @@ fn the_probability_of_level_1_comes_true() {
     let linear = linear(axis, &prior);
     let of_prior = linear.quantities(axis, &prior.mean, Differentiation::ValuesAlone);
     let of_prior = of_prior.unwrap().quantities;
-    let is_damping = |(q, _): &&(Quantity, Dual)| *q == Quantity::ShortPeriodDamping;
+    let is_damping = |(q, _): &&(FlyingQuality, Dual)| *q == FlyingQuality::ShortPeriodDamping;
     let middle = of_prior.iter().find(is_damping).unwrap().1.value;
     // The limit is in the middle of the prior, so that forecasts are uncertain.
     let mut specification = specification();
@@ -139,7 +139,7 @@ fn the_probability_of_level_1_comes_true() {
     let noise_root = root(&(&prior.covariance * 0.25), EXACT);
     let mut stream = RandomStream::new(11, "forecasts");
     let level_1 =
-        |values: &[(Quantity, f64)]| level(&specification, &damping, values) == Level::One;
+        |values: &[(FlyingQuality, f64)]| level(&specification, &damping, values) == Level::One;
     let mut forecasts = Vec::new();
     for _ in 0..400 {
         let truth = drawn(&prior.mean, &prior_root, &mut stream);
@@ -150,12 +150,12 @@ fn the_probability_of_level_1_comes_true() {
             values: prior.values.clone(),
         };
         let found = AxisAnalysis::of(axis, &linear, &estimated, 200).unwrap();
-        let is_level_1 = |draw: &&BTreeMap<Quantity, f64>| {
+        let is_level_1 = |draw: &&BTreeMap<FlyingQuality, f64>| {
             level_1(&draw.iter().map(|(q, v)| (*q, *v)).collect::<Vec<_>>())
         };
         let count = found.draws.iter().filter(is_level_1).count();
         let of_truth = linear.quantities(axis, &truth, Differentiation::ValuesAlone);
-        let of_truth: Vec<(Quantity, f64)> = of_truth
+        let of_truth: Vec<(FlyingQuality, f64)> = of_truth
             .unwrap()
             .quantities
             .into_iter()

@@ -8,7 +8,7 @@ use crate::qualities::{Qualities, Specification};
 use crate::report::contents::Contents;
 use crate::report::notation::{NOTHING, angle, fixed, number};
 use crate::report::table_view::TableView;
-use crate::tables::{Airframe, Level, LevelRow, QualityRow, Quantity};
+use crate::tables::{Airframe, FlyingQuality, Level, LevelRow, QualityRow};
 
 /// The section.
 #[derive(Clone, Debug, Serialize)]
@@ -34,22 +34,22 @@ const CERTAIN_PCT: f64 = 95.0;
 const SPACING_DEG: f64 = 5.0;
 
 /// Quantities of an axis with their symbols.
-const LONGITUDINAL: [(Quantity, &str); 7] = [
-    (Quantity::ShortPeriodFrequency, "ω sp, rad/s"),
-    (Quantity::ShortPeriodDamping, "ζ sp"),
-    (Quantity::LoadFactorPerAlpha, "n/α, g/rad"),
-    (Quantity::ControlAnticipation, "CAP, 1/(g s²)"),
-    (Quantity::AttitudeZero, "1/T θ2, 1/s"),
-    (Quantity::PhugoidFrequency, "ω ph, rad/s"),
-    (Quantity::PhugoidDamping, "ζ ph"),
+const LONGITUDINAL: [(FlyingQuality, &str); 7] = [
+    (FlyingQuality::ShortPeriodFrequency, "ω sp, rad/s"),
+    (FlyingQuality::ShortPeriodDamping, "ζ sp"),
+    (FlyingQuality::LoadFactorPerAlpha, "n/α, g/rad"),
+    (FlyingQuality::ControlAnticipation, "CAP, 1/(g s²)"),
+    (FlyingQuality::AttitudeZero, "1/T θ2, 1/s"),
+    (FlyingQuality::PhugoidFrequency, "ω ph, rad/s"),
+    (FlyingQuality::PhugoidDamping, "ζ ph"),
 ];
-const LATERAL: [(Quantity, &str); 6] = [
-    (Quantity::DutchRollFrequency, "ω d, rad/s"),
-    (Quantity::DutchRollDamping, "ζ d"),
-    (Quantity::PhiBeta, "|φ/β|"),
-    (Quantity::RollTimeConstant, "T R, s"),
-    (Quantity::SpiralRate, "1/T s, 1/s"),
-    (Quantity::RollSpiralDecay, "ζω of roll and spiral, 1/s"),
+const LATERAL: [(FlyingQuality, &str); 6] = [
+    (FlyingQuality::DutchRollFrequency, "ω d, rad/s"),
+    (FlyingQuality::DutchRollDamping, "ζ d"),
+    (FlyingQuality::PhiBeta, "|φ/β|"),
+    (FlyingQuality::RollTimeConstant, "T R, s"),
+    (FlyingQuality::SpiralRate, "1/T s, 1/s"),
+    (FlyingQuality::RollSpiralDecay, "ζω of roll and spiral, 1/s"),
 ];
 
 /// The section; `None` without a specification or flown conditions.
@@ -203,14 +203,14 @@ fn mode_table(
     rows: &[&QualityRow],
     alphas: &[f64],
     axis: Axis,
-    quantities: &[(Quantity, &str)],
+    quantities: &[(FlyingQuality, &str)],
 ) -> TableView {
     let heads: Vec<&str> = ["α", "q̄, lb/ft²", "path"]
         .into_iter()
         .chain(quantities.iter().map(|(_, symbol)| *symbol))
         .collect();
     let line = |alpha: &f64| {
-        let at = |quantity: Quantity| {
+        let at = |quantity: FlyingQuality| {
             let mut own = rows.iter();
             own.find(|row| is_at(row.alpha_deg, *alpha) && row.quantity == quantity)
         };

@@ -11,7 +11,7 @@ use crate::report::figure::xy_chart::{
     self, ChartAxis, ChartPoint, ChartSeries, LevelBox, XyChart, decades,
 };
 use crate::report::notation::angle;
-use crate::tables::{Airframe, Level, LevelRow, QualityRow, Quantity, RootRow};
+use crate::tables::{Airframe, FlyingQuality, Level, LevelRow, QualityRow, RootRow};
 
 /// A chart with its caption.
 #[derive(Clone, Debug, Serialize)]
@@ -71,15 +71,15 @@ pub fn charts(
         PairChart {
             id: "short-period",
             title: "Short period: control anticipation over damping",
-            x: (Quantity::ShortPeriodDamping, "ζ"),
-            y: (Quantity::ControlAnticipation, "ω²/(n/α), 1/(g s²)"),
+            x: (FlyingQuality::ShortPeriodDamping, "ζ"),
+            y: (FlyingQuality::ControlAnticipation, "ω²/(n/α), 1/(g s²)"),
             is_logarithmic: true,
         },
         PairChart {
             id: "dutch-roll",
             title: "Dutch roll: frequency over damping",
-            x: (Quantity::DutchRollDamping, "ζ"),
-            y: (Quantity::DutchRollFrequency, "ω, rad/s"),
+            x: (FlyingQuality::DutchRollDamping, "ζ"),
+            y: (FlyingQuality::DutchRollFrequency, "ω, rad/s"),
             is_logarithmic: false,
         },
     ];
@@ -169,8 +169,8 @@ impl LevelLine {
 struct PairChart {
     id: &'static str,
     title: &'static str,
-    x: (Quantity, &'static str),
-    y: (Quantity, &'static str),
+    x: (FlyingQuality, &'static str),
+    y: (FlyingQuality, &'static str),
     is_logarithmic: bool,
 }
 
@@ -211,7 +211,7 @@ impl PairChart {
     }
 
     fn points(&self, rows: &[&QualityRow]) -> Vec<ChartPoint> {
-        let of = |quantity: Quantity| rows.iter().filter(move |row| row.quantity == quantity);
+        let of = |quantity: FlyingQuality| rows.iter().filter(move |row| row.quantity == quantity);
         let mut points = Vec::new();
         for y in of(self.y.0) {
             let is_same = |x: &&&QualityRow| (x.alpha_deg - y.alpha_deg).abs() < 1e-9;

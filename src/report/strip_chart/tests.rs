@@ -61,25 +61,12 @@ fn maneuver_at(start_s: f64) -> Maneuver {
 
 fn fit(outcome: Outcome, reason: &str) -> FitRow {
     FitRow {
-        maneuver_id: "f_t00020".into(),
-        class: "STEPS".into(),
-        outcome,
         reason: reason.into(),
-        start: None,
         iterations: 5,
         initial_cost: Some(1.0),
         final_cost: Some(0.5),
-        condition_number: None,
         left_out: Some(0.01),
-        largest_condition_index: None,
-        confounded: None,
-        method: None,
-        gust_ft_s: None,
-        rotary_gust_deg_s: None,
-        gust_corner_rad_s: None,
-        autocorrelation: None,
-        likelihood_gain: None,
-        equation_error_distance: None,
+        ..FitRow::without_numbers("f_t00020", "STEPS", outcome)
     }
 }
 

@@ -6,7 +6,7 @@ use crate::tables::{DrawRow, ExportRow};
 
 /// One derivative over the grid of angle of attack, Mach number and third variable.
 #[derive(Clone, Debug, PartialEq)]
-pub struct DerivativeTable {
+pub struct ExportTable {
     pub derivative: String,
     pub unit: String,
     pub alphas_deg: Vec<f64>,
@@ -33,7 +33,7 @@ pub(super) fn is_same_breakpoint(a: f64, b: f64) -> bool {
     (a - b).abs() < 1e-6
 }
 
-impl DerivativeTable {
+impl ExportTable {
     /// Points of the grid with their cells, in the order of the cells.
     pub fn points(&self) -> impl Iterator<Item = (Condition, &GridCell)> {
         let places = each_or_none(&self.thirds)
@@ -92,7 +92,7 @@ impl DerivativeTable {
 
 /// Rows of one draw's tables.
 #[must_use]
-pub fn draw_rows(draw: usize, tables: &[DerivativeTable]) -> Vec<DrawRow> {
+pub fn draw_rows(draw: usize, tables: &[ExportTable]) -> Vec<DrawRow> {
     let row = |row: ExportRow| DrawRow {
         draw,
         derivative: row.derivative,
@@ -107,8 +107,8 @@ pub fn draw_rows(draw: usize, tables: &[DerivativeTable]) -> Vec<DrawRow> {
 
 /// Rows of the tables, in the columns of a wind-tunnel database.
 #[must_use]
-pub fn rows(tables: &[DerivativeTable]) -> Vec<ExportRow> {
-    let row = |table: &DerivativeTable, at: Condition, cell: &GridCell| ExportRow {
+pub fn rows(tables: &[ExportTable]) -> Vec<ExportRow> {
+    let row = |table: &ExportTable, at: Condition, cell: &GridCell| ExportRow {
         derivative: table.derivative.clone(),
         alpha_deg: at.alpha_deg,
         mach: Some(at.mach).filter(|_| !table.machs.is_empty()),

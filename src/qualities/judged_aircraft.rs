@@ -7,7 +7,7 @@ use crate::model::Model;
 
 /// Aircraft and posterior whose flying qualities are judged, with the specification.
 #[derive(Clone, Copy, Debug)]
-pub struct Basis<'a> {
+pub struct JudgedAircraft<'a> {
     pub model: &'a Model,
     pub aircraft: &'a Aircraft,
     pub buildup: &'a Buildup,

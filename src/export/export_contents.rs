@@ -1,6 +1,6 @@
 //! Everything that an export is made from.
 
-use super::derivative_table::DerivativeTable;
+use super::export_table::ExportTable;
 use super::settings::Settings;
 use crate::aero::{Buildup, Coefficient, Derivative, Regressor, WindTunnel};
 use crate::aircraft::Aircraft;
@@ -9,7 +9,7 @@ use crate::tables::PosteriorRow;
 
 /// Everything that an export is made from.
 #[derive(Clone, Copy, Debug)]
-pub struct Contents<'a> {
+pub struct ExportContents<'a> {
     pub title: &'a str,
     pub aircraft: &'a Aircraft,
     pub buildup: &'a Buildup,
@@ -22,8 +22,8 @@ pub struct Contents<'a> {
 
 /// Derivatives of one coefficient that have a table: those of vanes, or all others.
 pub(super) fn terms<'a>(
-    contents: &'a Contents,
-    tables: &'a [DerivativeTable],
+    contents: &'a ExportContents,
+    tables: &'a [ExportTable],
     coefficient: Coefficient,
     of_vanes: bool,
 ) -> impl Iterator<Item = &'a Derivative> {
