@@ -182,12 +182,12 @@ impl Filtered {
     }
 }
 
-/// Iterates from still or from moving air as the residuals of output error are, and where that gives no
-/// estimates from the other. Where rotary gusts account for the rates, both are tried: they can be taken
-/// for the rates' own effect.
+/// Iterates from moving air, or from still air where the residuals of output error are white; from the other
+/// start where the first gives no estimates. Both are tried where rotary gusts account for the rates, since
+/// rotary gusts may be mistaken for the effect of the rates themselves.
 ///
 /// # Errors
-/// Where no start leads to a minimum: why, of the end of least cost.
+/// Why no start leads to a minimum: the reason of the iteration that ended at the least cost.
 fn reached<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
     group: &Group<NX, E, NG, G>,
     filters: &[Filter<NG, G>],

@@ -38,7 +38,8 @@ pub struct CoefficientPosterior {
     pub weights: BTreeMap<usize, f64>,
     /// Terms that each maneuver estimates, by its place in the evidence.
     pub estimated: BTreeMap<usize, Vec<usize>>,
-    /// Differences of what each maneuver holds, by the other flights; by its id.
+    /// Differences from the tunnel of the values that a maneuver holds, by the posterior of the other flights.
+    /// The key is the maneuver's id.
     pub held: BTreeMap<String, HeldDifferences>,
     /// Agreement of each flight with the others.
     pub flights: BTreeMap<String, Agreement>,
