@@ -161,13 +161,15 @@ impl Files {
             return Err(Error::config(folder, None, what));
         }
         let maneuvers = folder.join("maneuvers");
-        let classes = files::with_extension(&maneuvers, "yaml")?;
+        let classes = if files::is_folder(&maneuvers) {
+            files::with_extension(&maneuvers, "yaml")?
+        } else {
+            Vec::new()
+        };
         if classes.is_empty() {
-            return Err(Error::config(
-                &maneuvers,
-                None,
-                "no maneuver class: each is a file `<class>.yaml` here",
-            ));
+            let what = "no maneuver class: each is a file `<class>.yaml` here, such as those of pipelines/navion; it names \
+                        the surfaces or controls that step, which have a line in aircraft.yaml and in model.yaml";
+            return Err(Error::config(&maneuvers, None, what));
         }
         Ok(Files {
             qualities: Source::optional(folder.join("qualities.yaml"))?,

@@ -334,6 +334,23 @@ fn a_unit_that_cannot_become_the_signal_s_is_named() {
 }
 
 #[test]
+fn a_signal_without_the_unit_at_its_end_is_told_the_name_to_use() {
+    let copy = Copy::new();
+    let line = copy.spoil(
+        "aircraft.yaml",
+        "stick_lat: { signal: stick_lat_in, unit: in }",
+        "stick_lat: { signal: stick_lat, unit: mm }",
+    );
+    assert_eq!(
+        copy.error(),
+        format!(
+            "aircraft.yaml:{line}: channel `stick_lat`: `mm` cannot become - of `stick_lat`: a signal's name ends \
+             with the unit that it is kept in, such as `stick_lat_ft`"
+        )
+    );
+}
+
+#[test]
 fn a_sign_is_one_or_minus_one() {
     let copy = Copy::new();
     let line = copy.spoil(
@@ -980,10 +997,13 @@ fn a_pipeline_without_classes_says_so() {
     for file in fs::read_dir(copy.path("maneuvers")).unwrap() {
         fs::remove_file(file.unwrap().path()).unwrap();
     }
-    assert_eq!(
-        copy.error(),
-        "maneuvers: no maneuver class: each is a file `<class>.yaml` here"
-    );
+    let says = || {
+        copy.error()
+            .starts_with("maneuvers: no maneuver class: each is a file `<class>.yaml` here")
+    };
+    assert!(says(), "{}", copy.error());
+    fs::remove_dir(copy.path("maneuvers")).unwrap();
+    assert!(says(), "{}", copy.error());
 }
 
 #[test]

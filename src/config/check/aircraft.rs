@@ -73,6 +73,19 @@ pub(super) fn channels(config: &Config, source: &Source) -> Result<()> {
     Ok(())
 }
 
+/// Hint for a signal whose name has no unit at its end; empty for other signals.
+fn without_unit(unit: Unit, target: Unit, signal: &str) -> String {
+    let mut units = std::iter::once(unit).chain(unit.alike());
+    let suffix = units
+        .find_map(|u| u.suffix)
+        .filter(|_| target.suffix.is_none());
+    suffix.map_or_else(String::new, |suffix| {
+        format!(
+            ": a signal's name ends with the unit that it is kept in, such as `{signal}{suffix}`"
+        )
+    })
+}
+
 /// The first mistake of a channel: its unit, its sign, its scale.
 fn mistake(column: &str, channel: &Channel) -> Option<String> {
     let unit = match Unit::parse(&channel.unit) {
@@ -81,9 +94,10 @@ fn mistake(column: &str, channel: &Channel) -> Option<String> {
     };
     let target = Unit::of_signal(&channel.signal);
     if unit.conversion_to(target).is_none() {
-        let (unit, target, signal) = (unit.name, target.name, &channel.signal);
+        let (name, kept, signal) = (unit.name, target.name, &channel.signal);
+        let hint = without_unit(unit, target, signal);
         return Some(format!(
-            "channel `{column}`: `{unit}` cannot become {target} of `{signal}`"
+            "channel `{column}`: `{name}` cannot become {kept} of `{signal}`{hint}"
         ));
     }
     if ![1.0, -1.0].contains(&channel.sign) {
