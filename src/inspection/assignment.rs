@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use super::equations::{Equation, Misfit, Scaled, misfit};
 use super::grid::Grid;
 use super::quantity::Quantity;
+use super::signs::{Reversal, SignCosts};
 
 /// Cost of a column whose name does not mean the quantity, over one whose name does.
 const NAME_COST: f64 = 2.0;
@@ -31,8 +32,6 @@ const INTEGRAL_FIT: f64 = 0.3;
 const MOST_INTEGRALS: usize = 5;
 /// Cost by which every other order of attitudes and rates must be worse.
 const ROTATION_LEAD: f64 = 2.0;
-/// Most quantities whose signs are turned at once.
-const SIGNS_AT_ONCE: usize = 5;
 /// Units from which descent starts, instead of the most usual ones: the misfits have valleys where all
 /// angles are in the wrong unit together.
 const STARTS: [&[&str]; 4] = [&[], &["rad"], &["rad/s"], &["rad", "rad/s"]];
@@ -56,6 +55,8 @@ pub struct Candidate {
     pub weight: f64,
     /// Units in which it may be written.
     pub units: Vec<&'static str>,
+    /// Signs that it may have, 1 or -1, the usual one first.
+    pub signs: Vec<f64>,
 }
 
 /// Column, unit and sign of a quantity.
@@ -87,11 +88,12 @@ impl Search<'_> {
         let mut assignment = self.best_start();
         self.descend(&mut assignment, true);
         self.seed_rotation(&mut assignment);
-        while self.complete(&mut assignment) {
+        loop {
             self.descend(&mut assignment, true);
+            if !self.complete(&mut assignment) {
+                return assignment;
+            }
         }
-        Self::usual_side(&mut assignment);
-        assignment
     }
 
     /// Best of the assignments to which descent leads from each start without turning several signs at
@@ -120,6 +122,7 @@ impl Search<'_> {
             let changed = self.improve_units(assignment)
                 || self.improve_single(assignment)
                 || self.improve_pairs(assignment)
+                || self.improve_axes(assignment)
                 || (turns_signs && self.improve_signs(assignment));
             if !changed {
                 break;
@@ -194,8 +197,8 @@ impl Search<'_> {
                 for (n, ((attitude, rate), member)) in pairs.iter().zip(&order).enumerate() {
                     let sign = if signs >> n & 1 == 1 { -1.0 } else { 1.0 };
                     let (angle, velocity) = &integrals[*member];
-                    trial.insert(*attitude, turned(angle, sign));
-                    trial.insert(*rate, turned(velocity, sign));
+                    trial.insert(*attitude, with_sign(angle, sign));
+                    trial.insert(*rate, with_sign(velocity, sign));
                 }
                 let distinct: std::collections::BTreeSet<&String> =
                     trial.values().map(|c| &c.column).collect();
@@ -324,7 +327,7 @@ impl Search<'_> {
                 assignment.entry(quantity).or_insert(Choice {
                     column: candidate.column.clone(),
                     unit,
-                    sign: 1.0,
+                    sign: candidate.signs.first().copied().unwrap_or(1.0),
                 });
             }
         }
@@ -342,7 +345,7 @@ impl Search<'_> {
             !others.any(|(_, choice)| choice.column == candidate.column)
         };
         let candidates = candidates.iter().filter(is_free);
-        candidates.flat_map(|c| variants(quantity, c)).collect()
+        candidates.flat_map(variants).collect()
     }
 
     /// Other units and signs of an assigned quantity's column.
@@ -440,41 +443,84 @@ impl Search<'_> {
         false
     }
 
-    /// Turns the signs of up to [`SIGNS_AT_ONCE`] quantities; `true` where that improved.
-    fn improve_signs(&self, assignment: &mut Assignment) -> bool {
-        if self.all_hold(assignment) {
-            return false;
-        }
-        let signed = assignment.keys().copied().filter(|q| q.is_signed());
-        let signed: Vec<Quantity> = signed.collect();
-        let before = self.cost(assignment, &Quantity::ALL);
-        let subsets = (0_u32..1 << signed.len())
-            .filter(|subset| (3..=SIGNS_AT_ONCE).contains(&(subset.count_ones() as usize)));
-        let turned = |subset: u32| {
-            let mut trial = assignment.clone();
-            let members = signed
-                .iter()
-                .enumerate()
-                .filter(|(n, _)| subset >> n & 1 == 1);
-            for (_, quantity) in members {
-                if let Some(choice) = trial.get_mut(quantity) {
-                    choice.sign = -choice.sign;
+    /// Exchanges the columns of two quantities of one kind, such as two rates; `true` where that improved.
+    fn improve_axes(&self, assignment: &mut Assignment) -> bool {
+        for (first, own) in assignment.clone() {
+            let akin = first.akin().iter().filter(|second| **second > first);
+            for second in akin.filter(|second| assignment.contains_key(second)) {
+                let changed = [first, *second];
+                let before = self.cost(assignment, &changed);
+                let exchanged = self.exchanged(changed, [&own, &assignment[second]], assignment);
+                let costs = exchanged.map(|trial| (self.cost(&trial, &changed), trial));
+                let best = costs.min_by(|a, b| a.0.total_cmp(&b.0));
+                if let Some((_, trial)) = best.filter(|(cost, _)| *cost < before - LEAST_GAIN) {
+                    *assignment = trial;
+                    return true;
                 }
             }
-            trial
-        };
-        let trials = subsets.map(|subset| {
-            let trial = turned(subset);
-            (self.cost(&trial, &Quantity::ALL), trial)
-        });
-        let best = trials.min_by(|a, b| a.0.total_cmp(&b.0));
-        match best.filter(|(cost, _)| *cost < before - LEAST_GAIN) {
-            Some((_, trial)) => {
-                *assignment = trial;
-                true
-            }
-            None => false,
         }
+        false
+    }
+
+    /// Assignments in which each of two quantities has the other's column, in all units and signs.
+    fn exchanged<'a>(
+        &'a self,
+        pair: [Quantity; 2],
+        [first, second]: [&Choice; 2],
+        assignment: &'a Assignment,
+    ) -> impl Iterator<Item = Assignment> + 'a {
+        let of_column = |quantity: &Quantity, column: &str| -> Vec<Choice> {
+            let candidates = self.candidates.get(quantity).into_iter().flatten();
+            let own = candidates.filter(|c| c.column == column);
+            own.flat_map(variants).collect()
+        };
+        let a = of_column(&pair[0], &second.column);
+        let b = of_column(&pair[1], &first.column);
+        a.into_iter().flat_map(move |x| {
+            let trials = b.clone().into_iter();
+            let of = move |y: Choice| with(assignment, [(pair[0], x.clone()), (pair[1], y)]);
+            trials.map(of).collect::<Vec<_>>()
+        })
+    }
+
+    /// Reverses the set of quantities that lowers the cost most; `true` where one does. Of sets that fit alike the
+    /// one with the fewest unusual signs is best: no equation tells a flight from its mirror image.
+    fn improve_signs(&self, assignment: &mut Assignment) -> bool {
+        let signs = self.signs(assignment);
+        let unusual = |reversal: Reversal| {
+            let turned = signs.reversed(reversal).filter_map(|q| assignment.get(&q));
+            turned.map(|choice| choice.sign).sum::<f64>()
+        };
+        let growth = |reversal: Reversal| signs.growth(reversal) + SIGN_COST * unusual(reversal);
+        let costs = signs
+            .reversals()
+            .map(|reversal| (growth(reversal), reversal));
+        let best = costs.min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, reversal)) = best.filter(|(cost, _)| *cost < -LEAST_GAIN) else {
+            return false;
+        };
+        *assignment = turned(assignment, signs.reversed(reversal));
+        true
+    }
+
+    /// Costs of all reversals of the quantities whose columns may have either sign.
+    #[must_use]
+    pub fn signs(&self, assignment: &Assignment) -> SignCosts {
+        let either = assignment
+            .iter()
+            .filter(|(quantity, choice)| self.has_either_sign(**quantity, choice));
+        let either: Vec<Quantity> = either.map(|(quantity, _)| *quantity).collect();
+        SignCosts::of(either, |equation, reversed| {
+            let trial = turned(assignment, reversed.iter().copied());
+            Some(self.misfit(equation, &trial)?.ratio.ln())
+        })
+    }
+
+    /// `true` where the range of a quantity's column allows both signs.
+    fn has_either_sign(&self, quantity: Quantity, choice: &Choice) -> bool {
+        let candidates = self.candidates.get(&quantity).into_iter().flatten();
+        let mut own = candidates.filter(|c| c.column == choice.column);
+        own.any(|candidate| candidate.signs.len() > 1)
     }
 
     /// Assignments in which unit or sign of two quantities that share an equation are others.
@@ -489,21 +535,6 @@ impl Search<'_> {
         both.map(|(x, y)| with(assignment, [(pair[0], x.clone()), (pair[1], y.clone())]))
             .collect()
     }
-
-    /// Turns the lateral quantities to the side with fewer reversed signs: no equation tells a flight
-    /// from its mirror image.
-    fn usual_side(assignment: &mut Assignment) {
-        let lateral = || Quantity::LATERAL.into_iter();
-        let reversed = lateral().filter(|q| assignment.get(q).is_some_and(|c| c.sign < 0.0));
-        let all = lateral().filter(|q| assignment.contains_key(q)).count();
-        if 2 * reversed.count() > all {
-            for choice in lateral().collect::<Vec<_>>() {
-                if let Some(choice) = assignment.get_mut(&choice) {
-                    choice.sign = -choice.sign;
-                }
-            }
-        }
-    }
 }
 
 /// Orders of three members of a list.
@@ -513,28 +544,34 @@ fn orders(members: usize) -> Vec<[usize; 3]> {
     all.filter(|[a, b, c]| a != b && b != c && a != c).collect()
 }
 
+/// The assignment with the signs of some quantities reversed.
+fn turned(assignment: &Assignment, reversed: impl Iterator<Item = Quantity>) -> Assignment {
+    let mut trial = assignment.clone();
+    for quantity in reversed {
+        if let Some(choice) = trial.get_mut(&quantity) {
+            choice.sign = -choice.sign;
+        }
+    }
+    trial
+}
+
 /// A choice with its sign multiplied.
-fn turned(choice: &Choice, sign: f64) -> Choice {
+fn with_sign(choice: &Choice, sign: f64) -> Choice {
     Choice {
         sign: choice.sign * sign,
         ..choice.clone()
     }
 }
 
-fn variants(quantity: Quantity, candidate: &Candidate) -> Vec<Choice> {
-    let signs: &[f64] = if quantity.is_signed() {
-        &[1.0, -1.0]
-    } else {
-        &[1.0]
-    };
-    let units = candidate.units.iter();
+fn variants(candidate: &Candidate) -> Vec<Choice> {
     let choice = |(unit, sign): (&&'static str, &f64)| Choice {
         column: candidate.column.clone(),
         unit,
         sign: *sign,
     };
+    let units = candidate.units.iter();
     units
-        .flat_map(|unit| signs.iter().map(move |sign| (unit, sign)))
+        .flat_map(|unit| candidate.signs.iter().map(move |sign| (unit, sign)))
         .map(choice)
         .collect()
 }

@@ -3,6 +3,7 @@
 use super::assignment::{Assignment, HOLDS, Search, with};
 use super::equations::Equation;
 use super::quantity::Quantity;
+use super::signs::{Reversal, SignCosts};
 
 /// Misfit from which an equation contradicts the columns in it: one of them is wrong.
 const CONTRADICTS: f64 = 0.3;
@@ -22,9 +23,13 @@ pub struct Verdict {
     pub evidence: String,
 }
 
-/// Certainty of a quantity that has a column.
+/// Certainty of a quantity that has a column; `signs` are the costs of all reversals of the assignment.
 #[must_use]
-pub fn verdict(search: &Search, assignment: &Assignment, quantity: Quantity) -> Verdict {
+pub fn verdict(
+    (search, signs): (&Search, &SignCosts),
+    assignment: &Assignment,
+    quantity: Quantity,
+) -> Verdict {
     let Some((equation, ratio)) = best_equation(search, assignment, quantity) else {
         return Verdict {
             is_sure: false,
@@ -49,19 +54,40 @@ pub fn verdict(search: &Search, assignment: &Assignment, quantity: Quantity) -> 
         };
     }
     let margin = margin(search, assignment, quantity);
+    let rival = rival(signs, quantity);
     let mirrored = Quantity::LATERAL.contains(&quantity) && !has_usual_side(assignment);
     let evidence = if mirrored {
         format!("{held}; but as many lateral signs would be usual in the mirror image")
     } else if margin < LEAST_MARGIN {
         format!("{held}; but another unit or sign fits nearly as well")
+    } else if let Some(rival) = &rival {
+        let names: Vec<&str> = rival.iter().map(|q| q.signal()).collect();
+        format!(
+            "{held}; but {} reversed together fit nearly as well",
+            names.join(", ")
+        )
     } else {
         held
     };
     Verdict {
-        is_sure: margin >= LEAST_MARGIN && !mirrored,
+        is_sure: margin >= LEAST_MARGIN && rival.is_none() && !mirrored,
         margin,
         evidence,
     }
+}
+
+/// The fewest quantities, one of them this one, that fit nearly as well when they are all reversed. Of a set and
+/// its mirror image, in which the other lateral quantities are reversed, the one with fewer lateral quantities counts.
+fn rival(signs: &SignCosts, quantity: Quantity) -> Option<Vec<Quantity>> {
+    let mirror = signs.mirror_image();
+    let is_smaller = |reversal: &Reversal| {
+        2 * (reversal & mirror).count_ones() <= mirror.count_ones() && *reversal != mirror
+    };
+    let rivals = signs.reversals().filter(is_smaller);
+    let rivals = rivals.filter(|r| signs.reversed(*r).any(|q| q == quantity));
+    let fitting = rivals.filter(|reversal| signs.growth(*reversal) < LEAST_MARGIN);
+    let fewest = fitting.min_by_key(|reversal| reversal.count_ones())?;
+    Some(signs.reversed(fewest).collect())
 }
 
 /// Equation with the quantity that contradicts what is recorded.

@@ -6,7 +6,7 @@ use super::assignment::{Assignment, Candidates, Search};
 use super::certainty::verdict;
 use super::clock::{ClockColumn, find_clock};
 use super::grid::Grid;
-use super::inputs::{InputColumn, inputs, kind_of, moves, step_size};
+use super::inputs::{InputColumn, inputs, kind_of, moves, rate, step_size};
 use super::plausible::{ColumnFacts, candidates, facts};
 use super::quantity::Quantity;
 use super::recording::Recording;
@@ -99,6 +99,7 @@ pub fn inspect(recordings: &[Recording]) -> Result<Inspection, String> {
     let inputs = inputs((&fine, &grid), &assignment, &facts);
     findings.add_inputs(&inputs, &grid);
     findings.add_constants();
+    findings.doubt_inertias();
     findings.add_flags(recordings);
     let unused = findings.unused(&candidates, &assignment);
     let channels = findings.channels;
@@ -160,11 +161,12 @@ impl Findings<'_> {
     }
 
     fn add_motion(&mut self, search: &Search, assignment: &Assignment) {
+        let signs = search.signs(assignment);
         for (quantity, choice) in assignment {
             let Some(facts) = self.facts.iter().find(|c| c.name == choice.column) else {
                 continue;
             };
-            let verdict = verdict(search, assignment, *quantity);
+            let verdict = verdict((search, &signs), assignment, *quantity);
             let unit = Unit::parse(choice.unit).ok();
             let turn = unit.and_then(|u| Unit::of_signal(signal::PSI).factor_to(u));
             let is_heading = *quantity == Quantity::Psi;
@@ -200,7 +202,20 @@ impl Findings<'_> {
             } else {
                 format!("{}; its unit follows from its range alone", input.evidence)
             };
-            let (is_sure, evidence) = unless_unknown_unit(facts, input.is_sure && stated, evidence);
+            let rate = rate(input.acts).signal();
+            let is_rate = |c: &&Channel| c.signal == rate;
+            let rate_is_sure = self
+                .channels
+                .iter()
+                .find(is_rate)
+                .is_some_and(|c| c.is_sure);
+            let evidence = if input.is_sure && !rate_is_sure {
+                format!("{evidence}; but {rate} is not sure")
+            } else {
+                evidence
+            };
+            let is_sure = input.is_sure && stated && rate_is_sure;
+            let (is_sure, evidence) = unless_unknown_unit(facts, is_sure, evidence);
             self.channels.push(Channel {
                 unit: unit.name.to_owned(),
                 sign: input.sign,
@@ -245,6 +260,30 @@ impl Findings<'_> {
             if let Some((_, facts)) = named.max_by(|a, b| a.0.total_cmp(&b.0)) {
                 self.channels.push(constant_channel(facts, name));
             }
+        }
+    }
+
+    /// Doubts the moments of inertia where that about z is not the largest, as it is of every aircraft: recorders differ in
+    /// the order of the axes.
+    fn doubt_inertias(&mut self) {
+        let largest = |signal: &str| {
+            let own = self.channels.iter().find(|c| c.signal == signal)?;
+            let unit = Unit::parse(&own.unit).ok()?;
+            Some(own.range.1 * unit.factor_to(Unit::of_signal(signal))?)
+        };
+        let [x, y, z] = [signal::IX, signal::IY, signal::IZ].map(largest);
+        let is_largest = z.is_none_or(|z| [x, y].into_iter().flatten().all(|other| other < z));
+        let of_inertia =
+            |c: &&mut Channel| [signal::IX, signal::IY, signal::IZ].contains(&&*c.signal);
+        for channel in self
+            .channels
+            .iter_mut()
+            .filter(of_inertia)
+            .filter(|_| !is_largest)
+        {
+            channel.is_sure = false;
+            channel.evidence +=
+                "; but the largest moment of inertia of an aircraft is that about z";
         }
     }
 

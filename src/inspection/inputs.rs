@@ -7,7 +7,7 @@ use super::effects::{Effect, Regression, effects};
 use super::grid::Grid;
 use super::plausible::ColumnFacts;
 use super::quantity::Quantity;
-use super::vocabulary::{Input, input, meanings};
+use super::vocabulary::{Input, input, is_derived, meanings};
 use crate::numerics::order_statistics::quantile;
 use crate::units;
 
@@ -62,7 +62,55 @@ pub fn inputs(
     let is_other = |input: &InputColumn| others.iter().any(|(facts, _)| facts.name == input.column);
     found.extend(with_others.into_iter().filter(is_other));
     found.extend(Responses::of(liveliest, assignment, &controls, CONTROL_STEPS).inputs());
+    let unnamed = unnamed(liveliest, assignment, facts, &found);
+    found.extend(unnamed);
     found
+}
+
+/// Surfaces whose names mean nothing: on each axis without a named one, the angle that the angular acceleration
+/// follows most clearly.
+fn unnamed(
+    grid: &Grid,
+    assignment: &Assignment,
+    facts: &[ColumnFacts],
+    found: &[InputColumn],
+) -> Vec<InputColumn> {
+    let is_free = |c: &&ColumnFacts| {
+        let is_motion = assignment.values().any(|choice| choice.column == c.name);
+        let is_angle = c
+            .unit
+            .is_some_and(|unit| unit.quantity == units::Quantity::Angle);
+        let has_meaning = kind_of(c).is_some() || !meanings(&c.spelling).is_empty();
+        is_angle && !is_motion && !has_meaning && !is_derived(&c.spelling)
+    };
+    let free: Vec<&ColumnFacts> = facts.iter().filter(is_free).collect();
+    let lacks = |kind: &Input| {
+        let is_main = |input: &&InputColumn| input.kind != Input::OtherSurface;
+        let surfaces = found
+            .iter()
+            .filter(|input| input.kind.is_surface())
+            .filter(is_main);
+        usual_axis(*kind).is_some_and(|acts| surfaces.clone().all(|input| input.acts != acts))
+    };
+    let of_kind = |kind: Input| {
+        let judged = free.iter().filter_map(|facts| {
+            let single = [(*facts, kind)];
+            let responses = Responses::of(grid, assignment, &single, 1);
+            let input = responses.inputs().pop().filter(|input| input.is_sure)?;
+            Some((responses.significance(0, input.acts).abs(), input))
+        });
+        let (_, input) = judged.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(InputColumn {
+            is_sure: false,
+            evidence: format!(
+                "its name has no meaning that harvest has; {}",
+                input.evidence
+            ),
+            ..input
+        })
+    };
+    let main = [Input::Elevator, Input::Aileron, Input::Rudder].into_iter();
+    main.filter(lacks).filter_map(of_kind).collect()
 }
 
 /// Kind of an input by its name; an angle whose name is a `d` and a few letters is a surface.
@@ -78,7 +126,12 @@ pub fn kind_of(facts: &ColumnFacts) -> Option<Input> {
             && (2..=5).contains(&joined.len())
             && meanings(&facts.spelling).is_empty()
     };
-    input(&facts.spelling).or_else(|| is_delta().then_some(Input::OtherSurface))
+    let is_position = |unit: units::Unit| {
+        use units::Quantity::{Angle, Length, Number};
+        matches!(unit.quantity, Angle | Length | Number)
+    };
+    let kind = input(&facts.spelling).or_else(|| is_delta().then_some(Input::OtherSurface));
+    kind.filter(|_| facts.unit.is_none_or(is_position))
 }
 
 /// Effects of some inputs on the three angular accelerations.
@@ -139,37 +192,69 @@ impl<'a> Responses<'a> {
         (0..self.inputs.len()).map(|n| self.input(n)).collect()
     }
 
+    /// Effect of an input on an axis in standard errors.
+    fn significance(&self, n: usize, acts: Acts) -> f64 {
+        self.effects[acts as usize]
+            .get(n)
+            .map_or(0.0, |e| e.significance)
+    }
+
+    /// Axis on which an input acts more clearly than on its own. Roll and yaw count as one: rudders roll an aircraft.
+    fn clearer_axis(&self, n: usize, acts: Acts) -> Option<Acts> {
+        let size = |acts: &Acts| self.significance(n, *acts).abs();
+        let lateral = [Acts::Roll, Acts::Yaw];
+        let others: &[Acts] = if acts == Acts::Pitch {
+            &lateral
+        } else {
+            &[Acts::Pitch]
+        };
+        let own: &[Acts] = if acts == Acts::Pitch {
+            &[Acts::Pitch]
+        } else {
+            &lateral
+        };
+        let own = own.iter().map(size).fold(0.0, f64::max);
+        others.iter().copied().find(|other| size(other) > own)
+    }
+
     fn input(&self, n: usize) -> InputColumn {
         let (facts, kind) = self.inputs[n];
-        let significance = |axis: usize| self.effects[axis].get(n).map_or(0.0, |e| e.significance);
+        let significance = |acts: Acts| self.significance(n, acts);
         let acts = usual_axis(kind).unwrap_or_else(|| {
-            let [pitch, roll, yaw] = [0, 1, 2].map(|axis| significance(axis).abs());
+            let [pitch, roll, yaw] =
+                [Acts::Pitch, Acts::Roll, Acts::Yaw].map(|acts| significance(acts).abs());
             match (pitch >= roll.max(yaw), roll >= yaw) {
                 (true, _) => Acts::Pitch,
                 (_, true) => Acts::Roll,
                 _ => Acts::Yaw,
             }
         });
-        let found = significance(acts as usize);
+        let found = significance(acts);
         let usual = usual_effect(kind);
         let sign = if found * usual < 0.0 && found.abs() >= TELLS_SIGN {
             -1.0
         } else {
             1.0
         };
-        let is_sure = usual != 0.0 && found.abs() >= TELLS_SIGN;
+        let other = self.clearer_axis(n, acts);
+        let is_sure = usual != 0.0 && found.abs() >= TELLS_SIGN && other.is_none();
         let direction = if found * sign > 0.0 {
             "positive"
         } else {
             "negative"
         };
-        let evidence = match (usual == 0.0, is_sure) {
-            (true, _) => "no motion tells its sign".to_owned(),
-            (_, false) => format!(
+        let evidence = match (usual == 0.0, is_sure, other) {
+            (true, _, _) => "no motion tells its sign".to_owned(),
+            (_, false, Some(other)) => format!(
+                "by its name; but {} follows it more clearly than {}",
+                acceleration(other),
+                acceleration(acts)
+            ),
+            (_, false, None) => format!(
                 "the motion does not tell its sign ({:.0} standard errors)",
                 found.abs()
             ),
-            (_, true) => format!(
+            (_, true, _) => format!(
                 "{direction} {} follows it ({:.0} standard errors)",
                 acceleration(acts),
                 found.abs()
@@ -183,6 +268,16 @@ impl<'a> Responses<'a> {
             is_sure,
             evidence,
         }
+    }
+}
+
+/// Rate about the axis on which an input acts.
+#[must_use]
+pub fn rate(acts: Acts) -> Quantity {
+    match acts {
+        Acts::Pitch => Quantity::Q,
+        Acts::Roll => Quantity::P,
+        Acts::Yaw => Quantity::R,
     }
 }
 

@@ -7,8 +7,8 @@
 //! tells is said to be unsure.
 //!
 //! In the order of use: `recording` (the input), `words` and `vocabulary` (names), `quantity`, `clock`,
-//! `grid` (one step for all columns), `plausible` (candidates), `equations`, `assignment` (the search),
-//! `certainty`, `effects` and `inputs` (surfaces and controls), `findings`, and `draft` (YAML).
+//! `grid` (one step for all columns), `plausible` (candidates), `equations`, `assignment` (the search, over
+//! `signs`), `certainty`, `effects` and `inputs` (surfaces and controls), `findings`, and `draft` (YAML).
 
 mod assignment;
 mod certainty;
@@ -22,6 +22,7 @@ mod inputs;
 mod plausible;
 mod quantity;
 mod recording;
+mod signs;
 mod vocabulary;
 mod words;
 

@@ -53,11 +53,20 @@ fn column_facts(recordings: &[Recording], name: &str) -> ColumnFacts {
     let range = quantile(values(), ENDS).zip(quantile(values(), 1.0 - ENDS));
     ColumnFacts {
         name: name.to_owned(),
-        unit: parsed.or(spelling.unit.filter(|_| stated.is_none())),
+        unit: parsed.or(spelled_unit(&spelling).filter(|_| stated.is_none())),
         unknown_unit: stated.filter(|_| parsed.is_none()),
         spelling,
         range,
     }
+}
+
+/// Unit that a name ends with, unless the rest of the name means quantities that have other units: the `m` of `alpha_m`
+/// says that it is measured.
+fn spelled_unit(spelling: &Spelling) -> Option<Unit> {
+    let unit = spelling.unit?;
+    let meanings = meanings(spelling);
+    let fits = |signal: &str| unit.factor_to(Unit::of_signal(signal)).is_some();
+    (meanings.is_empty() || meanings.iter().any(|(signal, _)| fits(signal))).then_some(unit)
 }
 
 /// Candidates of all quantities.
@@ -69,9 +78,15 @@ pub fn candidates(facts: &[ColumnFacts], clock: &ClockColumn) -> Candidates {
             .filter(|c| c.name != clock.name && !c.is_constant())
     };
     let of = |quantity: Quantity| {
-        let named: Vec<Candidate> = columns().filter_map(|c| named(quantity, c)).collect();
-        if !named.is_empty() {
-            return named;
+        let mut of_name: Vec<Candidate> = columns().filter_map(|c| named(quantity, c)).collect();
+        if !of_name.is_empty() {
+            // Recorders differ in the order of the axes: the rate about z may be that of pitch.
+            let is_own = |c: &&ColumnFacts| of_name.iter().any(|own| own.column == c.name);
+            let others = columns().filter(|c| !is_own(c));
+            let akin = others.filter(|c| quantity.akin().iter().any(|q| named(*q, c).is_some()));
+            let akin: Vec<Candidate> = akin.filter_map(|c| candidate(quantity, c, 0.0)).collect();
+            of_name.extend(akin);
+            return of_name;
         }
         let nameless = |c: &&ColumnFacts| {
             meanings(&c.spelling).is_empty()
@@ -100,27 +115,39 @@ fn candidate(quantity: Quantity, facts: &ColumnFacts, weight: f64) -> Option<Can
     let (low, high) = facts.range?;
     let fits = |unit: &&'static str| {
         let factor = quantity.factor(unit);
-        factor.is_some_and(|factor| is_plausible(quantity, low * factor, high * factor))
+        factor.is_some_and(|factor| {
+            !plausible_signs(quantity, low * factor, high * factor).is_empty()
+        })
     };
     let units: Vec<&'static str> = match facts.unit {
         Some(unit) => std::iter::once(unit.name).filter(fits).collect(),
         None => quantity.units().iter().copied().filter(fits).collect(),
     };
-    (!units.is_empty()).then(|| Candidate {
+    let signs = |unit: &&'static str| {
+        let factor = quantity.factor(unit).unwrap_or(f64::NAN);
+        plausible_signs(quantity, low * factor, high * factor)
+    };
+    units.first().map(signs).map(|signs| Candidate {
         column: facts.name.clone(),
         weight,
         units,
+        signs,
     })
 }
 
-/// `true` for a range that an aircraft's quantity can have, in rad, ft, s and slug.
-fn is_plausible(quantity: Quantity, low: f64, high: f64) -> bool {
+/// Signs with which a range is one that an aircraft's quantity can have, in rad, ft, s and slug; the usual sign first.
+fn plausible_signs(quantity: Quantity, low: f64, high: f64) -> Vec<f64> {
     let (least, most) = limits(quantity);
-    let size = low.abs().max(high.abs());
-    if quantity.is_signed() && quantity != Quantity::Altitude {
-        return size <= most;
-    }
-    low >= least && high <= most
+    let signs: &[f64] = if quantity.is_signed() {
+        &[1.0, -1.0]
+    } else {
+        &[1.0]
+    };
+    let fits = |sign: &f64| {
+        let (a, b) = (sign * low, sign * high);
+        a.min(b) >= least && a.max(b) <= most
+    };
+    signs.iter().copied().filter(fits).collect()
 }
 
 /// Least and largest value of an aircraft's quantity.
@@ -129,8 +156,8 @@ fn limits(quantity: Quantity) -> (f64, f64) {
         Quantity::Alpha | Quantity::Beta => (-2.0, 2.0),
         Quantity::Velocity => (0.0, 4000.0),
         Quantity::Mach => (0.0, 5.0),
-        // Pressure altitudes below the sea's level, and altitudes counted downwards.
-        Quantity::Altitude => (-130_000.0, 130_000.0),
+        // Pressure altitudes may lie below the sea's level, by the weather and the land.
+        Quantity::Altitude => (-3_000.0, 130_000.0),
         Quantity::P | Quantity::Q | Quantity::R => (-12.0, 12.0),
         Quantity::Theta => (-1.6, 1.6),
         Quantity::Phi => (-3.2, 3.2),

@@ -53,6 +53,22 @@ impl Quantity {
         Quantity::Ay,
     ];
 
+    /// Quantities of the same kind about or along the three axes, this one among them.
+    #[must_use]
+    pub fn akin(self) -> &'static [Quantity] {
+        match self {
+            Quantity::P | Quantity::Q | Quantity::R => &[Quantity::P, Quantity::Q, Quantity::R],
+            Quantity::Theta | Quantity::Phi | Quantity::Psi => {
+                &[Quantity::Theta, Quantity::Phi, Quantity::Psi]
+            }
+            Quantity::An | Quantity::Ax | Quantity::Ay => {
+                &[Quantity::An, Quantity::Ax, Quantity::Ay]
+            }
+            Quantity::Alpha | Quantity::Beta => &[Quantity::Alpha, Quantity::Beta],
+            Quantity::Velocity | Quantity::Mach | Quantity::Altitude | Quantity::Qbar => &[],
+        }
+    }
+
     /// Signal that holds the quantity.
     #[must_use]
     pub fn signal(self) -> &'static str {

@@ -56,128 +56,162 @@ const DERIVED: &[&str] = &[
 ];
 
 /// Pairs of engines, left before right.
-pub const SIDES: [(&str, &str); 5] = [
+pub const SIDES: [(&str, &str); 8] = [
     ("l", "r"),
     ("left", "right"),
     ("lh", "rh"),
     ("1", "2"),
     ("port", "starboard"),
+    ("li", "re"),
+    ("links", "rechts"),
+    ("sx", "dx"),
 ];
 
+// English, abbreviations of flight data recorders and of MATLAB; German, French, Italian, Spanish; Russian in Latin letters.
 #[rustfmt::skip]
 const ENTRIES: &[Entry] = &[
     Entry {
         signal: signal::TIME,
-        names: &["time", "t", "times", "tsec", "tim", "timestamp", "zeit", "irig", "irigtime", "clock", "elapsed",
-            "elapsedtime", "simtime", "systime", "reltime", "relativetime", "utc", "timesec", "recordtime"],
-        words: &[&["time"], &["timestamp"], &["clock"]],
+        names: &["time", "t", "times", "tsec", "tim", "timestamp", "irig", "irigtime", "clock", "elapsed", "elapsedtime", "simtime",
+            "systime", "reltime", "relativetime", "utc", "timesec", "recordtime", "zeit", "temps", "tempo", "tiempo"],
+        words: &[&["time"], &["timestamp"], &["clock"], &["zeit"], &["temps"]],
     },
     Entry {
         signal: signal::ALPHA_VANE,
         names: &["alpha", "alfa", "alf", "aoa", "alphavane", "alphav", "aoavane", "aoatrue", "alphatrue", "incidence"],
-        words: &[&["angle", "attack"], &["alpha"], &["alfa"], &["aoa"], &["incidence"]],
+        words: &[&["angle", "attack"], &["alpha"], &["alfa"], &["aoa"], &["incidence"], &["anstellwinkel"], &["incidenza"],
+            &["angulo", "ataque"]],
     },
     Entry {
         signal: signal::BETA_VANE,
         names: &["beta", "aos", "aoss", "betavane", "betav", "sideslip", "sideslipangle", "slip"],
-        words: &[&["sideslip"], &["beta"], &["aos"], &["aoss"], &["slip", "angle"]],
+        words: &[&["sideslip"], &["beta"], &["aos"], &["aoss"], &["slip", "angle"], &["schiebewinkel"], &["derapage"], &["dérapage"],
+            &["derapata"], &["derrape"]],
     },
     Entry {
         signal: signal::VELOCITY,
-        names: &["v", "vt", "vtas", "tas", "ktas", "velocity", "airspeed", "speed", "vtrue", "trueairspeed", "va", "vtot",
-            "vinf", "vair"],
-        words: &[&["true", "airspeed"], &["tas"], &["vtas"], &["ktas"], &["velocity"], &["airspeed"]],
+        names: &["v", "vt", "vtas", "tas", "ktas", "velocity", "airspeed", "speed", "vtrue", "trueairspeed", "va", "vtot", "vinf",
+            "vair", "fluggeschwindigkeit", "fahrt", "vitesse", "velocita", "velocidad", "vist"],
+        words: &[&["true", "airspeed"], &["tas"], &["vtas"], &["ktas"], &["velocity"], &["airspeed"], &["fluggeschwindigkeit"],
+            &["fluggeschw"], &["vitesse", "air"], &["vitesse", "propre"], &["vitesse", "vraie"], &["velocita", "vera"],
+            &["velocidad", "verdadera"]],
     },
     Entry {
         signal: signal::MACH,
-        names: &["mach", "machno", "machnumber", "ma", "m", "mn"],
-        words: &[&["mach"]],
+        names: &["mach", "machno", "machnumber", "ma", "m", "mn", "machzahl"],
+        words: &[&["mach"], &["machzahl"]],
     },
     Entry {
         signal: signal::ALTITUDE,
-        names: &["altitude", "alt", "h", "hp", "palt", "height", "hbaro", "baroalt", "altbaro", "pressurealtitude", "altmsl",
-            "hpress", "hmsl", "zp"],
-        words: &[&["altitude"], &["alt"], &["height"]],
+        names: &["altitude", "alt", "h", "hp", "palt", "height", "hbaro", "hbar", "baroalt", "altbaro", "pressurealtitude", "altmsl",
+            "hpress", "hmsl", "zp", "altitud"],
+        words: &[&["altitude"], &["alt"], &["height"], &["hoehe"], &["höhe"], &["druckhoehe"], &["druckhöhe"], &["quota"]],
     },
     Entry {
         signal: signal::P,
-        names: &["p", "pb", "pbody", "rollrate", "wx", "omegax", "gyrox", "prate", "rolrate", "rrate"],
-        words: &[&["roll", "rate"], &["omega", "x"], &["gyro", "x"], &["rate", "p"], &["body", "p"]],
+        names: &["p", "pb", "pbody", "rollrate", "wx", "omegax", "gyrox", "prate", "rolrate", "rolr", "rrate"],
+        words: &[&["roll", "rate"], &["omega", "x"], &["gyro", "x"], &["rate", "p"], &["body", "p"], &["rollrate"],
+            &["vit", "roulis"], &["vitesse", "roulis"], &["vel", "rollio"], &["velocita", "rollio"], &["vel", "balanceo"]],
     },
     Entry {
         signal: signal::Q,
-        names: &["q", "qb", "qbody", "pitchrate", "wy", "omegay", "gyroy", "qrate", "pitrate"],
-        words: &[&["pitch", "rate"], &["omega", "y"], &["gyro", "y"], &["rate", "q"], &["body", "q"]],
+        names: &["q", "qb", "qbody", "pitchrate", "wy", "omegay", "gyroy", "qrate", "pitrate", "pitr"],
+        words: &[&["pitch", "rate"], &["omega", "y"], &["gyro", "y"], &["rate", "q"], &["body", "q"], &["nickrate"],
+            &["vit", "tangage"], &["vitesse", "tangage"], &["vel", "beccheggio"], &["velocita", "beccheggio"], &["vel", "cabeceo"]],
     },
     Entry {
         signal: signal::R,
-        names: &["r", "rb", "rbody", "yawrate", "wz", "omegaz", "gyroz", "yrate"],
-        words: &[&["yaw", "rate"], &["omega", "z"], &["gyro", "z"], &["rate", "r"], &["body", "r"]],
+        names: &["r", "rb", "rbody", "yawrate", "wz", "omegaz", "gyroz", "yrate", "yawr"],
+        words: &[&["yaw", "rate"], &["omega", "z"], &["gyro", "z"], &["rate", "r"], &["body", "r"], &["gierrate"],
+            &["vit", "lacet"], &["vitesse", "lacet"], &["vel", "imbardata"], &["velocita", "imbardata"], &["vel", "guinada"]],
     },
     Entry {
         signal: signal::THETA,
-        names: &["theta", "thet", "the", "tht", "pitch", "pitchangle", "pitchattitude", "pitchatt"],
-        words: &[&["theta"], &["pitch", "angle"], &["pitch", "attitude"], &["pitch", "att"], &["euler", "pitch"]],
+        names: &["theta", "thet", "the", "tht", "pitch", "ptch", "pitchangle", "pitchattitude", "pitchatt", "tang", "tangage"],
+        words: &[&["theta"], &["pitch", "angle"], &["pitch", "ang"], &["pitch", "attitude"], &["pitch", "att"], &["euler", "pitch"],
+            &["nickwinkel"], &["längsneigung"], &["laengsneigung"], &["assiette"], &["assetto", "beccheggio"], &["tangazh"],
+            &["angulo", "cabeceo"]],
     },
     Entry {
         signal: signal::PHI,
-        names: &["phi", "roll", "bank", "bankangle", "rollangle", "rollattitude", "rollatt"],
-        words: &[&["phi"], &["roll", "angle"], &["roll", "attitude"], &["roll", "att"], &["bank"], &["euler", "roll"]],
+        names: &["phi", "roll", "bank", "bankangle", "rollangle", "rollattitude", "rollatt", "roulis"],
+        words: &[&["phi"], &["roll", "angle"], &["roll", "ang"], &["roll", "attitude"], &["roll", "att"], &["bank"],
+            &["euler", "roll"], &["rollwinkel"], &["hängewinkel"], &["haengewinkel"], &["querneigung"], &["gite"], &["gîte"],
+            &["assetto", "rollio"], &["kren"], &["angulo", "balanceo"]],
     },
     Entry {
         signal: signal::PSI,
-        names: &["psi", "yaw", "heading", "hdg", "head", "yawangle", "trueheading", "headingtrue"],
-        words: &[&["psi"], &["heading"], &["hdg"], &["yaw", "angle"], &["yaw", "attitude"], &["euler", "yaw"]],
+        names: &["psi", "yaw", "heading", "hdg", "head", "yawangle", "trueheading", "headingtrue", "cap", "kurs", "prua"],
+        words: &[&["psi"], &["heading"], &["hdg"], &["yaw", "angle"], &["yaw", "attitude"], &["euler", "yaw"], &["gierwinkel"],
+            &["steuerkurs"], &["rumbo"]],
     },
     Entry {
         signal: signal::AN,
-        names: &["an", "nz", "az", "anz", "normacc", "normalacc", "accz", "loadfactor", "vertacc", "accelz", "nzcg"],
+        names: &["an", "nz", "az", "anz", "normacc", "normalacc", "accz", "loadfactor", "vertacc", "accelz", "nzcg", "vrtg", "vertg"],
         words: &[&["normal", "acceleration"], &["normal", "accel"], &["normal", "acc"], &["nz"], &["an"], &["az"],
-            &["load", "factor"], &["accel", "z"], &["acc", "z"], &["vertical", "acceleration"], &["acceleration", "z"]],
+            &["load", "factor"], &["accel", "z"], &["acc", "z"], &["vertical", "acceleration"], &["acceleration", "z"],
+            &["lastvielfaches"], &["facteur", "charge"], &["fattore", "carico"], &["factor", "carga"], &["normalbeschl"],
+            &["normalbeschleunigung"]],
     },
     Entry {
         signal: signal::AX,
-        names: &["ax", "nx", "accx", "longacc", "axialacc", "accelx", "nxcg"],
+        names: &["ax", "nx", "accx", "longacc", "axialacc", "accelx", "nxcg", "long", "longg"],
         words: &[&["longitudinal", "acceleration"], &["axial", "acceleration"], &["long", "acc"], &["axial", "acc"],
-            &["nx"], &["ax"], &["accel", "x"], &["acc", "x"], &["acceleration", "x"], &["longitudinal", "accel"]],
+            &["nx"], &["ax"], &["accel", "x"], &["acc", "x"], &["acceleration", "x"], &["longitudinal", "accel"],
+            &["laengsbeschl"], &["laengsbeschleunigung"], &["längsbeschleunigung"]],
     },
     Entry {
         signal: signal::AY,
-        names: &["ay", "ny", "accy", "latacc", "accely", "nycg"],
+        names: &["ay", "ny", "accy", "latacc", "accely", "nycg", "latg"],
         words: &[&["lateral", "acceleration"], &["lateral", "accel"], &["lat", "acc"], &["ny"], &["ay"], &["accel", "y"],
-            &["acc", "y"], &["side", "acceleration"], &["acceleration", "y"]],
+            &["acc", "y"], &["side", "acceleration"], &["acceleration", "y"], &["querbeschl"], &["querbeschleunigung"]],
     },
     Entry {
         signal: signal::QBAR,
-        names: &["qbar", "dynamicpressure", "dynpress", "pdyn", "dynpres", "qdyn", "qinf", "q", "qd"],
-        words: &[&["dynamic", "pressure"], &["qbar"], &["pdyn"], &["dyn", "press"]],
+        names: &["qbar", "dynamicpressure", "dynpress", "dynp", "pdyn", "dynpres", "qdyn", "qinf", "q", "qd"],
+        words: &[&["dynamic", "pressure"], &["qbar"], &["pdyn"], &["dyn", "press"], &["staudruck"], &["pression", "dynamique"],
+            &["press", "din"], &["pressione", "dinamica"], &["presion", "dinamica"]],
     },
     Entry {
         signal: signal::THRUST,
-        names: &["thrust", "netthrust", "totalthrust", "fn", "thr"],
-        words: &[&["thrust"]],
+        names: &["thrust", "netthrust", "totalthrust", "fn", "fnet", "thr"],
+        words: &[&["thrust"], &["fnet"], &["schub"], &["poussee"], &["poussée"], &["spinta"], &["empuje"]],
     },
     Entry {
         signal: signal::MASS,
-        names: &["mass", "grossmass", "aircraftmass", "acmass", "m"],
-        words: &[&["mass"]],
+        names: &["mass", "grossmass", "aircraftmass", "acmass", "m", "gw", "grossweight", "acweight", "masa"],
+        words: &[&["mass"], &["gross", "weight"], &["aircraft", "weight"], &["masse"], &["massa"]],
     },
-    Entry { signal: signal::X_CG, names: &["xcg", "cgx"], words: &[&["x", "cg"], &["xcg"]] },
-    Entry { signal: signal::Y_CG, names: &["ycg", "cgy"], words: &[&["y", "cg"], &["ycg"]] },
-    Entry { signal: signal::Z_CG, names: &["zcg", "cgz"], words: &[&["z", "cg"], &["zcg"]] },
+    Entry {
+        signal: signal::X_CG,
+        names: &["xcg", "cgx"],
+        words: &[&["x", "cg"], &["xcg"], &["schwerpunkt", "x"], &["centrage", "x"]],
+    },
+    Entry {
+        signal: signal::Y_CG,
+        names: &["ycg", "cgy"],
+        words: &[&["y", "cg"], &["ycg"], &["schwerpunkt", "y"], &["centrage", "y"]],
+    },
+    Entry {
+        signal: signal::Z_CG,
+        names: &["zcg", "cgz"],
+        words: &[&["z", "cg"], &["zcg"], &["schwerpunkt", "z"], &["centrage", "z"]],
+    },
     Entry { signal: signal::IX, names: &["ix", "ixx", "jx", "jxx", "inertiax"], words: &[&["ixx"], &["inertia", "x"]] },
     Entry { signal: signal::IY, names: &["iy", "iyy", "jy", "jyy", "inertiay"], words: &[&["iyy"], &["inertia", "y"]] },
     Entry { signal: signal::IZ, names: &["iz", "izz", "jz", "jzz", "inertiaz"], words: &[&["izz"], &["inertia", "z"]] },
     Entry { signal: signal::IXZ, names: &["ixz", "jxz", "inertiaxz"], words: &[&["ixz"], &["inertia", "xz"]] },
     Entry {
         signal: signal::RPM_LEFT,
-        names: &["rpml", "rpmleft", "leftrpm", "rpm1", "n1l", "rpmlh", "rpm", "enginerpm", "lrpm"],
-        words: &[&["rpm", "l"], &["rpm", "left"], &["rpm", "1"], &["rpm", "lh"]],
+        names: &["rpml", "rpmleft", "leftrpm", "rpm1", "n1l", "n2l", "rpmlh", "rpm", "enginerpm", "lrpm"],
+        words: &[&["rpm", "l"], &["rpm", "left"], &["rpm", "1"], &["rpm1"], &["rpm", "lh"], &["drehzahl"], &["drehzahl", "li"],
+            &["drehzahl", "links"], &["regime", "g"], &["giri", "sx"], &["n2", "l"], &["n2", "1"], &["eng1", "n2"]],
     },
     Entry {
         signal: signal::RPM_RIGHT,
-        names: &["rpmr", "rpmright", "rightrpm", "rpm2", "n1r", "rpmrh", "rrpm"],
-        words: &[&["rpm", "r"], &["rpm", "right"], &["rpm", "2"], &["rpm", "rh"]],
+        names: &["rpmr", "rpmright", "rightrpm", "rpm2", "n1r", "n2r", "rpmrh", "rrpm"],
+        words: &[&["rpm", "r"], &["rpm", "right"], &["rpm", "2"], &["rpm2"], &["rpm", "rh"], &["drehzahl", "re"],
+            &["drehzahl", "rechts"], &["regime", "d"], &["giri", "dx"], &["n2", "r"], &["n2", "2"], &["eng2", "n2"]],
     },
 ];
 
@@ -246,27 +280,38 @@ type InputWords = (
 
 #[rustfmt::skip]
 const INPUTS: &[InputWords] = &[
-    (Input::PitchStick, &["dep", "ddep", "lonstk", "stickpitch", "deltastick", "etapilot"],
+    (Input::PitchStick, &["dep", "ddep", "lonstk", "stklon", "stickpitch", "deltastick", "etapilot", "ccpos", "cchp"],
         &[&["stick", "pitch"], &["stick", "long"], &["stick", "lon"], &["stick", "longitudinal"], &["stick", "fore"],
-            &["column"], &["stick", "aft"], &["stick", "y"], &["pilot", "pitch"], &["yoke", "pitch"]]),
-    (Input::RollStick, &["dap", "latstk", "sticklat", "wheel"],
+            &["column"], &["stick", "aft"], &["stick", "y"], &["pilot", "pitch"], &["yoke", "pitch"], &["stk", "pitch"],
+            &["stk", "lon"], &["knueppel", "nick"], &["knüppel", "nick"], &["manche", "prof"], &["manche", "tangage"],
+            &["barra", "long"], &["cloche", "long"], &["palanca", "cabeceo"]]),
+    (Input::RollStick, &["dap", "latstk", "stklat", "sticklat", "wheel", "cwpos"],
         &[&["stick", "lat"], &["stick", "lateral"], &["stick", "roll"], &["wheel"], &["stick", "x"], &["pilot", "roll"],
-            &["yoke", "roll"]]),
-    (Input::Pedals, &["pedal", "pedals", "dpp", "rudped", "ruddpedal"], &[&["pedal"], &["pedals"], &["pilot", "yaw"]]),
+            &["yoke", "roll"], &["stk", "roll"], &["stk", "lat"], &["knueppel", "roll"], &["knüppel", "roll"], &["manche", "lat"],
+            &["manche", "roulis"], &["barra", "lat"], &["cloche", "lat"], &["palanca", "balanceo"]]),
+    (Input::Pedals, &["pedal", "pedals", "ped", "dpp", "rped", "rudped", "ruddpedal"],
+        &[&["pedal"], &["pedals"], &["pilot", "yaw"], &["pedale"], &["palonnier"], &["pedaliera"], &["pedales"]]),
     (Input::OtherSurface, &["df", "dlef", "dtef", "lef", "tef", "dsp", "dspoil", "dsb", "dc", "dcan", "slat"],
-        &[&["flap"], &["flaps"], &["slat"], &["slats"], &["spoiler"], &["speedbrake"], &["canard"], &["vane"],
-            &["airbrake"], &["tab"], &["symmetric"], &["differential"], &["leading", "edge"], &["trailing", "edge"]]),
+        &[&["flap"], &["flaps"], &["slat"], &["slats"], &["lef"], &["tef"], &["spoiler"], &["speedbrake"], &["canard"], &["vane"],
+            &["airbrake"], &["tab"], &["symmetric"], &["sym"], &["simm"], &["differential"], &["diff"], &["leading", "edge"],
+            &["trailing", "edge"], &["tv"], &["klappe"], &["landeklappe"], &["vorfluegel"], &["vorflügel"], &["strahlruder"],
+            &["volet"], &["volets"], &["becs"], &["tuyere"], &["tuyère"], &["ugello"]]),
     (Input::Elevator, &["de", "ele", "elev", "dele", "delev", "deltae", "eta", "dh", "dstab", "stab", "ds"],
-        &[&["elevator"], &["stabilator"], &["stabilizer"], &["horizontal", "tail"], &["delta", "e"], &["elev"], &["htail"]]),
-    (Input::Aileron, &["da", "ail", "dail", "deltaa", "xi"], &[&["aileron"], &["ailerons"], &["delta", "a"], &["ail"]]),
-    (Input::Rudder, &["dr", "rud", "drud", "deltar", "zeta"], &[&["rudder"], &["rudders"], &["delta", "r"], &["rud"]]),
+        &[&["elevator"], &["stabilator"], &["stabilizer"], &["horizontal", "tail"], &["delta", "e"], &["elev"], &["htail"],
+            &["stab"], &["hoehenruder"], &["höhenruder"], &["profondeur"], &["equilibratore"], &["profundidad"]]),
+    (Input::Aileron, &["da", "ail", "ailn", "dail", "deltaa", "xi"],
+        &[&["aileron"], &["ailerons"], &["delta", "a"], &["ail"], &["querruder"], &["gauchissement"], &["alettone"],
+            &["alettoni"], &["aleron"]]),
+    (Input::Rudder, &["dr", "rud", "rudd", "drud", "deltar", "zeta", "direction"],
+        &[&["rudder"], &["rudders"], &["delta", "r"], &["rud"], &["seitenruder"], &["gouverne", "direction"], &["timone"],
+            &["timon"]]),
 ];
 
 /// Input that a name means.
 #[must_use]
 pub fn input(spelling: &Spelling) -> Option<Input> {
     let joined = spelling.joined();
-    let is_derived = spelling.words.iter().any(|w| DERIVED.contains(&w.as_str()));
+    let is_derived = is_derived(spelling);
     let fits = |(_, names, words): &&(Input, &[&str], &[&[&str]])| {
         let contained = || {
             words
@@ -276,6 +321,12 @@ pub fn input(spelling: &Spelling) -> Option<Input> {
         names.contains(&joined.as_str()) || (!is_derived && contained())
     };
     INPUTS.iter().find(fits).map(|(input, _, _)| *input)
+}
+
+/// `true` for a name with a word that no measured quantity has, such as `cmd`.
+#[must_use]
+pub fn is_derived(spelling: &Spelling) -> bool {
+    spelling.words.iter().any(|w| DERIVED.contains(&w.as_str()))
 }
 
 /// `true` for a name of one of two surfaces or engines: `aileron_left`.

@@ -316,6 +316,117 @@ fn columns_without_names_are_found_by_their_motion() {
 }
 
 #[test]
+fn signs_that_only_gravity_tells_are_not_sure_without_it() {
+    // Without accelerations, pitch may be reversed together with yaw: every equation that is left holds.
+    let copy = Copy::new()
+        .without(&["an", "ax", "ay", "altitude", "mach", "qbar", "beta_vane"])
+        .reversed(&["theta", "r"]);
+    let (found, wrong, _) = copy.judged();
+    assert!(wrong.is_empty(), "wrong and sure: {wrong:#?}");
+    let doubt = |name: &str| {
+        found
+            .channels
+            .iter()
+            .find(|c| c.column == name && !c.is_sure)
+    };
+    let theta = doubt("theta").expect("theta, not sure");
+    assert!(
+        theta.evidence.contains("reversed together"),
+        "{}",
+        theta.evidence
+    );
+}
+
+#[test]
+fn an_altitude_above_the_sea_tells_which_way_is_up() {
+    let names = ["an", "ax", "ay", "qbar", "beta_vane", "mach"];
+    let copy = Copy::new().without(&names).reversed(&["theta"]);
+    copy.check(12);
+    let (found, _, _) = copy.judged();
+    for (name, sign) in [("altitude", 1.0), ("theta", -1.0), ("q", 1.0)] {
+        let channel = found.channels.iter().find(|c| c.column == name).unwrap();
+        assert_eq!((channel.sign, channel.is_sure), (sign, true), "{name}");
+    }
+}
+
+#[test]
+fn axes_in_another_order_are_found_by_their_motion() {
+    let copy = Copy::new().renamed(&[
+        ("p", "WX"),
+        ("q", "WZ"),
+        ("r", "WY"),
+        ("an", "NY"),
+        ("ax", "NX"),
+        ("ay", "NZ"),
+        ("da", "DE"),
+        ("de", "DV"),
+        ("Ix", "JX"),
+        ("Iy", "JZ"),
+        ("Iz", "JY"),
+    ]);
+    copy.check(20);
+    let (found, _, _) = copy.judged();
+    for (name, signal) in [
+        ("WZ", "q_deg_s"),
+        ("WY", "r_deg_s"),
+        ("NY", "an_g"),
+        ("NZ", "ay_g"),
+    ] {
+        let channel = found.channels.iter().find(|c| c.column == name).unwrap();
+        assert_eq!(channel.signal, signal, "{name}");
+        assert!(channel.is_sure, "{name}: {}", channel.evidence);
+    }
+}
+
+#[test]
+fn names_of_other_languages_are_known_and_ends_that_are_no_units_left_out() {
+    let copy = Copy::new().in_si().without_units().renamed(&[
+        ("time", "Zeit"),
+        ("alpha_vane", "alpha_m"),
+        ("beta_vane", "Schiebewinkel"),
+        ("V", "vitesse_air"),
+        ("q", "Nickrate"),
+        ("theta", "assiette"),
+        ("an", "VRTG"),
+        ("de", "profondeur"),
+        ("dr", "Seitenruder"),
+        ("stick_pitch", "CCPOS"),
+        ("mass", "GW"),
+    ]);
+    copy.check(12);
+    let (found, _, _) = copy.judged();
+    let names = [
+        "alpha_m",
+        "Schiebewinkel",
+        "vitesse_air",
+        "profondeur",
+        "Seitenruder",
+        "CCPOS",
+        "GW",
+    ];
+    for name in names {
+        assert!(found.channels.iter().any(|c| c.column == name), "{name}");
+    }
+}
+
+#[test]
+fn surfaces_whose_names_mean_nothing_are_found_by_their_effects_and_not_sure() {
+    let copy = Copy::new().renamed(&[("de", "S01"), ("da", "S02"), ("dr", "S03")]);
+    copy.check(20);
+    let (found, _, _) = copy.judged();
+    for (name, effect) in [("S01", "pitch"), ("S02", "roll"), ("S03", "yaw")] {
+        let channel = found.channels.iter().find(|c| c.column == name);
+        let channel = channel.unwrap_or_else(|| panic!("{name}: {:#?}", found.unused));
+        assert!(
+            !channel.is_sure && channel.evidence.contains(effect),
+            "{name}: {}",
+            channel.evidence
+        );
+        assert!(channel.sign > 0.0, "{name}");
+    }
+}
+
+#[test]
 fn an_incomplete_recording_is_not_filled_up_with_other_columns() {
     let gone = ["psi", "beta_vane", "mach", "altitude", "tvcs", "obes", "q"];
     let copy = Copy::new().without(&gone);
