@@ -534,3 +534,39 @@ fn init_writes_a_pipeline_whose_questions_check_lists() {
         );
     }
 }
+
+#[test]
+fn a_drafted_class_takes_doublets_of_several_surfaces_for_one_maneuver() {
+    let folder = tempfile::tempdir().unwrap();
+    let flight = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/demo/flights/flight_001.parquet");
+    let command = |words: &[&str]| {
+        let mut command = harvest();
+        command.current_dir(folder.path()).args(words);
+        run(&mut command)
+    };
+    command(&["init", "mine", "--from", &flight.display().to_string()]);
+    let aircraft = folder.path().join("pipelines/mine/aircraft.yaml");
+    let text = fs::read_to_string(&aircraft).unwrap();
+    let harv = Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/harv/aircraft.yaml");
+    let harv = fs::read_to_string(harv).unwrap();
+    let parts = |text: &str| {
+        let (geometry, recorder) = text.split_once("\n# The recorder").unwrap();
+        (geometry.to_owned(), recorder.to_owned())
+    };
+    let answered = format!("{}\n# The recorder{}", parts(&harv).0, parts(&text).1);
+    fs::write(&aircraft, answered).unwrap();
+    let outcome = command(&["segment", "mine"]);
+    assert!(
+        outcome.code.is_some_and(|code| code != 1),
+        "{}",
+        outcome.stderr
+    );
+    let found = fs::read_to_string(folder.path().join("reports/mine/maneuvers.csv")).unwrap();
+    // Flap, aileron, elevator and vane step one after another from 1157.7 to 1183.7 s.
+    let of_flaps = found
+        .lines()
+        .filter(|line| line.starts_with("flight_001_t0115"));
+    assert_eq!(of_flaps.count(), 1, "{found}");
+    let unknown = fs::read_to_string(folder.path().join("reports/mine/unknown.csv")).unwrap();
+    assert_eq!(unknown.lines().count(), 1, "{unknown}");
+}

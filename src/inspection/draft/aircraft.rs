@@ -246,6 +246,24 @@ const OF_SURFACES: UsualErrors = UsualErrors {
     fault: "",
 };
 
+/// Errors of mass and inertias that are given as constants: half of the fuel that is burnt in a flight of training or test,
+/// and what an estimate from the type's data leaves.
+const OF_CONSTANTS: [(&str, UsualErrors); 4] = [
+    (signal::MASS, of_constant("scale_pct: 3")),
+    (signal::IX, of_constant("scale_pct: 5")),
+    (signal::IY, of_constant("scale_pct: 5")),
+    (signal::IZ, of_constant("scale_pct: 5")),
+];
+
+const fn of_constant(uncertainty: &'static str) -> UsualErrors {
+    UsualErrors {
+        signals: &[],
+        uncertainty,
+        ordinary: "",
+        fault: "",
+    }
+}
+
 impl UsualErrors {
     /// Line of a signal.
     fn line(&self, signal: &str) -> String {
@@ -269,7 +287,9 @@ fn instruments(draft: &Draft) -> String {
     });
     let surfaces = draft.inputs().filter(|(_, input)| input.kind.is_surface());
     let of_surfaces = surfaces.map(|(channel, _)| OF_SURFACES.line(&channel.signal));
-    let lines: String = of_signals.chain(of_surfaces).collect();
+    let constant = OF_CONSTANTS.iter().filter(|(name, _)| !draft.has(name));
+    let of_constants = constant.map(|(name, errors)| errors.line(name));
+    let lines: String = of_signals.chain(of_surfaces).chain(of_constants).collect();
     let map = if lines.is_empty() { " {}\n" } else { "\n" };
     format!(
         "

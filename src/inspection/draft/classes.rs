@@ -20,22 +20,19 @@ pub struct DraftClass {
     pub name: String,
     title: String,
     axis: Axis,
-    /// Signals that must step, and those that must not.
+    /// Signals that must step, those that may, and those that must not.
     steps: Vec<String>,
+    may_step: Vec<String>,
     rests: Vec<String>,
 }
 
 /// Classes by inputs that move: of the surfaces, and of the pilot's controls.
 pub fn classes(draft: &Draft) -> Vec<DraftClass> {
-    let of_surfaces = Inputs::of(draft, |kind| {
-        kind.is_surface() && kind != Input::OtherSurface
-    });
+    let of_surfaces = Inputs::of(draft, Input::is_surface);
     let of_pilot = Inputs::of(draft, |kind| !kind.is_surface());
-    let all = |inputs: &Inputs| {
-        let acts = [Acts::Pitch, Acts::Roll, Acts::Yaw];
-        acts.map(|acts| inputs.of_axis(acts)).concat()
-    };
-    let mut classes = of_surfaces.classes("surface", &all(&of_pilot));
+    let acts = [Acts::Pitch, Acts::Roll, Acts::Yaw];
+    let of_pilot_all = acts.map(|acts| of_pilot.of_axis(acts)).concat();
+    let mut classes = of_surfaces.classes("surface", &of_pilot_all);
     classes.extend(of_pilot.classes("pilot", &[]));
     classes
 }
@@ -55,23 +52,30 @@ impl<'a> Inputs<'a> {
         }
     }
 
+    /// Inputs of an axis: the main one first, where there is one, then flaps, vanes and the like.
     fn of_axis(&self, acts: Acts) -> Vec<String> {
         let of_axis = self.inputs.iter().filter(|(_, input)| input.acts == acts);
-        of_axis.map(|(channel, _)| channel.signal.clone()).collect()
+        let (main, others): (Vec<_>, Vec<_>) =
+            of_axis.partition(|(_, input)| input.kind != Input::OtherSurface);
+        let all = main.into_iter().chain(others);
+        all.map(|(channel, _)| channel.signal.clone()).collect()
     }
 
-    /// Pitch, roll, yaw, and roll with yaw. `others` must rest in all of them.
+    /// Pitch, roll, yaw, and roll with yaw. The first input of each axis must step, the others may; `others` must rest in
+    /// all of them.
     fn classes(&self, by: &str, others: &[String]) -> Vec<DraftClass> {
         let [pitch, roll, yaw] =
             [Acts::Pitch, Acts::Roll, Acts::Yaw].map(|acts| self.of_axis(acts));
         let class = |name: &str, axis: Axis, steps: &[&Vec<String>], rests: &[&Vec<String>]| {
             let first = |signals: &&Vec<String>| signals.first().cloned();
             let all_step = steps.iter().all(|signals| !signals.is_empty());
+            let further = steps.iter().flat_map(|signals| signals.iter().skip(1));
             all_step.then(|| DraftClass {
                 name: format!("{name}_{by}"),
                 title: title(name, by),
                 axis,
                 steps: steps.iter().filter_map(first).collect(),
+                may_step: further.cloned().collect(),
                 rests: rests
                     .iter()
                     .filter_map(first)
@@ -117,6 +121,12 @@ pub fn text(draft: &Draft, class: &DraftClass) -> String {
     );
     for signal in &class.steps {
         let _ = writeln!(text, "    {signal}: {{ at_least: {FEWEST_STEPS} }}");
+    }
+    for signal in &class.may_step {
+        let _ = writeln!(
+            text,
+            "    {signal}: {{ at_least: 0 }} # counts where it moves from side to side"
+        );
     }
     for signal in &class.rests {
         let _ = writeln!(text, "    {signal}: {{ at_most: {MOST_OTHER_STEPS} }}");
