@@ -176,10 +176,9 @@ const SURFACES: [&str; 5] = ["de_deg", "dpv_deg", "da_deg", "dr_deg", "dyv_deg"]
 pub(crate) fn with_noisy_surfaces(sd_deg: f64, noise: &mut Noise) -> Record {
     let mut record = record();
     for name in SURFACES {
-        let values = &mut record.signals.get_mut(name).unwrap().values;
-        values
-            .iter_mut()
-            .for_each(|v| *v += sd_deg * noise.gaussian());
+        for value in &mut record.signals.get_mut(name).unwrap().values {
+            *value += sd_deg * noise.gaussian();
+        }
     }
     record
 }
