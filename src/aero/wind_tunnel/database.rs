@@ -37,7 +37,7 @@ impl WindTunnel {
         &self.settings
     }
 
-    /// The same tables, constant beyond their ends.
+    /// Copy of the tables that is constant beyond their ends.
     #[must_use]
     pub fn clamped(&self) -> WindTunnel {
         let settings = Settings {

@@ -84,8 +84,8 @@ fn the_gradient_with_noisy_inputs_is_that_of_finite_differences() {
     }
 }
 
-/// Correlation of neighbouring innovations of the rates and accelerations, and their mean square, at
-/// the truth.
+/// Correlation of neighbouring innovations of the pitch or roll rate, and their mean square, at the
+/// truth.
 fn innovations_of_maneuvers<const NX: usize, E: InGusts<NX>>(exact: bool) -> (f64, f64) {
     let truth = truth(E::AXIS);
     let mut draws = Draws(8);
@@ -99,7 +99,6 @@ fn innovations_of_maneuvers<const NX: usize, E: InGusts<NX>>(exact: bool) -> (f6
         let at = recorded.filter.with_noise(&recorded.own, &still);
         let white = recorded.filter.innovations(&at).unwrap().whitened;
         for pair in white.windows(2) {
-            // The pitch rate or roll rate.
             squares += pair[0][1] * pair[0][1];
             products += pair[0][1] * pair[1][1];
             count += 1.0;

@@ -19,7 +19,7 @@ const LEAST_SELECTED: usize = 5;
 /// which it holds a jump of the record: far beyond noise, gusts and turbulence.
 const JUMP_DEVIATIONS: f64 = 10.0;
 
-/// The same limit for a relation that only gusts excite: a window beyond it holds the motion of a control.
+/// Distance of a window, for a relation that only gusts excite, from which it holds the motion of a control.
 const MANEUVER_DEVIATIONS: f64 = 3.0;
 
 /// Least change of the gusts' velocity with which a relation that they excite is checked, ft/s²:
