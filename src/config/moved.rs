@@ -5,7 +5,7 @@ use serde_yaml::Value;
 use super::source::Source;
 use super::written::PipelineFile;
 use crate::error::Error;
-use crate::settings::Setting;
+use crate::settings::{Key, Setting};
 
 /// Keys that another key or file has replaced, and the new place.
 const REPLACED: [(&str, &str); 11] = [
@@ -58,7 +58,11 @@ pub(super) fn refusal(pipeline: &Source) -> Option<Error> {
     let written: Value = pipeline.parse().ok()?;
     let mut paths = Vec::new();
     leaves(&written, &mut Vec::new(), &mut paths);
-    let mut moved: Vec<Moved> = paths.iter().filter_map(|path| new_place(path)).collect();
+    let expert = expert_keys();
+    let mut moved: Vec<Moved> = paths
+        .iter()
+        .filter_map(|path| new_place(path, &expert))
+        .collect();
     moved.dedup();
     let (first, further) = moved.split_first()?;
     let further = further.iter().map(|key| {
@@ -95,8 +99,15 @@ fn leaves(value: &Value, path: &mut Vec<String>, found: &mut Vec<Vec<String>>) {
     }
 }
 
+/// Keys under `expert:`, as they are written.
+fn expert_keys() -> Vec<String> {
+    let keys = PipelineFile::keys();
+    let expert = keys.iter().filter(|key| key.path.get(1) == Some(&"expert"));
+    expert.map(Key::written).collect()
+}
+
 /// New place of an old key.
-fn new_place(path: &[String]) -> Option<Moved> {
+fn new_place(path: &[String], expert_keys: &[String]) -> Option<Moved> {
     let written = path.join(": ");
     if let Some((old, place)) = REPLACED.iter().find(|(old, _)| is_below(&written, old)) {
         return Some(Moved {
@@ -106,11 +117,7 @@ fn new_place(path: &[String]) -> Option<Moved> {
     }
     let (stage, rest) = path.split_first()?;
     let expert = format!("{stage}: expert: {}", rest.join(": "));
-    let keys = PipelineFile::keys();
-    let exists = keys
-        .iter()
-        .filter(|key| key.path.get(1) == Some(&"expert"))
-        .any(|key| is_below(&expert, &key.written()));
+    let exists = expert_keys.iter().any(|key| is_below(&expert, key));
     exists.then(|| Moved {
         old: path.to_vec(),
         place: format!("`{expert}`"),

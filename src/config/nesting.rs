@@ -1,32 +1,44 @@
-//! Depth of a YAML text, measured before it is parsed: the parser's time grows with its square.
+//! Bounds of a YAML text, checked before it is parsed: the parser's time grows with the square of its nesting
+//! and of its directives.
 
-/// Deepest nesting of a file. Those of a pipeline reach eight levels.
-const DEEPEST: usize = 100;
+/// Largest file, bytes: eighty times the longest of the shipped pipelines.
+const LARGEST: usize = 1 << 20;
 
-/// Message for a text that is nested too deep.
-pub const REASON: &str = "brackets, dashes or question marks are nested more than 100 deep here";
+/// Deepest nesting of a file. Those of a pipeline reach eight levels; the parser takes milliseconds for so many.
+const DEEPEST: usize = 1000;
 
-/// First line of a text, counted from 1, that is nested too deep; `None` if none is.
-pub fn too_deep(text: &str) -> Option<usize> {
+/// Characters that end a line in YAML.
+const BREAKS: [char; 5] = ['\n', '\r', '\u{85}', '\u{2028}', '\u{2029}'];
+
+/// Finds what makes a text no file of a pipeline: its line, counted from 1, and the reason. Brackets count in
+/// comments as well: where a comment begins, only the parser knows.
+pub fn excess(text: &str) -> Option<(Option<usize>, &'static str)> {
+    if text.len() > LARGEST {
+        return Some((None, "it is larger than 1 MB, more than any such file has"));
+    }
     let mut open = 0_usize;
-    for (index, line) in text.lines().enumerate() {
-        let line = without_comment(line);
-        for c in line.chars() {
+    for (line, text) in (1..).zip(text.split(BREAKS)) {
+        if text.starts_with('%') {
+            return Some((
+                Some(line),
+                "a line begins with `%`: directives are not read",
+            ));
+        }
+        for c in text.chars() {
             match c {
                 '[' | '{' => open += 1,
                 ']' | '}' => open = open.saturating_sub(1),
                 _ => {}
             }
             if open > DEEPEST {
-                return Some(index + 1);
+                return Some((Some(line), "brackets are nested more than 1000 deep here"));
             }
         }
-        // Each of these begins a level of its own: `- - - 1`.
-        let marks = line
-            .split([' ', '\t'])
-            .take_while(|word| ["", "-", "?"].contains(word));
-        if marks.filter(|word| !word.is_empty()).count() > DEEPEST {
-            return Some(index + 1);
+        // Each of these may begin a level of its own: `- - - 1`.
+        let words = text.split([' ', '\t']);
+        if words.filter(|word| ["-", "?"].contains(word)).count() > DEEPEST {
+            let what = "dashes or question marks are nested more than 1000 deep here";
+            return Some((Some(line), what));
         }
     }
     None
@@ -45,10 +57,32 @@ pub fn without_comment(line: &str) -> &str {
 mod tests {
     use super::*;
 
+    fn line(text: &str) -> Option<usize> {
+        excess(text).and_then(|(line, _)| line)
+    }
+
     #[test]
-    fn deep_nesting_is_found_on_its_line_and_brackets_in_comments_do_not_count() {
-        assert_eq!(too_deep(&format!("a: 1\nb: {}", "[".repeat(101))), Some(2));
-        assert_eq!(too_deep(&format!("a:\n{}1", "- ".repeat(101))), Some(2));
-        assert_eq!(too_deep(&"b: [{c: [1]}] # [[[[\n".repeat(1000)), None);
+    fn deep_nesting_is_found_on_its_line_wherever_the_parser_may_see_it() {
+        let deep = "[".repeat(1001);
+        for before in [
+            "a: 1\nb: ",
+            "a: 1\nb: [\" #\", ",
+            "# a comment\r",
+            "# a comment\u{85}",
+            "a: [ \"x\n# \", ",
+        ] {
+            assert_eq!(line(&format!("{before}{deep}")), Some(2), "{before:?}");
+        }
+        let hidden = "\" #\", [\n".repeat(1001);
+        assert_eq!(line(&format!("a: [{hidden}")), Some(1000));
+        assert_eq!(line(&format!("a:\n{}1", "- ".repeat(1001))), Some(2));
+        assert_eq!(excess(&"b: [{c: [1]}] # [[\n".repeat(400)), None);
+    }
+
+    #[test]
+    fn directives_and_large_files_are_refused() {
+        assert_eq!(line("a: 1\n%TAG !t! tag:x,2000:\n"), Some(2));
+        assert!(excess(&"# a\n".repeat(300_000)).is_some());
+        assert_eq!(excess("a: 20 % of it\n"), None);
     }
 }

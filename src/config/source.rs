@@ -37,8 +37,8 @@ impl Source {
     pub fn read(path: PathBuf) -> Result<Source> {
         let text = files::text(&path)?;
         let source = Source { path, text };
-        match nesting::too_deep(&source.text) {
-            Some(line) => Err(Error::config(&source.path, Some(line), nesting::REASON)),
+        match nesting::excess(&source.text) {
+            Some((line, what)) => Err(Error::config(&source.path, line, what)),
             None => Ok(source),
         }
     }

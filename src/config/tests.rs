@@ -1121,18 +1121,36 @@ fn a_constant_mass_is_greater_than_zero() {
 }
 
 #[test]
-fn brackets_without_end_are_refused_at_once() {
-    let copy = Copy::new();
-    let path = copy.write(
-        "pipeline.yaml",
-        &format!("title: t\narchive: {}", "[".repeat(100_000)),
-    );
-    let error = copy.error();
-    assert_eq!(
-        error,
-        "pipeline.yaml:2: brackets, dashes or question marks are nested more than 100 deep here"
-    );
-    assert!(path.is_file());
+fn what_the_parser_takes_long_for_is_refused_at_once() {
+    let deep = "[".repeat(100_000);
+    let keys: Vec<String> = (0..100_000).map(|k| format!("k{k}: 1\n")).collect();
+    let begun = std::time::Instant::now();
+    for (text, error) in [
+        (
+            format!("title: t\narchive: {deep}"),
+            "pipeline.yaml:2: brackets are nested",
+        ),
+        (
+            format!("title: t\na: [\" #\", {deep}"),
+            "pipeline.yaml:2: brackets are nested",
+        ),
+        (
+            "%TAG !t! t:x\n".repeat(50_000),
+            "pipeline.yaml:1: a line begins with `%`",
+        ),
+        (keys.concat(), "pipeline.yaml:1: unknown field `k0`"),
+        (
+            "#\n".repeat(1_000_000),
+            "pipeline.yaml: it is larger than 1 MB",
+        ),
+    ] {
+        let copy = Copy::new();
+        let path = copy.write("pipeline.yaml", &text);
+        let found = copy.error();
+        assert!(found.starts_with(error), "{found}");
+        assert!(path.is_file());
+    }
+    assert!(begun.elapsed().as_secs() < 60, "{:?}", begun.elapsed());
 }
 
 #[test]
