@@ -12,8 +12,9 @@ use super::channel::{
 };
 use super::checks::{
     BlockAverager, BlockMeans, Check, FaultReport, FaultyChannel, Gusts, ImpossibleSignal,
-    LiftPoint, check_relations, confirmed_signals, find_faulty_channels, impossible_gyration,
-    impossible_mass, impossible_signals, lift_curve, report,
+    LiftPoint, check_relations, confirmed_signals, find_faulty_channels, impossible_centre,
+    impossible_gyration, impossible_mass, impossible_signals, impossible_velocity, lift_curve,
+    report, wrong_time,
 };
 use super::clock::{Clock, Stretch};
 use super::compatibility::{self, ErrorEvidence, Findings, OnFault};
@@ -76,7 +77,10 @@ pub fn assess(
     };
     let blocks = examination.blocks(std::mem::take(&mut recording.block_means));
     let (mut relations, findings) = examination.reconcile(&blocks);
-    let impossible = examination.impossible(&blocks, &relations.faulty);
+    if relations.impossible.is_empty() {
+        relations.impossible = examination.impossible(&blocks, &relations.faulty);
+    }
+    let impossible = &relations.impossible;
     if !impossible.is_empty() {
         let found = impossible.iter().map(|one| {
             let refusal = context.refusal(one.signal, one.reason.clone());
@@ -87,7 +91,6 @@ pub fn assess(
             return Err(joined(&found, flight_id));
         }
         problems.extend(found);
-        relations.impossible = impossible;
     }
     let mut stand_ins = recording.stand_ins;
     if let Some(report) = &relations.report {
@@ -227,6 +230,9 @@ impl Examination<'_> {
     /// is the fault.
     fn reconcile(&self, blocks: &BlockMeans) -> (RelationResult, Findings) {
         let relations = self.check(blocks);
+        if !relations.impossible.is_empty() {
+            return (relations, Findings::default());
+        }
         let faulty = &relations.faulty;
         if !faulty.is_empty() && faulty.iter().all(FaultyChannel::is_correctable) {
             let findings = self.reconstruct(|record| correct_by_factors(record, faulty));
@@ -263,16 +269,18 @@ impl Examination<'_> {
             signal::QBAR,
             signal::VELOCITY,
         ];
-        let found = impossible_signals(blocks);
-        if !found.is_empty() || faulty.iter().any(|f| LIFT.contains(&f.signal.as_str())) {
-            return found;
-        }
         let Context {
             channels,
             aircraft,
             settings,
             ..
         } = *self.context;
+        let mut found = impossible_signals(blocks);
+        found.extend(impossible_centre(blocks, aircraft));
+        found.extend(impossible_velocity(blocks, &settings.checks));
+        if !found.is_empty() || faulty.iter().any(|f| LIFT.contains(&f.signal.as_str())) {
+            return found;
+        }
         let mass = channels.values().find(|c| c.signal == signal::MASS);
         let unit = mass.map(|channel| channel.unit.as_str());
         impossible_mass(blocks, aircraft, unit, &settings.checks)
@@ -281,7 +289,8 @@ impl Examination<'_> {
             .collect()
     }
 
-    /// Checks the kinematic relations and isolates the faulty channels.
+    /// Checks the kinematic relations and isolates the faulty channels. A wrong time fails relations of
+    /// every channel, so then no channel is named.
     fn check(&self, blocks: &BlockMeans) -> RelationResult {
         let Context {
             channels,
@@ -290,6 +299,16 @@ impl Examination<'_> {
             ..
         } = *self.context;
         let (checks, gusts) = check_relations(blocks, aircraft, &settings.checks);
+        if let Some(time) = wrong_time(&checks) {
+            return RelationResult {
+                confirmed: Vec::new(),
+                report: None,
+                checks,
+                gusts,
+                faulty: Vec::new(),
+                impossible: vec![time],
+            };
+        }
         let faulty = find_faulty_channels(
             blocks,
             &checks,

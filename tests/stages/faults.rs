@@ -116,6 +116,39 @@ fn each_is_named_alone(planted: &[(&str, f64)]) {
 }
 
 #[test]
+fn a_time_of_another_unit_or_rate_is_named_and_no_channel() {
+    let config = config();
+    for (number, raw) in flights(&config).iter().enumerate() {
+        // 40 Hz taken for 32 or 50 Hz; minutes of a slower recorder; a tenth.
+        for factor in [0.8, 1.25, 3.0, 0.1, 1.0 / 20.0] {
+            let mut wrong = raw.clone();
+            let time = wrong.columns.get_mut("time").unwrap();
+            time.values.iter_mut().for_each(|t| *t *= factor);
+            let problem = ingest(&config, &wrong, &Settings::default()).unwrap_err();
+            let about = format!("flight {number} times {factor}: {problem:?}");
+            assert_eq!(problem.place, "channel `time`", "{about}");
+            let counts = problem.reason.strip_prefix("it counts ").unwrap();
+            let seconds: f64 = counts.split(' ').next().unwrap().parse().unwrap();
+            assert!((seconds / factor - 1.0).abs() < 0.03, "{about}");
+        }
+    }
+}
+
+#[test]
+fn a_centre_of_gravity_in_inches_and_a_velocity_at_rest_are_named() {
+    let config = config();
+    let raw = ten_minutes(&config);
+    for (channel, factor) in [("xcg", 12.0), ("zcg", 12.0), ("V", 1.0 / DEG)] {
+        let mut wrong = raw.clone();
+        let column = wrong.columns.get_mut(channel).unwrap();
+        column.values.iter_mut().for_each(|v| *v *= factor);
+        let problem = ingest(&config, &wrong, &Settings::default()).unwrap_err();
+        assert_eq!(problem.place, format!("channel `{channel}`"), "{problem:?}");
+        assert!(problem.reason.contains("in another unit"), "{problem:?}");
+    }
+}
+
+#[test]
 fn a_reversed_attitude_or_rate_is_named() {
     each_is_named_alone(&["theta", "phi", "psi", "p", "q", "r"].map(|name| (name, -1.0)));
 }

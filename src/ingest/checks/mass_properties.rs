@@ -101,6 +101,30 @@ pub fn impossible_signals(blocks: &BlockMeans) -> Vec<ImpossibleSignal> {
     }
 }
 
+/// Dynamic pressure of an aircraft that flies, lbf/ft²: that of 90 ft/s at sea level.
+const FLYING_PSF: f64 = 10.0;
+
+/// Density of very cold air at sea level, slug/ft³.
+const DENSEST_SLUG_FT3: f64 = 0.003;
+
+/// Finds the velocity of an aircraft at rest beside the dynamic pressure of one that flies: below the least velocity
+/// no relation is checked.
+pub fn impossible_velocity(blocks: &BlockMeans, settings: &Checks) -> Option<ImpossibleSignal> {
+    let (velocity, qbar) = (
+        median(blocks, signal::VELOCITY)?,
+        median(blocks, signal::QBAR)?,
+    );
+    let most = 0.5 * DENSEST_SLUG_FT3 * velocity * velocity;
+    let is_at_rest = velocity < settings.least_velocity_ft_s;
+    (is_at_rest && qbar > most.max(FLYING_PSF)).then(|| ImpossibleSignal {
+        signal: signal::VELOCITY,
+        reason: format!(
+            "its median is {velocity:.4} ft/s, that of the dynamic pressure {qbar:.4} lbf/ft2, which needs more speed: is \
+             one of them in another unit?"
+        ),
+    })
+}
+
 fn not_positive(blocks: &BlockMeans, name: &'static str) -> Option<ImpossibleSignal> {
     let may_be_zero = [signal::VELOCITY, signal::QBAR].contains(&name);
     let is_wrong = |median: &f64| *median < 0.0 || *median == 0.0 && !may_be_zero;
@@ -155,6 +179,32 @@ pub fn impossible_gyration(blocks: &BlockMeans, aircraft: &Aircraft) -> Option<I
             "with it and a mass of {mass:.4} slug the radius of gyration in roll is {share:.3} of half \
              the span; aircraft have 0.2 to 0.4: are the inertias, or the mass, in another unit?"
         ),
+    })
+}
+
+/// Farthest that an accelerometer is from the centre of gravity along each body axis, spans: with margins of two, as a
+/// slender aircraft is two spans long and some fifth of a span high.
+const FARTHEST_SPANS: [f64; 3] = [3.0, 1.0, 1.0];
+
+/// Finds a centre of gravity outside the aircraft: inches for feet, or another reference point than the sensors'.
+pub fn impossible_centre(blocks: &BlockMeans, aircraft: &Aircraft) -> Option<ImpossibleSignal> {
+    let sensor = aircraft.sensors.an;
+    let axes = [
+        (signal::X_CG, sensor.x_ft),
+        (signal::Y_CG, sensor.y_ft),
+        (signal::Z_CG, sensor.z_ft),
+    ];
+    axes.into_iter().zip(FARTHEST_SPANS).find_map(|((name, at_ft), spans)| {
+        let centre = median(blocks, name)?;
+        let is_outside = (centre - at_ft).abs() > spans * aircraft.span_ft;
+        is_outside.then(|| ImpossibleSignal {
+            signal: name,
+            reason: format!(
+                "its median, {centre:.4} ft, is {:.0} ft from the accelerometer of `an`, farther than the aircraft is long: \
+                 is it in another unit, or from another point than the sensors?",
+                (centre - at_ft).abs()
+            ),
+        })
     })
 }
 

@@ -7,6 +7,7 @@ mod fault_isolation;
 mod gusts;
 mod mass_properties;
 mod relations;
+mod time_scale;
 mod windows;
 
 pub(in crate::ingest) use agreement::{Check, check_relations, confirmed_signals};
@@ -17,5 +18,7 @@ pub(in crate::ingest) use fault_isolation::{
 pub(in crate::ingest) use gusts::Gusts;
 pub use mass_properties::LiftPoint;
 pub(in crate::ingest) use mass_properties::{
-    ImpossibleSignal, impossible_gyration, impossible_mass, impossible_signals, lift_curve,
+    ImpossibleSignal, impossible_centre, impossible_gyration, impossible_mass, impossible_signals,
+    impossible_velocity, lift_curve,
 };
+pub(in crate::ingest) use time_scale::wrong_time;
