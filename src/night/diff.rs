@@ -1,7 +1,7 @@
 //! Changes from one published night to another, with their causes.
 
 use super::published_night::PublishedNight;
-use super::{NONE_PUBLISHED, changes};
+use super::{NONE_PUBLISHED, changes, damaged};
 use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::lineage::Changes;
@@ -23,9 +23,7 @@ pub fn diff(config: &Config, since: Option<&str>, to: Option<&str>) -> Result<Di
     let nights = Nights::look(&config.reports);
     let night = match to {
         Some(name) => complete_night(config, &nights, name)?,
-        None => nights
-            .complete()
-            .ok_or_else(|| Error::not_found(&config.reports, NONE_PUBLISHED))?,
+        None => last_night(config, &nights)?,
     };
     let changes = match since.or(night.since.as_deref()) {
         Some(name) => {
@@ -41,14 +39,28 @@ pub fn diff(config: &Config, since: Option<&str>, to: Option<&str>) -> Result<Di
     })
 }
 
+/// Finds the last complete night, where the current one is whole.
+fn last_night(config: &Config, nights: &Nights) -> Result<Night> {
+    let none = |what: &str| Error::not_found(&config.reports, what);
+    match nights.damaged_current() {
+        Some(name) => Err(none(&damaged(&name))),
+        None => nights.complete().ok_or_else(|| none(NONE_PUBLISHED)),
+    }
+}
+
 /// Finds a complete night by its name, with or without leading zeros.
 fn complete_night(config: &Config, nights: &Nights, name: &str) -> Result<Night> {
     let night = nights.named(name).filter(Night::is_complete);
     night.ok_or_else(|| {
-        let what = format!(
-            "there is no complete night `{name}` here; there are {}",
-            nights.names().join(", ")
-        );
+        let names = nights.names();
+        let is_named = |own: &&String| own.trim_start_matches('0') == name.trim_start_matches('0');
+        let what = match names.iter().find(is_named) {
+            Some(own) if nights.night(own).is_none() => damaged(own),
+            _ => format!(
+                "there is no complete night `{name}` here; there are {}",
+                names.join(", ")
+            ),
+        };
         Error::not_found(&config.reports, what)
     })
 }

@@ -26,3 +26,8 @@ pub(crate) use table_metadata::shelf_of_stage;
 
 /// Answer of a command that reads a night where there is none.
 const NONE_PUBLISHED: &str = "no night has been published here yet; `harvest run` publishes one";
+
+/// Message for a night whose manifest is missing or damaged.
+fn damaged(name: &str) -> String {
+    format!("night {name} is damaged: its night.json is not as it was published")
+}

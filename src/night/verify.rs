@@ -121,9 +121,7 @@ fn find_night(config: &Config, nights: &Nights, name: Option<&str>) -> Result<Ni
         let damaged = nights.damaged_current().filter(|_| name.is_none());
         let names = nights.names();
         let what = match damaged {
-            Some(name) => {
-                format!("night {name} is damaged: its night.json is not as it was published")
-            }
+            Some(name) => super::damaged(&name),
             None if names.is_empty() => NONE_PUBLISHED.to_owned(),
             None => format!(
                 "there is no such night here; there are {}",

@@ -382,11 +382,14 @@ fn a_damaged_manifest_is_named_as_damaged() {
             .starts_with("night 0001 is damaged: its night.json"),
         "{outcome:?}"
     );
-    let outcome = campaign.ends("verify", 1);
-    assert!(
-        outcome.stderr.contains("night 0001 is damaged"),
-        "{outcome:?}"
-    );
+    let since = run(campaign.command("diff").args(["--since", "1"]));
+    for outcome in [campaign.ends("verify", 1), campaign.ends("diff", 1)] {
+        assert!(
+            outcome.stderr.contains("night 0001 is damaged"),
+            "{outcome:?}"
+        );
+    }
+    assert_eq!(since.code, Some(1), "{since:?}");
     campaign.ends("ingest", 0);
     assert!(
         campaign
