@@ -14,12 +14,13 @@ use super::{condition, problems};
 /// for times that are read from a strip chart.
 const AGREEMENT_S: f64 = 1.0;
 
-/// Share of the shorter window from which an event replaces a maneuver: windows close together
-/// share what is between them, which is less than half of either.
+/// Share of the shorter window from which an event replaces a maneuver, also one of the other axis:
+/// windows close together share what is between them, which is less than half of either.
 const REPLACING_SHARE: f64 = 0.5;
 
-/// Replaces maneuvers by the events given for this flight that cover more than half of one or lie
-/// in one by more than half; compares the two.
+/// Replaces maneuvers by the events given for this flight that cover more than half of one, lie in one
+/// by more than half, or have samples between the first and the last input of one of their axis;
+/// compares the two.
 ///
 /// An event of an unknown class, outside the record, or with samples of an earlier event of its axis
 /// becomes a problem and replaces nothing.
@@ -44,8 +45,9 @@ pub fn with_events(
     let mut given: Vec<Maneuver> = Vec::new();
     let mut rows = Vec::new();
     for event in in_order(events, &record.flight_id) {
-        let maneuver = maneuver_of_event(event, record, classes, aircraft, limits);
-        match maneuver.and_then(|maneuver| with_own_samples(maneuver, &given, record.step_s)) {
+        let class = class_inside(event, record, classes);
+        let own = class.and_then(|class| with_own_samples(event, class, &given, record.step_s));
+        match own.and_then(|class| maneuver_of_event(event, class, record, aircraft, limits)) {
             Ok(maneuver) => {
                 rows.push(compare(Some(event), most_overlapping(event, &found)));
                 given.push(maneuver);
@@ -60,7 +62,7 @@ pub fn with_events(
     problems.retain(|problem| !explained.contains(problem));
     let kept: Vec<Maneuver> = found
         .into_iter()
-        .filter(|f| !given.iter().any(|g| replaces(g, f)))
+        .filter(|f| !given.iter().any(|g| replaces(g, f, record.step_s)))
         .collect();
     rows.extend(kept.iter().map(|f| compare(None, Some(f))));
     let mut maneuvers: Vec<Maneuver> = kept.into_iter().chain(given).collect();
@@ -83,38 +85,41 @@ fn in_order<'a>(events: &'a [Event], flight_id: &str) -> Vec<&'a Event> {
     own
 }
 
-/// Returns a maneuver if no event before it has samples of it: an axis's samples count once.
+/// Returns the class of an event if no event before it, in the order of their starts, has samples of it: an
+/// axis's samples count once.
 ///
 /// # Errors
 /// The event that has them, in words.
-fn with_own_samples(
-    maneuver: Maneuver,
+fn with_own_samples<'c>(
+    event: &Event,
+    class: &'c Class,
     before: &[Maneuver],
     step_s: f64,
-) -> Result<Maneuver, String> {
-    // One event may begin at the sample at which another ends.
-    let shares = |other: &&Maneuver| {
-        other.axis == maneuver.axis
-            && overlap_s(other, maneuver.start_s, maneuver.end_s) > step_s / 2.0
-    };
-    match before.iter().find(shares) {
-        None => Ok(maneuver),
+) -> Result<&'c Class, String> {
+    // Those before it share nothing, so the latest ends last. One event may begin at the sample at which another
+    // ends.
+    let of_axis = |other: &&Maneuver| other.axis == class.axis;
+    let shares = |other: &&Maneuver| overlap_s(other, event.start_s, event.end_s) > step_s / 2.0;
+    match before.iter().rev().find(of_axis).filter(shares) {
+        None => Ok(class),
         Some(other) => Err(format!(
             "the event {} from {:.1} to {:.1} s has samples of the event {} from {:.1} to {:.1} s, \
              and samples count once; it is left out",
-            maneuver.class,
-            maneuver.start_s,
-            maneuver.end_s,
-            other.class,
-            other.start_s,
-            other.end_s
+            event.class, event.start_s, event.end_s, other.class, other.start_s, other.end_s
         )),
     }
 }
 
-fn replaces(given: &Maneuver, found: &Maneuver) -> bool {
+fn replaces(given: &Maneuver, found: &Maneuver, step_s: f64) -> bool {
     let shorter_s = (found.end_s - found.start_s).min(given.end_s - given.start_s);
-    overlap_s(found, given.start_s, given.end_s) > REPLACING_SHARE * shorter_s
+    let shares_most = overlap_s(found, given.start_s, given.end_s) > REPLACING_SHARE * shorter_s;
+    let inputs = (
+        found.recognised.first_input_s,
+        found.recognised.last_input_s,
+    );
+    let has_input = matches!(inputs, (Some(first_s), Some(last_s))
+        if overlap_s(given, first_s, last_s) > step_s / 2.0);
+    shares_most || given.axis == found.axis && has_input
 }
 
 /// True for excitation of no class of which the analyst's maneuver has more than half.
@@ -123,17 +128,15 @@ fn explains(given: &Maneuver, unknown: &Unknown) -> bool {
     overlap_s(given, unknown.start_s, unknown.end_s) > REPLACING_SHARE * lasting_s
 }
 
-/// The maneuver of an event.
+/// The class of an event inside the record.
 ///
 /// # Errors
-/// The reason why there is none, in words.
-fn maneuver_of_event(
+/// There is no such class, or the event lies outside, in words.
+fn class_inside<'c>(
     event: &Event,
     record: &Record,
-    classes: &[Class],
-    aircraft: &Aircraft,
-    limits: &QualityLimits,
-) -> Result<Maneuver, String> {
+    classes: &'c [Class],
+) -> Result<&'c Class, String> {
     let class = classes
         .iter()
         .find(|c| c.name == event.class)
@@ -151,21 +154,29 @@ fn maneuver_of_event(
         && event.start_s < event.end_s.min(last_s)
         && event.end_s.max(first_s) > event.start_s
         && event.end_s <= last_s + AGREEMENT_S;
-    if !inside {
-        let (start, end) = (event.start_s, event.end_s);
-        return Err(format!(
-            "the event {} from {start:.1} to {end:.1} s is not inside the record, {first_s:.1} to {last_s:.1} s",
-            event.class
-        ));
+    if inside {
+        return Ok(class);
     }
-    condition::maneuver(
-        record,
-        aircraft,
-        class,
-        (event.start_s, event.end_s),
-        None,
-        limits,
-    )
+    let (start, end) = (event.start_s, event.end_s);
+    Err(format!(
+        "the event {} from {start:.1} to {end:.1} s is not inside the record, {first_s:.1} to {last_s:.1} s",
+        event.class
+    ))
+}
+
+/// The maneuver of an event.
+///
+/// # Errors
+/// The reason why there is none, in words.
+fn maneuver_of_event(
+    event: &Event,
+    class: &Class,
+    record: &Record,
+    aircraft: &Aircraft,
+    limits: &Limits,
+) -> Result<Maneuver, String> {
+    let window = (event.start_s, event.end_s);
+    condition::maneuver(record, aircraft, class, window, None, limits)
 }
 
 fn overlap_s(m: &Maneuver, start_s: f64, end_s: f64) -> f64 {

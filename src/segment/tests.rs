@@ -1415,6 +1415,28 @@ fn samples_of_one_axis_count_once() {
 }
 
 #[test]
+fn an_event_replaces_a_maneuver_of_which_it_has_an_input_and_may_share_its_decay() {
+    let mut r = flight(60);
+    up(&mut r, "obes", 20.0, 33.0);
+    three_two_one_one(&mut r, 21.0);
+    let origins = |start_s: f64| {
+        let (segmented, _) = with_events(
+            found(&r),
+            &r,
+            &[event("PITCH", start_s, 45.0)],
+            &classes(),
+            &aircraft(),
+            &settings().quality,
+        );
+        let maneuvers = segmented.maneuvers.iter();
+        maneuvers.map(|m| m.origin.name()).collect::<Vec<_>>()
+    };
+    // The last input is at 28 s.
+    assert_eq!(origins(27.5), ["given"]);
+    assert_eq!(origins(28.5), ["found", "given"]);
+}
+
+#[test]
 fn without_events_nothing_is_compared() {
     let r = flight(60);
     assert_eq!(
