@@ -173,7 +173,7 @@ fn maneuver_of_event(
     class: &Class,
     record: &Record,
     aircraft: &Aircraft,
-    limits: &Limits,
+    limits: &QualityLimits,
 ) -> Result<Maneuver, String> {
     let window = (event.start_s, event.end_s);
     condition::maneuver(record, aircraft, class, window, None, limits)

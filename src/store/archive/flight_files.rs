@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use super::file_rules::flight_id;
+use super::glob_paths;
 use super::remote;
 use super::walk::Walk;
 use crate::error::Error;
@@ -35,7 +36,7 @@ pub fn find(archive: &str) -> Result<Vec<FlightFiles>, Error> {
         add_below(archive, at, &mut files)?;
     } else {
         let mut walk = Walk::of_flights();
-        for path in matches(archive)? {
+        for path in glob_paths::matching(archive)? {
             if !path.is_dir() || walk.add(&path, &mut files).is_err() {
                 files.insert(path);
             }
@@ -46,17 +47,6 @@ pub fn find(archive: &str) -> Result<Vec<FlightFiles>, Error> {
         return Err(Error::not_found(Path::new(archive), what));
     }
     Ok(flights(files))
-}
-
-/// Paths that match a glob.
-fn matches(pattern: &str) -> Result<Vec<PathBuf>, Error> {
-    let nonsense = |what: String| Error::Archive {
-        place: pattern.into(),
-        what,
-    };
-    let paths = glob::glob(pattern).map_err(|e| nonsense(format!("not a glob: {e}")))?;
-    let paths = paths.map(|path| path.map_err(|e| nonsense(e.to_string())));
-    paths.collect()
 }
 
 /// Adds the files of a glob with `**` at a place: the folders above it are searched as an archive is,
@@ -75,7 +65,10 @@ fn add_below(archive: &str, at: usize, files: &mut BTreeSet<PathBuf>) -> Result<
         Walk::of_files()
     };
     let mut found = BTreeSet::new();
-    for folder in matches(above)?.iter().filter(|path| path.is_dir()) {
+    for folder in glob_paths::matching(above)?
+        .iter()
+        .filter(|path| path.is_dir())
+    {
         walk.add(folder, &mut found)?;
     }
     let pattern = glob::Pattern::new(archive).map_err(|e| Error::Archive {

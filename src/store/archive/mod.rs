@@ -7,6 +7,7 @@
 
 mod file_rules;
 mod flight_files;
+mod glob_paths;
 mod guard;
 mod in_memory;
 mod numbers;

@@ -43,18 +43,25 @@ impl Walk {
     }
 
     /// Adds the files below a folder, except names with a leading dot or underscore. A folder
-    /// below it that cannot be read, or that a link leads to again, is added itself.
+    /// below it that cannot be read, or that a link leads to again, is added itself; so is one that
+    /// holds the archive.
     ///
     /// # Errors
     /// The folder cannot be read, or there are more folders than an archive has.
     pub fn add(&mut self, folder: &Path, files: &mut BTreeSet<PathBuf>) -> Result<(), Error> {
-        if self.has_entered(folder) {
+        let unreadable = |cause| Error::io(folder, "cannot read the archive's folder")(cause);
+        let root = fs::canonicalize(folder).map_err(unreadable)?;
+        if self.entered.contains(&root) {
             files.insert(folder.to_owned());
             return Ok(());
         }
-        self.enter(folder, files)?;
+        self.enter(folder, &root, files)?;
         while let Some(link) = self.links.pop_front() {
-            if self.has_entered(&link) || self.enter(&link, files).is_err() {
+            let target = fs::canonicalize(&link);
+            let is_new =
+                |target: &PathBuf| !self.entered.contains(target) && !root.starts_with(target);
+            let target = target.ok().filter(is_new);
+            if target.is_none_or(|target| self.enter(&link, &target, files).is_err()) {
                 files.insert(link);
             }
         }
@@ -74,29 +81,33 @@ impl Walk {
         self.entered.len() > self.most_folders
     }
 
-    fn has_entered(&self, folder: &Path) -> bool {
-        fs::canonicalize(folder).is_ok_and(|folder| self.entered.contains(&folder))
-    }
-
-    fn enter(&mut self, folder: &Path, files: &mut BTreeSet<PathBuf>) -> Result<(), Error> {
+    /// Adds the files of a folder and of the folders in it. `target` is the folder without links.
+    fn enter(
+        &mut self,
+        folder: &Path,
+        target: &Path,
+        files: &mut BTreeSet<PathBuf>,
+    ) -> Result<(), Error> {
         if self.is_full() {
             return Ok(());
         }
-        let unreadable = |cause| Error::io(folder, "cannot read the archive's folder")(cause);
-        self.entered
-            .insert(fs::canonicalize(folder).map_err(unreadable)?);
-        let entries = fs::read_dir(folder).map_err(unreadable)?;
-        let paths = entries.map(|entry| entry.map(|entry| entry.path()));
-        let mut paths: Vec<PathBuf> = paths.collect::<Result<_, _>>().map_err(unreadable)?;
-        paths.sort();
-        for path in paths.into_iter().filter(|path| !has_hidden_name(path)) {
-            if !path.is_dir() {
-                if self.takes_all || has_extension_of_flights(&path) {
+        self.entered.insert(target.to_owned());
+        for entry in entries(folder)? {
+            let (name, path) = (entry.file_name(), entry.path());
+            if is_hidden(&name.to_string_lossy()) {
+                continue;
+            }
+            // No further look at the disk for each of what may be many files.
+            let kind = entry.file_type();
+            if kind.as_ref().is_ok_and(fs::FileType::is_dir) {
+                let own = target.join(name);
+                let is_again = self.entered.contains(&own);
+                if is_again || self.enter(&path, &own, files).is_err() {
                     files.insert(path);
                 }
-            } else if path.is_symlink() {
+            } else if kind.is_ok_and(|kind| kind.is_symlink()) && path.is_dir() {
                 self.links.push_back(path);
-            } else if self.has_entered(&path) || self.enter(&path, files).is_err() {
+            } else if self.takes_all || has_extension_of_flights(&path) {
                 files.insert(path);
             }
         }
@@ -104,9 +115,14 @@ impl Walk {
     }
 }
 
-fn has_hidden_name(path: &Path) -> bool {
-    let name = path.file_name();
-    name.is_some_and(|name| is_hidden(&name.to_string_lossy()))
+/// Entries of a folder in the order of their names.
+fn entries(folder: &Path) -> Result<Vec<fs::DirEntry>, Error> {
+    let unreadable = |cause| Error::io(folder, "cannot read the archive's folder")(cause);
+    let entries = fs::read_dir(folder).map_err(unreadable)?;
+    let entries: Result<Vec<fs::DirEntry>, std::io::Error> = entries.collect();
+    let mut entries = entries.map_err(unreadable)?;
+    entries.sort_by_key(fs::DirEntry::file_name);
+    Ok(entries)
 }
 
 fn has_extension_of_flights(path: &Path) -> bool {
@@ -117,6 +133,25 @@ fn has_extension_of_flights(path: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_to_a_folder_that_holds_the_archive_is_not_followed() {
+        use std::os::unix::fs::symlink;
+        let above = tempfile::tempdir().unwrap();
+        let archive = above.path().join("flights");
+        for folder in ["flights/a", "elsewhere/b"] {
+            fs::create_dir_all(above.path().join(folder)).unwrap();
+        }
+        fs::write(above.path().join("elsewhere/b/f.parquet"), "").unwrap();
+        symlink(above.path(), archive.join("a/above")).unwrap();
+        symlink("/", archive.join("root")).unwrap();
+        symlink(above.path().join("elsewhere"), archive.join("beside")).unwrap();
+        let mut files = BTreeSet::new();
+        Walk::of_flights().add(&archive, &mut files).unwrap();
+        let found = ["a/above", "beside/b/f.parquet", "root"].map(|name| archive.join(name));
+        assert_eq!(files, found.into());
+    }
 
     #[test]
     fn an_archive_of_too_many_folders_is_refused_and_its_place_named() {
