@@ -176,7 +176,7 @@ fn every_derivative_that_is_estimated_is_compared_and_the_combined_ones_too() {
 fn a_tunnel_that_agrees_with_flight_is_said_to_agree() {
     // The demonstration's tunnel is wrong on purpose; one that is flight's own trend agrees
     // everywhere.
-    let campaign = Campaign::on("data/demo/flights");
+    let campaign = Campaign::of_demo();
     demo().fill_store(&campaign);
     campaign.copy_pipeline();
     let rows = &demo().tables["comparison"];

@@ -138,7 +138,7 @@ fn maneuvers_hold_the_tunnel_s_values_until_the_posterior_of_the_other_flights_h
         off.count()
     };
     assert!(off(&demo().tables["estimates"]) > 100);
-    let campaign = Campaign::on("data/demo/flights");
+    let campaign = Campaign::of_demo();
     demo().fill_store(&campaign);
     campaign.copy_pipeline();
     let (posterior, tunnel) = ("held_values: posterior", "held_values: tunnel");

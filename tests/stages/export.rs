@@ -1,30 +1,45 @@
 //! Export: the demonstration's derivatives for simulators, read back as a tunnel and, where it is
 //! installed, by JSBSim.
 
+use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::process::Command;
+use std::sync::OnceLock;
 
 use crate::support::{Campaign, demo, number};
 
-/// The demonstration's export.
-fn exported() -> Campaign {
-    let campaign = Campaign::on("data/demo/flights");
+/// The demonstration with the artefacts of its run.
+fn processed() -> Campaign {
+    let campaign = Campaign::of_demo();
     demo().fill_store(&campaign);
-    campaign.ends("compare", 0);
-    campaign.ends("export", 0);
     campaign
+}
+
+/// The demonstration's export in a folder, made once for all tests that read it.
+fn exported() -> tempfile::TempDir {
+    static FILES: OnceLock<BTreeMap<PathBuf, Vec<u8>>> = OnceLock::new();
+    let files = FILES.get_or_init(|| {
+        let campaign = processed();
+        campaign.ends("export", 0);
+        campaign.bytes("reports/export")
+    });
+    let folder = tempfile::tempdir().unwrap();
+    for (name, bytes) in files {
+        std::fs::write(folder.path().join(name), bytes).unwrap();
+    }
+    folder
 }
 
 #[test]
 fn the_export_is_the_posterior_and_comes_back_as_the_tunnel() {
-    let campaign = exported();
-    let folder = campaign.path("reports/export");
-    let text = std::fs::read_to_string(folder.join("flight_updated.csv")).unwrap();
+    let (campaign, folder) = (processed(), exported());
+    let text = std::fs::read_to_string(folder.path().join("flight_updated.csv")).unwrap();
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let rows: Vec<crate::support::Row> = reader.deserialize().map(Result::unwrap).collect();
     let mut exported = rows.iter().filter(|r| r["source"].starts_with("posterior"));
-    let posterior = campaign.table("posterior");
+    let posterior = &demo().tables["posterior"];
     assert!(posterior.len() > 1000, "{} rows", posterior.len());
-    for row in &posterior {
+    for row in posterior {
         let same = |r: &&crate::support::Row| {
             r["derivative"] == row["derivative"] && r["alpha_deg"] == row["alpha_deg"]
         };
@@ -62,7 +77,7 @@ fn the_export_is_the_posterior_and_comes_back_as_the_tunnel() {
             campaign
                 .command("check")
                 .arg("--wind-tunnel")
-                .arg(folder.join(name)),
+                .arg(folder.path().join(name)),
         );
         assert_eq!(outcome.code, Some(0), "{name}: {outcome:?}");
     }
@@ -70,14 +85,10 @@ fn the_export_is_the_posterior_and_comes_back_as_the_tunnel() {
 
 #[test]
 fn jsbsim_itself_computes_the_exported_coefficients() {
-    let campaign = exported();
+    let folder = exported();
     let python = std::env::var("JSBSIM_PYTHON").unwrap_or_else(|_| "python3".into());
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/load_in_jsbsim.py");
-    let Ok(output) = Command::new(python)
-        .arg(script)
-        .arg(campaign.path("reports/export"))
-        .output()
-    else {
+    let Ok(output) = Command::new(python).arg(script).arg(folder.path()).output() else {
         return;
     };
     // 77: JSBSim is not installed; `export::tests` evaluates the section by its rules in any case.
@@ -90,7 +101,7 @@ fn jsbsim_itself_computes_the_exported_coefficients() {
 
 #[test]
 fn draws_are_whole_models_and_the_same_for_the_same_seed() {
-    let campaign = exported();
+    let campaign = processed();
     let draw =
         |number: &str| crate::support::run(campaign.command("export").args(["--draws", number]));
     assert_eq!(draw("10000").code, Some(64), "files have four digits");
@@ -108,7 +119,8 @@ fn draws_are_whole_models_and_the_same_for_the_same_seed() {
 
 #[test]
 fn an_export_does_not_change_what_is_up_to_date() {
-    let campaign = exported();
+    let campaign = processed();
+    campaign.ends("export", 0);
     let names = [
         "flight_updated.csv",
         "flight_updated.parquet",

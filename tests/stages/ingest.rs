@@ -8,7 +8,7 @@ use arrow::array::{RecordBatch, StringArray};
 use arrow::datatypes::DataType;
 
 use crate::support::{
-    Campaign, pitch_steps, renamed, replaced, values, with_unit, with_values, without,
+    Campaign, both_axes, pitch_steps, renamed, replaced, values, with_unit, with_values, without,
     yaw_and_roll_steps,
 };
 
@@ -17,6 +17,10 @@ use crate::support::{
 fn is_refused(spoil: impl FnOnce(&Campaign), place: &str, words: &[&str]) {
     let campaign = Campaign::of_pitch_steps();
     spoil(&campaign);
+    is_refused_in(&campaign, place, words);
+}
+
+fn is_refused_in(campaign: &Campaign, place: &str, words: &[&str]) {
     let outcome = campaign.ends("estimate", 2);
     assert!(
         outcome.stdout.contains("2 flights, 1 refused"),
@@ -44,8 +48,12 @@ fn is_refused(spoil: impl FnOnce(&Campaign), place: &str, words: &[&str]) {
     assert_eq!(fits[0]["outcome"], "converged");
 }
 
+/// As [`is_refused`], for a readable file whose record is wrong; the healthy flight is in the store.
 fn record_is_refused(record: &RecordBatch, place: &str, words: &[&str]) {
-    is_refused(|campaign| campaign.add("spoiled", record), place, words);
+    let campaign = Campaign::of_pitch_steps();
+    both_axes().fill_store(&campaign);
+    campaign.add("spoiled", record);
+    is_refused_in(&campaign, place, words);
 }
 
 #[test]

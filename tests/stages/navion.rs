@@ -5,14 +5,20 @@ use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use arrow::array::{ArrayRef, AsArray, Float64Array, RecordBatch, StringArray};
 use arrow::compute::cast;
 use arrow::datatypes::DataType;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
-use crate::support::{Row, files, harvest, number, run, table, values, write};
+use crate::support::{Campaign, Processed, Row, files, harvest, number, run, table, values, write};
+
+/// The campaign of the repository, run once for all tests that look at it.
+fn navion() -> &'static Processed {
+    static NAVION: OnceLock<Processed> = OnceLock::new();
+    NAVION.get_or_init(|| Processed::of(&Campaign::of_navion()))
+}
 
 /// A subcommand on the pipeline with an archive and folders of its own.
 fn command(stage: &str, archive: &Path, folder: &Path) -> Command {
@@ -60,27 +66,21 @@ fn truth(truths: &[Row], estimate: &Row) -> f64 {
 
 #[test]
 fn a_light_aircraft_is_estimated_within_its_bounds() {
-    let folder = tempfile::tempdir().unwrap();
-    let outcome = run(&mut command(
-        "run",
-        Path::new("data/navion/flights"),
-        folder.path(),
-    ));
+    let outcome = &navion().outcome;
     assert_eq!(outcome.code, Some(0), "{outcome:?}");
-    assert!(folder.path().join("reports/report.html").exists());
 
-    let maneuvers = table(&published(folder.path(), "maneuvers"));
+    let maneuvers = &navion().tables["maneuvers"];
     let events = table(Path::new("data/navion/truth/events.csv"));
     let classes = |rows: &[Row]| -> Vec<(String, String)> {
         let class = |row: &Row| (row["flight_id"].clone(), row["class"].clone());
         rows.iter().map(class).collect()
     };
-    assert_eq!(classes(&maneuvers), classes(&events));
-    let fits = table(&published(folder.path(), "fits"));
+    assert_eq!(classes(maneuvers), classes(&events));
+    let fits = &navion().tables["fits"];
     assert!(fits.iter().all(|fit| fit["outcome"] == "converged"));
 
     let truths = table(Path::new("data/navion/truth/derivatives.csv"));
-    let estimates = table(&published(folder.path(), "estimates"));
+    let estimates = &navion().tables["estimates"];
     let free: Vec<&Row> = estimates
         .iter()
         .filter(|e| e["status"] == "estimated" && !e["derivative"].starts_with("bias"))
@@ -100,13 +100,13 @@ fn a_light_aircraft_is_estimated_within_its_bounds() {
     );
     let worst = errors.iter().copied().fold(0.0, f64::max);
     assert!(worst < 5.0, "an estimate is {worst} bounds from the truth");
-    instruments_are_within_their_bounds(folder.path());
+    instruments_are_within_their_bounds();
 }
 
 /// Each file is one short window, whose bounds contain the noise of rates and accelerations.
-fn instruments_are_within_their_bounds(folder: &Path) {
+fn instruments_are_within_their_bounds() {
     let truths = table(Path::new("data/navion/truth/instruments.csv"));
-    let instruments = table(&published(folder, "instruments"));
+    let instruments = &navion().tables["instruments"];
     let distance = |row: &Row| {
         let bound: f64 = row["bias_bound"].parse().ok()?;
         let is_same = |truth: &&Row| {
@@ -125,7 +125,7 @@ fn instruments_are_within_their_bounds(folder: &Path) {
         "{within} of {} biases are within their intervals",
         distances.len()
     );
-    let trends = table(&published(folder, "instrument_trends"));
+    let trends = &navion().tables["instrument_trends"];
     let changed = |row: &&Row| row["verdict"] == "step" || row["verdict"] == "drift";
     assert_eq!(trends.iter().find(changed), None, "steady instruments");
     assert!(trends.iter().all(|row| row["far_flights"].is_empty()));
@@ -266,11 +266,11 @@ fn nothing_is_taken_over_from_the_first_aircraft() {
 
 #[test]
 fn the_next_flight_is_planned_from_its_cards() {
-    let folder = tempfile::tempdir().unwrap();
-    let archive = Path::new("data/navion/flights");
-    let outcome = run(command("next", archive, folder.path()).args(["--minutes", "5"]));
+    let campaign = Campaign::of_navion();
+    navion().fill_store(&campaign);
+    let outcome = run(campaign.command("next").args(["--minutes", "5"]));
     assert_eq!(outcome.code, Some(0), "{outcome:?}");
-    let planned = table(&folder.path().join("reports/next/next_cards.csv"));
+    let planned = table(&campaign.path("reports/next/next_cards.csv"));
     assert_eq!(planned.len(), 18);
     let flown = planned.iter().filter(|row| !row["place"].is_empty());
     let times: f64 = flown.map(|row| number(row, "times")).sum();

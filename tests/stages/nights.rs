@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 
 use crate::support::{
-    Campaign, Outcome, Random, files, flight, from_environment, pitch_steps, run,
+    Campaign, Outcome, Random, both_axes, files, flight, from_environment, pitch_steps, run,
     yaw_and_roll_steps,
 };
 
@@ -60,6 +60,14 @@ fn two_nights(campaign: &Campaign, mut disturb: impl FnMut(&Campaign)) {
     campaign.add("flight_004", &yaw_and_roll_steps());
     disturb(campaign);
     campaign.finishes("run");
+}
+
+/// Two undisturbed nights, with the artefacts of both flights in the store from the beginning.
+fn two_published_nights() -> Campaign {
+    let campaign = Campaign::new();
+    both_axes().fill_store(&campaign);
+    two_nights(&campaign, |_| {});
+    campaign
 }
 
 /// In the suite a few kills; `make torture` does many.
@@ -284,8 +292,7 @@ fn a_copy_of_a_flight_is_rejected_until_its_rows_differ() {
 
 #[test]
 fn the_report_lists_changes_with_causes_and_diff_ends_with_its_exit_code() {
-    let campaign = Campaign::new();
-    two_nights(&campaign, |_| {});
+    let campaign = two_published_nights();
     let said = campaign.ends("diff", 0).stdout;
     assert!(
         said.contains("night 0002 since night 0001") && said.contains("new flight flight_004"),
@@ -520,8 +527,8 @@ fn published_tables_carry_their_lineage_and_verify_checks_it() {
 
 #[test]
 fn an_artefact_under_another_s_name_is_made_again_and_no_published_night_changes() {
-    let campaign = Campaign::of_pitch_steps();
-    campaign.add("flight_004", &yaw_and_roll_steps());
+    let campaign = Campaign::of_both_axes();
+    both_axes().fill_store(&campaign);
     campaign.finishes("run");
     let night = campaign.path("reports/nights/0001");
     let published = || -> BTreeMap<PathBuf, Vec<u8>> {
@@ -555,8 +562,7 @@ fn flip(path: &Path) {
 
 #[test]
 fn after_damage_to_any_file_the_next_run_ends_with_the_same_bytes() {
-    let campaign = Campaign::new();
-    two_nights(&campaign, |_| {});
+    let campaign = two_published_nights();
     let expected = campaign.bytes("reports");
     let all = || -> Vec<PathBuf> {
         let night = fs::canonicalize(campaign.path("reports/current")).unwrap();
@@ -599,8 +605,7 @@ fn after_damage_to_any_file_the_next_run_ends_with_the_same_bytes() {
 
 #[test]
 fn gc_lists_then_removes_only_what_no_night_needs() {
-    let campaign = Campaign::new();
-    two_nights(&campaign, |_| {});
+    let campaign = two_published_nights();
     assert!(
         run(campaign.command("gc").arg("--yes"))
             .stdout
@@ -639,8 +644,7 @@ fn gc_lists_then_removes_only_what_no_night_needs() {
 
 #[test]
 fn gc_removes_nothing_where_a_night_s_needs_are_unreadable() {
-    let campaign = Campaign::new();
-    two_nights(&campaign, |_| {});
+    let campaign = two_published_nights();
     flip(&campaign.path("reports/nights/0001/night.json"));
     fs::write(
         campaign.path("store/estimate/superseded.json"),
@@ -733,7 +737,7 @@ fn the_log_has_one_json_object_per_line_and_the_terminal_is_quiet() {
 #[test]
 fn a_signal_leaves_a_line_in_the_log() {
     use std::os::unix::process::ExitStatusExt as _;
-    let campaign = Campaign::on("data/demo/flights");
+    let campaign = Campaign::of_demo();
     let log = campaign.path("nightly.jsonl");
     let mut command = campaign.command("run");
     command.args(["--quiet", "--jobs", "1", "--log"]).arg(&log);

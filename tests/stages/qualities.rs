@@ -64,7 +64,7 @@ fn the_modes_are_those_of_a_fighter_and_their_deviations_are_small_beside_them()
 
 #[test]
 fn feedback_of_yaw_rate_damps_the_dutch_roll_and_a_misspelt_surface_is_named() {
-    let campaign = Campaign::on("data/demo/flights");
+    let campaign = Campaign::of_demo();
     demo().fill_store(&campaign);
     campaign.copy_pipeline();
     let commented = "# feedback:\n#   de_deg: { alpha_deg: 0.3, q_deg_s: 0.3 }";

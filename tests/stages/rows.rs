@@ -146,7 +146,7 @@ fn disagreements_are_ranked_by_size_and_stand_in_the_comparison() {
 
 #[test]
 fn changes_are_differences_from_the_trends_of_an_earlier_campaign() {
-    let campaign = Campaign::on("data/demo/flights");
+    let campaign = Campaign::of_demo();
     demo().fill_store(&campaign);
     let earlier = campaign.path("earlier");
     fs::create_dir(&earlier).unwrap();

@@ -4,13 +4,7 @@
 use std::fs;
 use std::process::{Command, Stdio};
 
-use crate::support::{Campaign, Outcome, demo, pitch_steps, run, yaw_and_roll_steps};
-
-fn two_flights() -> Campaign {
-    let campaign = Campaign::of_pitch_steps();
-    campaign.add("flight_004", &yaw_and_roll_steps());
-    campaign
-}
+use crate::support::{Campaign, Outcome, both_axes, demo, pitch_steps, run, yaw_and_roll_steps};
 
 fn plan_of(campaign: &Campaign, of: &str, shards: usize) -> Outcome {
     run(campaign
@@ -49,7 +43,7 @@ fn all_shards(campaign: &Campaign, stage: &str, shards: usize) {
 
 #[test]
 fn the_tables_of_many_shards_are_those_of_one_process() {
-    let campaign = Campaign::on("data/demo/flights");
+    let campaign = Campaign::of_demo();
     assert_eq!(plan_of(&campaign, "flights", 3).code, Some(0));
     all_shards(&campaign, "segment", 3);
     for shards in [1, 4, 24] {
@@ -72,7 +66,7 @@ fn the_tables_of_many_shards_are_those_of_one_process() {
 
 #[test]
 fn a_merge_refuses_what_is_missing_and_status_names_its_shards() {
-    let campaign = two_flights();
+    let campaign = Campaign::of_both_axes();
     let early = plan_of(&campaign, "maneuvers", 2);
     assert_eq!(early.code, Some(1));
     assert!(
@@ -118,7 +112,7 @@ fn a_merge_refuses_what_is_missing_and_status_names_its_shards() {
 
 #[test]
 fn a_shard_that_runs_again_or_twice_at_once_makes_the_same() {
-    let campaign = two_flights();
+    let campaign = Campaign::of_both_axes();
     plan_of(&campaign, "flights", 1);
     let spawned = || {
         shard(&campaign, "segment", 1, 1)
@@ -140,7 +134,7 @@ fn a_shard_that_runs_again_or_twice_at_once_makes_the_same() {
 
 #[test]
 fn a_plan_of_something_else_is_refused_and_says_what_changed() {
-    let campaign = two_flights();
+    let campaign = Campaign::of_both_axes();
     plan_of(&campaign, "flights", 1);
     let refused = |words: &str| {
         let outcome = run(&mut shard(&campaign, "segment", 1, 1));
@@ -164,7 +158,7 @@ fn a_plan_of_something_else_is_refused_and_says_what_changed() {
 
 #[test]
 fn a_store_in_use_and_a_file_that_cannot_be_read_ask_for_another_try() {
-    let campaign = two_flights();
+    let campaign = Campaign::of_both_axes();
     plan_of(&campaign, "flights", 1);
     let lock = fs::File::open(campaign.path("store/lock")).unwrap();
     lock.lock().unwrap();
@@ -184,7 +178,7 @@ fn a_store_in_use_and_a_file_that_cannot_be_read_ask_for_another_try() {
 
 #[test]
 fn scripts_are_written_for_a_scheduler_and_nothing_is_run() {
-    let campaign = two_flights();
+    let campaign = Campaign::of_both_axes();
     let outcome = run(campaign.command("submit").args(["--engine", "slurm"]));
     assert_eq!(outcome.code, Some(0), "{outcome:?}");
     for name in ["flights", "plan", "maneuvers", "merge", "submit"] {
@@ -218,7 +212,7 @@ echo 1.server
 #[test]
 fn the_scripts_for_pbs_publish_the_tables_of_one_process() {
     use std::os::unix::fs::PermissionsExt as _;
-    let campaign = two_flights();
+    let campaign = Campaign::of_both_axes();
     campaign.copy_pipeline();
     campaign.edit("pipeline.yaml", "# cluster:\n", "cluster: { shards: 2 }\n");
     let outcome = run(campaign.command("submit").args(["--engine", "pbs"]));
@@ -232,8 +226,5 @@ fn the_scripts_for_pbs_publish_the_tables_of_one_process() {
         .arg(campaign.path("store/cluster/submit.sh"))
         .env("PATH", format!("{}:{path}", programs.display())));
     assert_eq!(submitted.code, Some(0), "{submitted:?}");
-    let whole = two_flights();
-    whole.copy_pipeline();
-    whole.finishes("run");
-    assert!(campaign.tables() == whole.tables());
+    assert!(campaign.tables() == both_axes().bytes);
 }

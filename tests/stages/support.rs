@@ -42,11 +42,13 @@ pub fn run(command: &mut Command) -> Outcome {
 }
 
 /// A campaign of its own: folders for the archive, the store and the reports, and a pipeline where
-/// it is not the shipped one.
+/// it is not a shipped one.
 #[derive(Debug)]
 pub struct Campaign {
     folder: tempfile::TempDir,
     archive: Option<String>,
+    /// Pipeline of the repository.
+    shipped: &'static str,
 }
 
 impl Campaign {
@@ -56,6 +58,7 @@ impl Campaign {
         Campaign {
             folder,
             archive: None,
+            shipped: "harv",
         }
     }
 
@@ -64,6 +67,26 @@ impl Campaign {
         let campaign = Campaign::new();
         campaign.add("flight_001", &pitch_steps());
         campaign
+    }
+
+    /// A campaign of two short flights with one maneuver of each axis.
+    pub fn of_both_axes() -> Campaign {
+        let campaign = Campaign::of_pitch_steps();
+        campaign.add("flight_004", &yaw_and_roll_steps());
+        campaign
+    }
+
+    /// The demonstration campaign.
+    pub fn of_demo() -> Campaign {
+        Campaign::on("data/demo/flights")
+    }
+
+    /// The campaign of the second aircraft.
+    pub fn of_navion() -> Campaign {
+        Campaign {
+            shipped: "navion",
+            ..Campaign::on("data/navion/flights")
+        }
     }
 
     /// On an archive that lies elsewhere.
@@ -101,9 +124,11 @@ impl Campaign {
     pub fn command(&self, stage: &str) -> Command {
         let mut command = harvest();
         let own = self.path("pipeline");
-        command
-            .arg(stage)
-            .arg(if own.is_dir() { own } else { "harv".into() });
+        command.arg(stage).arg(if own.is_dir() {
+            own
+        } else {
+            self.shipped.into()
+        });
         match &self.archive {
             Some(archive) => command.arg("--archive").arg(archive),
             None => command.arg("--archive").arg(self.path("flights")),
@@ -147,7 +172,9 @@ impl Campaign {
     /// Makes the campaign's pipeline a copy of the shipped one, to be edited.
     pub fn copy_pipeline(&self) {
         copy_tree(
-            &Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/harv"),
+            &Path::new(env!("CARGO_MANIFEST_DIR"))
+                .join("pipelines")
+                .join(self.shipped),
             &self.path("pipeline"),
         );
     }
@@ -211,32 +238,20 @@ impl Campaign {
 }
 
 /// The whole demonstration campaign, run once with one thread for all tests that look at it.
-pub fn demo() -> &'static Demo {
-    static DEMO: OnceLock<Demo> = OnceLock::new();
-    DEMO.get_or_init(|| {
-        let campaign = Campaign::on("data/demo/flights");
-        let outcome = run(campaign.command("run").args(["--threads", "1"]));
-        let bytes = campaign.tables();
-        let csv = bytes
-            .keys()
-            .filter(|path| path.extension().is_some_and(|e| e == "csv"));
-        let names = csv.filter_map(|path| path.file_stem()?.to_str());
-        Demo {
-            tables: names
-                .map(|name| (name.to_owned(), campaign.table(name)))
-                .collect(),
-            bytes: bytes.clone(),
-            report: fs::read_to_string(campaign.path("reports/report.html")).unwrap(),
-            printed: fs::read(campaign.path("reports/report.pdf")).unwrap(),
-            store: campaign.bytes("store"),
-            outcome,
-        }
-    })
+pub fn demo() -> &'static Processed {
+    static DEMO: OnceLock<Processed> = OnceLock::new();
+    DEMO.get_or_init(|| Processed::of(&Campaign::of_demo()))
 }
 
-/// Results of a run of the demonstration campaign, in memory: nothing of it stays on the disk.
+/// Two short flights with one maneuver of each axis, run once: a store for tests of what comes after.
+pub fn both_axes() -> &'static Processed {
+    static BOTH_AXES: OnceLock<Processed> = OnceLock::new();
+    BOTH_AXES.get_or_init(|| Processed::of(&Campaign::of_both_axes()))
+}
+
+/// Results of a run of a campaign, in memory: nothing of it stays on the disk.
 #[derive(Debug)]
-pub struct Demo {
+pub struct Processed {
     pub outcome: Outcome,
     pub tables: BTreeMap<String, Vec<Row>>,
     pub bytes: BTreeMap<PathBuf, Vec<u8>>,
@@ -246,7 +261,27 @@ pub struct Demo {
     store: BTreeMap<PathBuf, Vec<u8>>,
 }
 
-impl Demo {
+impl Processed {
+    /// Runs a campaign with one thread.
+    pub fn of(campaign: &Campaign) -> Processed {
+        let outcome = run(campaign.command("run").args(["--threads", "1"]));
+        let bytes = campaign.tables();
+        let csv = bytes
+            .keys()
+            .filter(|path| path.extension().is_some_and(|e| e == "csv"));
+        let names = csv.filter_map(|path| path.file_stem()?.to_str());
+        Processed {
+            tables: names
+                .map(|name| (name.to_owned(), campaign.table(name)))
+                .collect(),
+            bytes: bytes.clone(),
+            report: fs::read_to_string(campaign.path("reports/report.html")).unwrap(),
+            printed: fs::read(campaign.path("reports/report.pdf")).unwrap(),
+            store: campaign.bytes("store"),
+            outcome,
+        }
+    }
+
     /// Puts what the run left in its store into a campaign's, so that only what differs is done.
     pub fn fill_store(&self, campaign: &Campaign) {
         for (path, bytes) in &self.store {

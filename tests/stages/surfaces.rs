@@ -88,7 +88,7 @@ fn late_surfaces_are_found_and_corrected_and_a_further_flight_estimates_itself_a
     for number in 1..=3 {
         campaign.add(&format!("flight_{number:03}"), &late(number));
     }
-    campaign.finishes("run");
+    campaign.finishes("model");
     let delays = of_all_flights(&campaign);
     for channel in ["de", "da", "dr", "ddht", "dyv"] {
         let row = &delays[channel];
@@ -103,14 +103,14 @@ fn late_surfaces_are_found_and_corrected_and_a_further_flight_estimates_itself_a
 
     let before = estimates(&campaign);
     campaign.add("flight_004", &late(4));
-    campaign.finishes("run");
+    campaign.finishes("model");
     let after = estimates(&campaign);
     let own = |path: &&PathBuf| path.to_string_lossy().contains("flight_004");
     assert!(before.is_subset(&after));
     assert!(after.difference(&before).all(|path| own(&path)));
 
     let stored = campaign.bytes("store");
-    let again = campaign.finishes("run");
+    let again = campaign.finishes("model");
     assert!(campaign.bytes("store") == stored, "{again:?}");
 }
 
@@ -144,7 +144,7 @@ fn delays_that_are_only_reported_stay_in_the_record_and_in_the_bounds() {
         "surfaces: { delay: apply,",
         "surfaces: { delay: report,",
     );
-    campaign.finishes("run");
+    campaign.finishes("model");
     let delays = of_all_flights(&campaign);
     assert!(delays.values().all(|row| row["applied"].is_empty()));
     let exact = exact_estimates();

@@ -59,7 +59,7 @@ fn biases_have_no_trend() {
 
 #[test]
 fn a_new_group_is_a_line_in_the_pipeline() {
-    let campaign = Campaign::on("data/demo/flights");
+    let campaign = Campaign::of_demo();
     demo().fill_store(&campaign);
     campaign.copy_pipeline();
     campaign.edit(
