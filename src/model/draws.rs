@@ -42,8 +42,7 @@ impl Sampler<'_> {
     pub fn draw(&self, stream: &mut RandomStream) -> Vec<PosteriorRow> {
         let mut values = Vec::with_capacity(self.rows.len());
         for own in &self.coefficients {
-            let deviates = DVector::from_fn(own.root.ncols(), |_, _| stream.normal());
-            let differences = &own.mean + &own.root * deviates;
+            let differences = &own.mean + stream.deviations(&own.root);
             for quantity in &own.quantities {
                 values.extend(quantity.values(&differences));
             }

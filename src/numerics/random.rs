@@ -5,6 +5,8 @@
 //! Streams of different names are independent, so adding a sensor leaves the noise of the others
 //! unchanged.
 
+use nalgebra::{DMatrix, DVector};
+
 /// A stream of random numbers.
 #[derive(Clone, Debug)]
 pub struct RandomStream {
@@ -50,6 +52,11 @@ impl RandomStream {
     pub fn normal(&mut self) -> f64 {
         let radius = (-2.0 * self.uniform().ln()).sqrt();
         radius * (2.0 * std::f64::consts::PI * self.uniform()).cos()
+    }
+
+    /// Draws deviations with the covariance R Rᵀ of a root R.
+    pub fn deviations(&mut self, root: &DMatrix<f64>) -> DVector<f64> {
+        root * DVector::from_fn(root.ncols(), |_, _| self.normal())
     }
 }
 

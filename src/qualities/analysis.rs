@@ -65,8 +65,7 @@ impl AxisAnalysis {
         let root = continuous_root(&posterior.covariance);
         let mut stream = RandomStream::new(SEED, axis.name());
         let drawn = (0..draws).filter_map(|_| {
-            let deviates = DVector::from_fn(root.ncols(), |_, _| stream.normal());
-            let values = &posterior.mean + &root * deviates;
+            let values = &posterior.mean + stream.deviations(&root);
             linear.quantities(axis, &values, Differentiation::ValuesAlone)
         });
         let drawn: Vec<AxisQuantities> = drawn.collect();
