@@ -57,7 +57,11 @@ const LAYERS: [Layer; 3] = [
 pub fn air(altitude_ft: f64) -> Air {
     let geometric = altitude_ft * M_PER_FT;
     // The layers are defined over geopotential height.
-    let (temperature, pressure) = state_at(geometric * RADIUS_M / (RADIUS_M + geometric));
+    let State {
+        temperature,
+        pressure,
+        ..
+    } = state_at(geometric * RADIUS_M / (RADIUS_M + geometric));
     Air {
         density_slug_ft3: pressure / (GAS * temperature) / KG_M3_PER_SLUG_FT3,
         sound_ft_s: (HEAT_RATIO * GAS * temperature).sqrt() / M_PER_FT,
@@ -66,18 +70,58 @@ pub fn air(altitude_ft: f64) -> Air {
     }
 }
 
-/// Temperature, K, and pressure, Pa, at a geopotential height.
-fn state_at(height_m: f64) -> (f64, f64) {
+/// Slopes of density and speed of sound over the geometric height, each over the quantity itself, 1/ft.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AirGradients {
+    pub density: f64,
+    pub sound: f64,
+}
+
+/// Gradients of the air at a geometric height, ft. By the hydrostatic equation p' = −ρ g, and of the ideal
+/// gas ρ'/ρ = p'/p − T'/T.
+#[must_use]
+pub fn air_gradients(altitude_ft: f64) -> AirGradients {
+    let geometric = altitude_ft * M_PER_FT;
+    let share = RADIUS_M / (RADIUS_M + geometric);
+    let State {
+        temperature,
+        gradient,
+        ..
+    } = state_at(geometric * share);
+    // Geopotential height rises by share² of the geometric one.
+    let per_ft = share * share * M_PER_FT / temperature;
+    AirGradients {
+        density: -(GRAVITY / GAS + gradient) * per_ft,
+        sound: 0.5 * gradient * per_ft,
+    }
+}
+
+/// Temperature, K, with its rise, K/m, and pressure, Pa, at a geopotential height.
+struct State {
+    temperature: f64,
+    gradient: f64,
+    pressure: f64,
+}
+
+fn state_at(height_m: f64) -> State {
     let (mut base_m, mut temperature, mut pressure) = (0.0, SEA_LEVEL_K, SEA_LEVEL_PA);
     for layer in LAYERS {
         let rise_m = height_m.min(layer.top_m) - base_m;
         (temperature, pressure) = layer.climb(temperature, pressure, rise_m);
         if height_m <= layer.top_m {
-            return (temperature, pressure);
+            return State {
+                temperature,
+                gradient: layer.gradient,
+                pressure,
+            };
         }
         base_m = layer.top_m;
     }
-    (f64::NAN, f64::NAN)
+    State {
+        temperature: f64::NAN,
+        gradient: f64::NAN,
+        pressure: f64::NAN,
+    }
 }
 
 impl Layer {
@@ -137,8 +181,22 @@ mod tests {
             (20_000.0, 54.748_89),
             (32_000.0, 8.680_187),
         ] {
-            let (_, pressure) = state_at(height_m);
+            let pressure = state_at(height_m).pressure;
             assert_relative_eq!(pressure / 100.0, pressure_mbar, max_relative = 5e-6);
+        }
+    }
+
+    #[test]
+    fn gradients_are_those_of_differences() {
+        const STEP_FT: f64 = 1.0;
+        for altitude_ft in [0.0, 25_000.0, 50_000.0, 80_000.0] {
+            let (above, below) = (air(altitude_ft + STEP_FT), air(altitude_ft - STEP_FT));
+            let relative = |above: f64, below: f64| (above / below).ln() / (2.0 * STEP_FT);
+            let own = air_gradients(altitude_ft);
+            let density = relative(above.density_slug_ft3, below.density_slug_ft3);
+            let sound = relative(above.sound_ft_s, below.sound_ft_s);
+            assert_relative_eq!(own.density, density, max_relative = 1e-7);
+            assert_relative_eq!(own.sound, sound, max_relative = 1e-7, epsilon = 1e-15);
         }
     }
 

@@ -7,6 +7,7 @@ pub mod differences;
 pub(crate) mod digits;
 pub mod dual;
 pub(crate) mod harmonics;
+pub(crate) mod lanes;
 pub(crate) mod matrix;
 pub mod mean;
 pub mod minimise;

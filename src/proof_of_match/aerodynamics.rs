@@ -11,9 +11,17 @@ use super::derivative_table::DerivativeTable;
 use crate::aero::{Axis, Buildup, Coefficient, Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::flight::signal;
+use crate::rigid_body::AirData;
+use crate::units::DEG;
 
 /// Number of coefficients: CN, Cm, CA, CY, Cl, Cn.
 pub const COEFFICIENTS: usize = 6;
+
+/// Coefficient and sign of the force along each body axis.
+pub const FORCE: [(usize, f64); 3] = [(2, -1.0), (3, 1.0), (0, -1.0)];
+
+/// Coefficient of the moment about each body axis.
+pub const MOMENT: [usize; 3] = [4, 1, 5];
 
 /// Recorded signals of a build-up, each once: surfaces and vanes. The simulation has the flow itself.
 #[must_use]
@@ -41,6 +49,37 @@ pub struct Flow {
     pub alpha_rate: f64,
     pub qbar: f64,
 }
+
+impl Flow {
+    /// Flow by the air data at the c.g., rates in rad/s.
+    #[must_use]
+    pub fn new(air: &AirData, rates: [f64; 3], alpha_rate: f64) -> Flow {
+        Flow {
+            alpha_deg: DEG * air.alpha,
+            beta_deg: DEG * air.beta,
+            velocity: air.velocity_ft_s,
+            mach: air.mach,
+            rates,
+            alpha_rate,
+            qbar: air.qbar_psf,
+        }
+    }
+
+    /// Places of its quantities among the slopes.
+    pub const ALPHA: usize = 0;
+    pub const BETA: usize = 1;
+    pub const VELOCITY: usize = 2;
+    pub const MACH: usize = 3;
+    pub const RATES: usize = 4;
+    pub const ALPHA_RATE: usize = 7;
+    pub const QBAR: usize = 8;
+}
+
+/// Number of the quantities of a flow, in their order, along which coefficients have slopes.
+pub const FLOW: usize = 9;
+
+/// Slopes along the quantities of a flow.
+pub type FlowSlopes = [f64; FLOW];
 
 /// Factor of a derivative, with the constants that it needs.
 #[derive(Clone, Debug, PartialEq)]
@@ -131,13 +170,35 @@ impl<'a> Aerodynamics<'a> {
         coefficients: &[f64; COEFFICIENTS],
         qbar: f64,
     ) -> (Vector3<f64>, Vector3<f64>) {
-        let [normal, pitching, axial, side, rolling, yawing] = *coefficients;
         let area = qbar * self.aircraft.wing_area_ft2;
-        let (span, chord) = (self.aircraft.span_ft, self.aircraft.chord_ft);
+        let force = FORCE.map(|(coefficient, sign)| sign * coefficients[coefficient]);
+        let lengths = self.lengths().into_iter().zip(MOMENT);
+        let moment = lengths.map(|(length, coefficient)| length * coefficients[coefficient]);
         (
-            Vector3::new(-axial, side, -normal) * area,
-            Vector3::new(span * rolling, chord * pitching, span * yawing) * area,
+            Vector3::from(force) * area,
+            Vector3::from_iterator(moment) * area,
         )
+    }
+
+    /// Place of a derivative's coefficient.
+    #[must_use]
+    pub fn coefficient(&self, derivative: usize) -> usize {
+        self.terms[derivative].0
+    }
+
+    /// Reference lengths of the moments about the body axes, ft.
+    #[must_use]
+    pub fn lengths(&self) -> [f64; 3] {
+        let Aircraft {
+            span_ft, chord_ft, ..
+        } = self.aircraft;
+        [*span_ft, *chord_ft, *span_ft]
+    }
+
+    /// Reference area, ft².
+    #[must_use]
+    pub fn area(&self) -> f64 {
+        self.aircraft.wing_area_ft2
     }
 }
 
@@ -153,6 +214,7 @@ pub struct AboutTrim<'a> {
     /// Values of the factors at the present instant.
     values: Vec<f64>,
     has_lag: bool,
+    trim_alpha_deg: f64,
 }
 
 /// Term of a build-up about a trim.
@@ -200,6 +262,7 @@ impl<'a> AboutTrim<'a> {
             values: vec![0.0; factors.len()],
             has_lag: aerodynamics.has_lag,
             factors,
+            trim_alpha_deg: trim.alpha_deg,
         }
     }
 
@@ -212,9 +275,7 @@ impl<'a> AboutTrim<'a> {
     /// Change of the coefficients from the trim.
     #[must_use]
     pub fn change(&mut self, flow: &Flow, recorded: &[f64]) -> [f64; COEFFICIENTS] {
-        for (value, factor) in self.values.iter_mut().zip(&self.factors) {
-            *value = factor.value(flow, recorded);
-        }
+        self.evaluate(flow, recorded);
         let entries = self.table.entries(self.table.place(flow.alpha_deg));
         let mut change = [0.0; COEFFICIENTS];
         for (sum, terms) in change.iter_mut().zip(&self.terms) {
@@ -228,6 +289,52 @@ impl<'a> AboutTrim<'a> {
         }
         change
     }
+
+    /// Values of the factors in a flow.
+    fn evaluate(&mut self, flow: &Flow, recorded: &[f64]) {
+        for (value, factor) in self.values.iter_mut().zip(&self.factors) {
+            *value = factor.value(flow, recorded);
+        }
+    }
+
+    /// Slopes of the coefficients along the flow, and along the derivatives at every angle of attack alike.
+    #[must_use]
+    pub fn slopes(&mut self, flow: &Flow, recorded: &[f64]) -> CoefficientSlopes {
+        self.evaluate(flow, recorded);
+        let entries = self.table.entries(self.table.place(flow.alpha_deg));
+        let along = self.factors.iter().map(|f| f.slopes(flow, recorded));
+        let along: Vec<FlowSlopes> = along.collect();
+        let mut by_flow = [[0.0; FLOW]; COEFFICIENTS];
+        let mut by_derivative = vec![0.0; self.table.derivatives()];
+        for (sums, terms) in by_flow.iter_mut().zip(&self.terms) {
+            for term in terms {
+                if term.is_along_alpha {
+                    sums[Flow::ALPHA] += entries.integral_slope(term.derivative);
+                    by_derivative[term.derivative] = flow.alpha_deg - self.trim_alpha_deg;
+                    continue;
+                }
+                let moved = self.values[term.factor] - term.at_trim;
+                sums[Flow::ALPHA] += entries.value_slope(term.derivative) * moved;
+                let value = entries.value(term.derivative);
+                for (sum, slope) in sums.iter_mut().zip(&along[term.factor]) {
+                    *sum += value * slope;
+                }
+                by_derivative[term.derivative] = moved;
+            }
+        }
+        CoefficientSlopes {
+            by_flow,
+            by_derivative,
+        }
+    }
+}
+
+/// Slopes of the coefficients at an instant.
+#[derive(Clone, Debug)]
+pub struct CoefficientSlopes {
+    pub by_flow: [FlowSlopes; COEFFICIENTS],
+    /// Slope of each derivative's own coefficient along it.
+    pub by_derivative: Vec<f64>,
 }
 
 /// Place of a coefficient among those of both axes.
@@ -300,5 +407,37 @@ impl Factor {
             Factor::Magnitude(of) => of.value(flow, recorded).abs(),
             Factor::Product(both) => both[0].value(flow, recorded) * both[1].value(flow, recorded),
         }
+    }
+
+    /// Slopes along the flow.
+    fn slopes(&self, flow: &Flow, recorded: &[f64]) -> FlowSlopes {
+        let mut slopes = [0.0; FLOW];
+        match self {
+            Factor::Constant | Factor::Recorded(_) => {}
+            Factor::Alpha => slopes[Flow::ALPHA] = 1.0,
+            Factor::Beta => slopes[Flow::BETA] = 1.0,
+            Factor::Velocity => slopes[Flow::VELOCITY] = 1.0,
+            Factor::Mach => slopes[Flow::MACH] = 1.0,
+            Factor::Rate { axis, half_length } => {
+                slopes[Flow::RATES + axis] = half_length / flow.velocity;
+                slopes[Flow::VELOCITY] = -self.value(flow, recorded) / flow.velocity;
+            }
+            Factor::AlphaRate { half_length } => {
+                slopes[Flow::ALPHA_RATE] = half_length / flow.velocity;
+                slopes[Flow::VELOCITY] = -self.value(flow, recorded) / flow.velocity;
+            }
+            Factor::Vane { .. } => slopes[Flow::QBAR] = -self.value(flow, recorded) / flow.qbar,
+            Factor::Magnitude(of) => {
+                let sign = of.value(flow, recorded).signum();
+                slopes = of.slopes(flow, recorded).map(|slope| sign * slope);
+            }
+            Factor::Product(both) => {
+                let [a, b] = [&both[0], &both[1]];
+                let values = [a.value(flow, recorded), b.value(flow, recorded)];
+                let (by_a, by_b) = (a.slopes(flow, recorded), b.slopes(flow, recorded));
+                slopes = std::array::from_fn(|i| by_a[i] * values[1] + values[0] * by_b[i]);
+            }
+        }
+        slopes
     }
 }

@@ -13,12 +13,12 @@ use super::derivative_table::DerivativeTable;
 use super::dutch_roll::{DutchRoll, LateralModes};
 use super::free_run::FreeRun;
 use super::judgement::Judged;
+use super::linear_run::Histories;
 use super::outputs::place;
 use super::recording::Recording;
-use super::repeat_flight::{Histories, MovedRuns, moving, start_errors};
+use super::repeat_flight::{MeanRun, moving};
 use super::specification::Tolerance;
-use super::start::MatchedStart;
-use crate::aero::{Axis, Buildup, Condition};
+use crate::aero::{Buildup, Condition};
 use crate::model::{LocalPosterior, LocalValue};
 use crate::tables::MatchedQuantity;
 
@@ -36,17 +36,6 @@ pub struct DecisiveDifference {
     pub rest: f64,
     /// `true` where the model is the posterior, whose mean the model is.
     pub follows_mean: bool,
-}
-
-/// Effects on the outputs at every `stride`-th sample.
-#[derive(Debug)]
-pub struct LinearOutputs {
-    pub stride: usize,
-    /// Place among the posterior's values, and effect per unit.
-    slopes: Vec<(usize, Histories)>,
-    /// Effects of the start's independent errors.
-    of_start: Vec<Histories>,
-    mean: FreeRun,
 }
 
 /// Dutch roll of repeat flights and of the model that predicts them.
@@ -87,33 +76,7 @@ impl PredictedDutchRoll<'_> {
     }
 }
 
-impl LinearOutputs {
-    /// Flies the effect of each derivative, raised by its standard deviation, and of the start's errors;
-    /// `None` where the start is not determined.
-    #[must_use]
-    pub fn new(
-        (runs, start): (MovedRuns, &MatchedStart),
-        posterior: &LocalPosterior,
-        (buildup, axis): (&Buildup, Axis),
-    ) -> Option<LinearOutputs> {
-        let errors = start_errors(start.covariance.as_ref()?, axis);
-        let slope = |(value, derivative): (usize, usize)| {
-            let deviation = posterior.covariance[(value, value)].sqrt();
-            let effect = runs.effect(&[(derivative, deviation)]);
-            let per_unit = |history: Vec<f64>| history.iter().map(|e| e / deviation).collect();
-            (deviation > 0.0).then(|| (value, effect.map(per_unit)))
-        };
-        let moving = moving(posterior, buildup).into_iter();
-        let slopes = moving.filter_map(slope).collect();
-        let of_start = runs.effects_of_start(&errors, axis).collect();
-        Some(LinearOutputs {
-            slopes,
-            of_start,
-            stride: runs.stride,
-            mean: runs.mean,
-        })
-    }
-
+impl MeanRun {
     /// The decisive difference of the run of a model at every `stride`-th sample, and of its Dutch roll where
     /// that is known; `None` where a run departs or no tolerance can be judged.
     #[must_use]
@@ -124,7 +87,7 @@ impl LinearOutputs {
         (posterior, buildup): (&LocalPosterior, &Buildup),
         judged: &[Judged],
     ) -> Option<LinearDifference> {
-        if flown.1.has_departed || self.mean.has_departed {
+        if flown.1.has_departed || self.run.has_departed {
             return None;
         }
         let worst = |own: &Judged| {
@@ -151,7 +114,7 @@ impl LinearOutputs {
         posterior: &LocalPosterior,
         judged: &Judged,
     ) -> Option<(f64, LinearDifference)> {
-        let samples = 0..self.mean.outputs.len();
+        let samples = 0..self.run.outputs.len();
         let all = samples.filter_map(|sample| {
             let own = self.difference(flown, sample, judged)?;
             Some((own.distance(&posterior.covariance), own))
@@ -173,14 +136,15 @@ impl LinearOutputs {
             return None;
         }
         let per_width = 1.0 / tolerance.width(recording.measured[recorded][output]);
-        let by_start = self.of_start.iter().map(|effect| effect[output][sample]);
-        let by_start = by_start.map(|effect| effect * effect).sum::<f64>().sqrt();
-        let slopes = self.slopes.iter();
-        let slopes = slopes.map(|(value, effect)| (*value, per_width * effect[output][sample]));
+        let (slopes, of_start) = self.slopes_by_kind();
+        let at = |slopes: &Histories| slopes[output][sample];
+        let values = self.derivatives.iter().map(|(value, _)| *value);
+        let slopes = values.zip(slopes.iter().map(|own| per_width * at(own)));
+        let of_start = DVector::from_iterator(of_start.len(), of_start.iter().map(at));
+        let by_start = deviation(&self.start_covariance, &of_start);
         Some(LinearDifference {
             quantity: tolerance.quantity,
-            mean: per_width
-                * (self.mean.outputs[sample][output] - run.outputs.get(sample)?[output]),
+            mean: per_width * (self.run.outputs[sample][output] - run.outputs.get(sample)?[output]),
             slopes: slopes.collect(),
             rest: per_width * by_start.hypot(recording.noise[output]),
         })
@@ -211,6 +175,11 @@ impl LinearDifference {
         for (value, slope) in &self.slopes {
             slopes[*value] = *slope;
         }
-        (covariance * &slopes).dot(&slopes).max(0.0).sqrt()
+        deviation(covariance, &slopes)
     }
+}
+
+/// Standard deviation of a linear function, by its slopes along quantities with a covariance.
+fn deviation(covariance: &DMatrix<f64>, slopes: &DVector<f64>) -> f64 {
+    (covariance * slopes).dot(slopes).max(0.0).sqrt()
 }

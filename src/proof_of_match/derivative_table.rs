@@ -72,6 +72,7 @@ impl DerivativeTable {
     }
 
     /// Raises one derivative by a constant.
+    #[cfg(test)]
     pub fn raise(&mut self, derivative: usize, regressor: &Regressor, by: f64) {
         for (node, row) in self.values.chunks_mut(self.derivatives).enumerate() {
             let distance = if *regressor == Regressor::Alpha {
@@ -81,6 +82,12 @@ impl DerivativeTable {
             };
             row[derivative] += by * distance;
         }
+    }
+
+    /// Number of its derivatives.
+    #[must_use]
+    pub fn derivatives(&self) -> usize {
+        self.derivatives
     }
 
     #[inline]
@@ -143,6 +150,23 @@ impl Entries<'_> {
     #[must_use]
     pub fn integral(&self, derivative: usize) -> f64 {
         self.between(self.fraction, derivative)
+    }
+
+    /// Slope of the derivative along α, per deg.
+    #[must_use]
+    pub fn value_slope(&self, derivative: usize) -> f64 {
+        let is_inside = (0.0..=1.0).contains(&self.fraction);
+        if is_inside {
+            self.integral_slope(derivative)
+        } else {
+            0.0
+        }
+    }
+
+    /// Slope of the integral of a derivative along α, per deg.
+    #[must_use]
+    pub fn integral_slope(&self, derivative: usize) -> f64 {
+        (self.high[derivative] - self.low[derivative]) / STEP_DEG
     }
 
     #[inline]

@@ -9,12 +9,12 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::derivative_table::DerivativeTable;
-use super::deviations::Deviations;
 use crate::aero::{Axis, Buildup, Derivative, Regressor, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::maneuver::{Maneuver, Means};
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
 use crate::numerics::random::RandomStream;
+use crate::numerics::root::continuous_root;
 use crate::qualities::{Controls, Differentiation, Flight, FlownConditions, LinearModel};
 use crate::tables::{FlyingQuality, MatchedQuantity};
 
@@ -70,8 +70,8 @@ pub struct LateralModes {
     own: DVector<f64>,
     /// Derivatives that the maneuver estimates; it holds the others.
     estimated: Vec<bool>,
-    /// Independent errors of the estimates.
-    errors: Deviations,
+    /// Root of the covariance of the estimates' errors.
+    errors: DMatrix<f64>,
     alpha_deg: f64,
     pub flight: DutchRoll,
 }
@@ -121,7 +121,7 @@ impl LateralModes {
                 .iter()
                 .map(|name| estimates.place(name).is_some())
                 .collect(),
-            errors: Deviations::of(&estimates.covariance_of(&names)),
+            errors: continuous_root(&estimates.covariance_of(&names)),
             alpha_deg: maneuver.alpha_deg,
             linear,
             derivatives,
@@ -152,7 +152,7 @@ impl LateralModes {
     ) -> Option<RepeatQuantity> {
         let values = self.values(mean);
         let at = |values: DVector<f64>| self.as_estimated(values)?.value(quantity);
-        let effect = |by: &DVector<f64>| Some(0.5 * (at(&values + by)? - at(&values - by)?));
+        let effect = |by: DVector<f64>| Some(0.5 * (at(&values + &by)? - at(&values - &by)?));
         let slope = |(derivative, deviation): &(usize, f64)| {
             let own = self.derivatives.iter().position(|own| own == derivative);
             let Some(own) = own.filter(|_| *deviation > 0.0) else {
@@ -160,10 +160,14 @@ impl LateralModes {
             };
             let mut by = DVector::zeros(values.len());
             by[own] = *deviation;
-            Some(effect(&by)? / deviation)
+            Some(effect(by)? / deviation)
         };
         let slopes: Option<Vec<f64>> = deviations.iter().map(slope).collect();
-        let errors: Option<Vec<f64>> = self.errors.directions.iter().map(effect).collect();
+        let errors = self
+            .errors
+            .column_iter()
+            .map(|own| effect(own.into_owned()));
+        let errors: Option<Vec<f64>> = errors.collect();
         Some(RepeatQuantity {
             mean: at(values.clone())?,
             slopes: slopes?,
@@ -184,10 +188,7 @@ impl LateralModes {
         for (value, derivative) in values.iter_mut().zip(&self.derivatives) {
             *value += deviation(*derivative);
         }
-        let deviates = self.errors.drawn(stream);
-        for (error, deviate) in self.errors.directions.iter().zip(deviates) {
-            values.axpy(deviate, error, 1.0);
-        }
+        values += stream.deviations(&self.errors);
         self.as_estimated(values)
     }
 

@@ -3,13 +3,14 @@
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use super::aerodynamics::{AboutTrim, Aerodynamics, COEFFICIENTS, Flow, Trim};
+use super::load_changes::LoadSlopes;
 use super::outputs::{Outputs, outputs};
 use super::recording::Recording;
 use crate::aircraft::Aircraft;
 use crate::numerics::runge_kutta::{self, POINT};
-use crate::rigid_body::{AirData, BodyState, Euler, Instant, Loads, Readings, body};
+use crate::rigid_body::{AirData, BodyState, CHANGING, Euler, Instant, Loads, Readings, body};
 use crate::units::DEG;
-use nalgebra::Vector3;
+use nalgebra::{Quaternion, Vector3};
 use pulp::{Arch, Simd, WithSimd};
 
 /// Angle of attack beyond which the aircraft has departed, deg: no build-up has a meaning there.
@@ -17,6 +18,9 @@ const DEPARTURE_DEG: f64 = 90.0;
 
 /// Number of states at the start.
 pub const STATES: usize = 8;
+
+/// Velocities and rates among the states of the body.
+const STATES_OF_BODY: usize = 6;
 
 /// State and balance from which a simulation starts. Heading and place over the ground decide nothing.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,6 +47,39 @@ impl Start {
             }
         }
         start
+    }
+
+    /// Slopes of the body's changing states along one of the start's.
+    #[must_use]
+    pub fn slopes(&self, parameter: usize) -> [f64; CHANGING] {
+        let [alpha, beta, velocity, ..] = self.state;
+        let (sa, ca) = alpha.sin_cos();
+        let (sb, cb) = beta.sin_cos();
+        let attitude = self.body().attitude;
+        let mut slopes = [0.0; CHANGING];
+        let (body, turn) = slopes.split_at_mut(STATES_OF_BODY);
+        match parameter {
+            0 => body[..3].copy_from_slice(&[-velocity * sa * cb, 0.0, velocity * ca * cb]),
+            1 => body[..3].copy_from_slice(&[
+                -velocity * ca * sb,
+                velocity * cb,
+                -velocity * sa * sb,
+            ]),
+            2 => body[..3].copy_from_slice(&[ca * cb, sb, sa * cb]),
+            // Pitch turns about the axis across, as the heading is zero; bank about the body's own.
+            6 => turn[..4].copy_from_slice(
+                (Quaternion::new(0.0, 0.0, 0.5, 0.0) * attitude)
+                    .coords
+                    .as_slice(),
+            ),
+            7 => turn[..4].copy_from_slice(
+                (attitude * Quaternion::new(0.0, 0.5, 0.0, 0.0))
+                    .coords
+                    .as_slice(),
+            ),
+            rate => body[rate] = 1.0,
+        }
+        slopes
     }
 
     fn body(&self) -> BodyState {
@@ -81,6 +118,16 @@ impl Simulation<'_> {
     /// Flies the first `samples` samples, every `stride`-th of which is a step.
     #[must_use]
     pub fn fly(&self, start: &Start, samples: usize, stride: usize) -> FreeRun {
+        self.fly_with(start, (samples, stride), &mut Alone)
+    }
+
+    /// As [`Simulation::fly`], with a companion.
+    pub fn fly_with(
+        &self,
+        start: &Start,
+        (samples, stride): (usize, usize),
+        companion: &mut impl Companion,
+    ) -> FreeRun {
         let step_s = stride as f64 * self.recording.step_s;
         let mut equations = RunEquations {
             simulation: self,
@@ -105,6 +152,8 @@ impl Simulation<'_> {
             });
             run.outputs
                 .push(outputs(&readings, instant.air.velocity_ft_s));
+            companion.at_stage(0, &instant, (&mut equations, 2 * sample));
+            companion.at_sample(&instant);
             if sample + stride < samples {
                 // The first stage is at the sample itself.
                 let rate = |stage: usize, at: &BodyState| {
@@ -112,13 +161,39 @@ impl Simulation<'_> {
                         return instant.rate;
                     }
                     let point = 2 * sample + stride * POINT[stage];
-                    equations.instant(at, point).rate
+                    let instant = equations.instant(at, point);
+                    companion.at_stage(stage, &instant, (&mut equations, point));
+                    instant.rate
                 };
-                state = runge_kutta::step(&state, step_s, rate, BodyState::plus).normalised();
+                let end = runge_kutta::step(&state, step_s, rate, BodyState::plus);
+                companion.after_step(&end);
+                state = end.normalised();
             }
         }
         run
     }
+}
+
+/// Computation beside a run, at its instants.
+pub trait Companion {
+    /// Takes the instant of a stage, with the equations and the point of the recording. The first stage of a
+    /// step is at its sample.
+    fn at_stage(&mut self, stage: usize, instant: &Instant, at: (&mut RunEquations, usize));
+
+    /// Follows the first stage of a sample, whether a step starts there or not.
+    fn at_sample(&mut self, instant: &Instant);
+
+    /// Follows all stages of a step; its end is not yet normalised.
+    fn after_step(&mut self, end: &BodyState);
+}
+
+/// Companion that computes nothing.
+struct Alone;
+
+impl Companion for Alone {
+    fn at_stage(&mut self, _: usize, _: &Instant, _: (&mut RunEquations, usize)) {}
+    fn at_sample(&mut self, _: &Instant) {}
+    fn after_step(&mut self, _: &BodyState) {}
 }
 
 /// Readings of the sensors, compiled for the processor at hand: without its fused multiplication the vanes'
@@ -138,7 +213,7 @@ impl WithSimd for Sensing<'_> {
 }
 
 /// Equations of motion of one run.
-struct RunEquations<'a> {
+pub struct RunEquations<'a> {
     simulation: &'a Simulation<'a>,
     start: &'a Start,
     aerodynamics: AboutTrim<'a>,
@@ -158,16 +233,44 @@ impl RunEquations<'_> {
         self.instant_at(alpha_rate, state, point)
     }
 
+    /// Slopes of the loads at an instant, and those of each derivative's coefficient along it.
+    pub fn load_slopes(&mut self, instant: &Instant, point: usize) -> (LoadSlopes, Vec<f64>) {
+        let has_lag = self.aerodynamics.have_lag();
+        let state = &instant.state;
+        let alpha_rate = if has_lag {
+            AirData::alpha_rate(&state.velocity, &instant.rate.velocity)
+        } else {
+            0.0
+        };
+        let flow = Flow::new(&instant.air, state.rates.into(), alpha_rate);
+        let recorded = self.simulation.recording.signals(point);
+        let coefficients = self.coefficients(&flow, recorded);
+        let slopes = self.aerodynamics.slopes(&flow, recorded);
+        let loads = LoadSlopes::new(
+            &self.simulation.aerodynamics,
+            instant,
+            &coefficients,
+            slopes.by_flow,
+            has_lag,
+        );
+        (loads, slopes.by_derivative)
+    }
+
+    /// Coefficients in a flow.
+    fn coefficients(&mut self, flow: &Flow, recorded: &[f64]) -> [f64; COEFFICIENTS] {
+        let change = self.aerodynamics.change(flow, recorded);
+        let level = self.start.trim.coefficients;
+        std::array::from_fn(|i| level[i] + change[i])
+    }
+
     /// Motion where the loads see this α̇, rad/s.
     fn instant_at(&mut self, alpha_rate: f64, state: &BodyState, point: usize) -> Instant {
         let recording = self.simulation.recording;
         let inputs = recording.inputs(point);
         let mut air = AirData::new(&state.velocity, state.position.z);
         air.qbar_psf *= self.start.density_ratio;
-        let flow = flow(&air, state.rates.into(), alpha_rate);
-        let change = self.aerodynamics.change(&flow, recording.signals(point));
-        let level = self.start.trim.coefficients;
-        let coefficients: [f64; COEFFICIENTS] = std::array::from_fn(|i| level[i] + change[i]);
+        let flow = Flow::new(&air, state.rates.into(), alpha_rate);
+        let coefficients = self.coefficients(&flow, recording.signals(point));
         let model = &self.simulation.aerodynamics;
         let (force, moment) = model.loads(&coefficients, air.qbar_psf);
         let thrust = inputs.thrust;
@@ -188,17 +291,5 @@ impl RunEquations<'_> {
             relative_rates: state.rates,
             forward_thrust_lbf: thrust.forward_lbf,
         }
-    }
-}
-
-fn flow(air: &AirData, rates: [f64; 3], alpha_rate: f64) -> Flow {
-    Flow {
-        alpha_deg: DEG * air.alpha,
-        beta_deg: DEG * air.beta,
-        velocity: air.velocity_ft_s,
-        mach: air.mach,
-        rates,
-        alpha_rate,
-        qbar: air.qbar_psf,
     }
 }

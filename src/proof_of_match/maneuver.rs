@@ -3,14 +3,14 @@
 use serde::{Deserialize, Serialize};
 
 use super::aerodynamics::Aerodynamics;
-use super::decisive_difference::{DecisiveDifference, LinearOutputs, PredictedDutchRoll};
+use super::decisive_difference::{DecisiveDifference, PredictedDutchRoll};
 use super::derivative_table::DerivativeTable;
 use super::dutch_roll::{LateralModes, OwnEstimates};
 use super::free_run::{FreeRun, Simulation};
 use super::judgement::{self, Finding, Simulated};
 use super::outputs::place;
 use super::recording::Recording;
-use super::repeat_flight::{self, Effects, MovedRuns, Probabilities};
+use super::repeat_flight::{self, MeanRun, Probabilities, Repeats};
 use super::specification::{Specification, Test};
 use super::start::{self, MatchedStart};
 use crate::aero::{Axis, Buildup, WindTunnel};
@@ -207,20 +207,18 @@ impl<'a> Flight<'a> {
         let (model, database) = basis.models.first().ok_or("no model is given")?;
         let local = self.local.ok_or("the posterior has nothing of its axis")?;
         let posterior = self.trimmed(basis.posterior);
-        let start = &posterior.start;
-        let runs = MovedRuns::new(&posterior.simulation, &start.start, basis.buildup);
-        let axis = (basis.buildup, self.maneuver.axis);
-        let linear =
-            LinearOutputs::new((runs, start), local, axis).ok_or("its start is not determined")?;
+        let about = (&posterior.simulation, &posterior.start);
+        let mean = MeanRun::of(about, local, (basis.buildup, self.maneuver.axis))
+            .ok_or("its start is not determined")?;
         let follows_mean = *model == ModelSource::Posterior;
         let own = (!follows_mean).then(|| self.trimmed(database));
         let Trimmed { simulation, start } = own.as_ref().unwrap_or(&posterior);
-        let run = simulation.fly(&start.start, self.recording.samples, linear.stride);
+        let run = simulation.fly(&start.start, self.recording.samples, mean.stride);
         let judged = judgement::judged(&self.tests, self.modes.is_some());
         let predicted = |modes| predicted_dutch_roll(modes, &posterior.simulation, simulation);
         let dutch_roll = self.modes.as_ref().map(predicted).transpose()?;
         let about = (local, basis.buildup);
-        let decisive = linear
+        let decisive = mean
             .decisive((&self.recording, &run), dutch_roll, about, &judged)
             .ok_or("its simulation departs, or no tolerance can be judged")?;
         let named = decisive.slopes.iter();
@@ -239,13 +237,13 @@ impl<'a> Flight<'a> {
     fn matched(&self) -> Matched {
         let posterior = self.trimmed(self.basis.posterior);
         let mean = self.simulated(&posterior);
-        let effects = self.effects(&posterior, &mean.run);
+        let repeats = self.repeats(&posterior, &mean.run);
         let mut matched = Matched::default();
         for (model, database) in self.basis.models {
             let is_other = *model != ModelSource::Posterior;
             let own = is_other.then(|| self.simulated(&self.trimmed(database)));
             let simulated = own.as_ref().unwrap_or(&mean);
-            self.judge(*model, simulated, effects.as_ref(), &mut matched);
+            self.judge(*model, simulated, repeats.as_ref(), &mut matched);
         }
         matched
     }
@@ -264,13 +262,13 @@ impl<'a> Flight<'a> {
         Trimmed { simulation, start }
     }
 
-    /// Effects of the posterior's deviations and of the errors of its start.
-    fn effects(&self, posterior: &Trimmed, mean: &FreeRun) -> Option<Effects> {
+    /// Repeat flights about the posterior's mean.
+    fn repeats(&self, posterior: &Trimmed, mean: &FreeRun) -> Option<Repeats> {
         let basis = self.basis;
         let model = (basis.buildup, self.maneuver.axis);
         let flown = (&posterior.simulation, &posterior.start);
         let known = (self.local?, self.modes.as_ref());
-        repeat_flight::effects(flown, mean, known, model, basis.specification.draws)
+        repeat_flight::repeats(flown, mean, known, model, basis.specification.draws)
     }
 
     /// Free run and Dutch roll of a trimmed model.
@@ -289,14 +287,14 @@ impl<'a> Flight<'a> {
         &self,
         model: ModelSource,
         simulated: &Simulated,
-        effects: Option<&Effects>,
+        repeats: Option<&Repeats>,
         matched: &mut Matched,
     ) {
         let required_pct = self.basis.specification.inside_pct;
         let judged = judgement::judged(&self.tests, self.modes.is_some());
         let findings = judgement::judge(&self.recording, simulated, &judged, required_pct);
-        let repeat = effects.map(|effects| {
-            effects.probabilities(&self.recording, simulated, &judged, required_pct)
+        let repeat = repeats.map(|repeats| {
+            repeats.probabilities(&self.recording, simulated, &judged, required_pct)
         });
         let repeat = repeat.as_ref();
         matched

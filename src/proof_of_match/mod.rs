@@ -2,8 +2,8 @@
 //! with six degrees of freedom, and judged by the tolerances of a standard.
 //!
 //! [`recording`] is the maneuver as recorded: inputs and outputs. [`derivative_table`] and
-//! [`aerodynamics`] are the model that flies it, [`free_run`] the flight, and [`start`] its initial
-//! state and trim. [`specification`] has the tolerances, which are the analyst's data; [`judgement`]
+//! [`aerodynamics`] are the model that flies it, [`free_run`] the flight, [`linear_run`] the slopes of its
+//! outputs, and [`start`] its initial state and trim. [`specification`] has the tolerances, which are the analyst's data; [`judgement`]
 //! compares, and [`dutch_roll`] adds the modes of the flight's own estimates; [`repeat_flight`] adds the probability that a repeat flight passes,
 //! and [`mod@decisive_difference`] what decides it, as a linear function of the derivatives.
 
@@ -12,9 +12,10 @@ mod outputs;
 mod derivative_table;
 mod aerodynamics;
 mod recording;
+mod load_changes;
 mod free_run;
+mod linear_run;
 mod start;
-mod deviations;
 mod dutch_roll;
 mod judgement;
 mod repeat_flight;

@@ -3,17 +3,17 @@
 //!
 //! A repeat flight is flown by an aircraft of the posterior with the same surfaces. To first order its
 //! outputs differ from those at the mean by the effects of the derivatives' deviations; the simulator's
-//! differ by those of the errors of its matched start. Both effects are free runs. The noise of the
-//! sensors is white and independent, so its part of the probability is exact for each draw.
+//! differ by those of the errors of its matched start. Both follow from the slopes of one free run. The
+//! noise of the sensors is white and independent, so its part of the probability is exact for each draw.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use pulp::Arch;
 
-use super::deviations::Deviations;
 use super::dutch_roll::{DutchRoll, LateralModes};
-use super::free_run::{FreeRun, STATES, Simulation, Start};
+use super::free_run::{FreeRun, STATES, Simulation};
 use super::judgement::{Judged, Simulated, allowed_outside};
-use super::outputs::{COUNT, Outputs, place};
+use super::linear_run::{Histories, LinearRun, Parameter};
+use super::outputs::{Outputs, place};
 use super::recording::Recording;
 use super::specification::Tolerance;
 use super::start::MatchedStart;
@@ -21,24 +21,26 @@ use crate::aero::{Axis, Buildup, Regressor};
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
 use crate::numerics::normal;
 use crate::numerics::random::RandomStream;
+use crate::numerics::root::continuous_root;
 use crate::numerics::sample_count::whole_steps;
 
 /// Seed of the draws.
 const SEED: u64 = 60;
 
-/// Longest step of the effects' free runs, s. Probabilities differ by 0.2 % rms from those of steps of a quarter.
+/// Longest step of the run with slopes, s. Probabilities differ by 0.2 % rms from those of steps of a quarter.
 const LONGEST_STEP_S: f64 = 0.1;
 
 /// Distance from the limit beyond which noise decides nothing, standard deviations.
 const CERTAIN: f64 = 5.0;
 
-/// Effects of independent standard normal deviates on the outputs, at every `stride`-th sample.
+/// Repeat flights about the mean of a posterior, at every `stride`-th sample.
 #[derive(Clone, Debug)]
-pub struct Effects {
+pub struct Repeats {
     stride: usize,
     /// Outputs at the mean of the posterior.
     mean: Vec<Outputs>,
-    effects: Vec<Histories>,
+    /// Slopes of the outputs along the derivatives and the parameters of the start.
+    slopes: Vec<Histories>,
     /// Repeat flights, which all models share.
     draws: Vec<Draw>,
 }
@@ -46,14 +48,11 @@ pub struct Effects {
 /// Drawn aircraft and start of a repeat flight.
 #[derive(Clone, Debug)]
 struct Draw {
-    /// A standard normal deviate for each effect.
-    deviates: Vec<f64>,
+    /// Deviations of the derivatives and of the start's parameters.
+    deviations: Vec<f64>,
     /// Dutch roll by the estimates of the repeat flight.
     dutch_roll: Option<DutchRoll>,
 }
-
-/// History of each output. A draw sums hundreds of them, sample after sample.
-pub type Histories = [Vec<f64>; COUNT];
 
 /// Probabilities of one model: of each tolerance in the order of the tests, and of all requirements.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,109 +71,100 @@ impl Probabilities {
     }
 }
 
-/// Samples in a step of the effects' free runs.
+/// Run about which flights repeat, with the slopes of its outputs.
+#[derive(Debug)]
+pub struct MeanRun {
+    pub stride: usize,
+    pub run: FreeRun,
+    /// Slopes along the derivatives, and after them along the start's own parameters.
+    slopes: Vec<Histories>,
+    /// Places of the derivatives, among the values of the posterior and in the build-up.
+    pub derivatives: Vec<(usize, usize)>,
+    /// Covariance of the start's own parameters.
+    pub start_covariance: DMatrix<f64>,
+}
+
+impl MeanRun {
+    /// Flies the mean of a posterior; `None` where its start is not determined.
+    #[must_use]
+    pub fn of(
+        (simulation, start): (&Simulation, &MatchedStart),
+        posterior: &LocalPosterior,
+        (buildup, axis): (&Buildup, Axis),
+    ) -> Option<MeanRun> {
+        let covariance = start.covariance.as_ref()?;
+        let recording = simulation.recording;
+        let stride = stride(recording);
+        let derivatives = moving(posterior, buildup);
+        let own = start_parameters(axis);
+        let moved = derivatives.iter().map(|(_, d)| Parameter::Derivative(*d));
+        let parameters: Vec<Parameter> = moved.chain(own.map(Parameter::Start)).collect();
+        let steps = (recording.samples, stride);
+        let LinearRun { run, slopes } =
+            simulation.fly_with_slopes((&start.start, &parameters), steps);
+        Some(MeanRun {
+            stride,
+            run,
+            slopes,
+            derivatives,
+            start_covariance: of_places(covariance, &own),
+        })
+    }
+
+    /// Slopes along the derivatives, and along the parameters of the start.
+    #[must_use]
+    pub fn slopes_by_kind(&self) -> (&[Histories], &[Histories]) {
+        self.slopes.split_at(self.derivatives.len())
+    }
+}
+
+/// Samples in a step of the run with slopes.
 fn stride(recording: &Recording) -> usize {
     whole_steps(LONGEST_STEP_S, recording.step_s)
         .min(recording.samples)
         .max(1)
 }
 
-/// Free runs about that of the posterior's mean.
-#[derive(Debug)]
-pub struct MovedRuns<'a> {
-    simulation: &'a Simulation<'a>,
-    start: &'a Start,
-    buildup: &'a Buildup,
-    pub stride: usize,
-    pub mean: FreeRun,
-}
-
-impl<'a> MovedRuns<'a> {
-    #[must_use]
-    pub fn new(
-        simulation: &'a Simulation<'a>,
-        start: &'a Start,
-        buildup: &'a Buildup,
-    ) -> MovedRuns<'a> {
-        let recording = simulation.recording;
-        let stride = stride(recording);
-        MovedRuns {
-            simulation,
-            start,
-            buildup,
-            stride,
-            mean: simulation.fly(start, recording.samples, stride),
-        }
-    }
-
-    /// Effect of a deviation of the derivatives, by place in the build-up.
-    #[must_use]
-    pub fn effect(&self, deviation: &[(usize, f64)]) -> Histories {
-        let mut raised = self.simulation.clone();
-        for (derivative, by) in deviation {
-            let regressor = &self.buildup.derivatives[*derivative].regressor;
-            raised.aerodynamics.table.raise(*derivative, regressor, *by);
-        }
-        self.difference(&raised, self.start)
-    }
-
-    /// Effects of a matched start's errors in the axis's own parameters.
-    pub fn effects_of_start(
-        &self,
-        errors: &Deviations,
-        axis: Axis,
-    ) -> impl Iterator<Item = Histories> {
-        errors.directions.iter().map(move |error| {
-            let parameters = start_parameters(axis).into_iter().zip(error.iter());
-            let moved = parameters.fold(self.start.clone(), |start, (parameter, by)| {
-                start.moved(parameter, *by)
-            });
-            self.difference(self.simulation, &moved)
-        })
-    }
-
-    fn difference(&self, simulation: &Simulation, start: &Start) -> Histories {
-        let samples = self.simulation.recording.samples;
-        difference(&simulation.fly(start, samples, self.stride), &self.mean)
-    }
-}
-
-/// Flies the effects of a posterior's deviations and of the start's errors about its run `mean`, and draws the
-/// repeat flights; `None` where the start is not determined or nothing is known of the axis.
+/// Draws repeat flights about the mean of a posterior, whose run in short steps is `mean`; `None` where the start
+/// is not determined or nothing is known of the axis.
 #[must_use]
-pub fn effects(
+pub fn repeats(
     (simulation, start): (&Simulation, &MatchedStart),
     mean: &FreeRun,
     (posterior, modes): (&LocalPosterior, Option<&LateralModes>),
-    (buildup, axis): (&Buildup, Axis),
+    model: (&Buildup, Axis),
     draws: usize,
-) -> Option<Effects> {
-    let covariance = start.covariance.as_ref()?;
-    let runs = MovedRuns::new(simulation, &start.start, buildup);
-    let of_derivatives = OfDerivatives::of(posterior, buildup)?;
-    let of_start = start_errors(covariance, axis);
-    let effects = of_derivatives.named.iter().map(|own| runs.effect(own));
-    let effects = effects.chain(runs.effects_of_start(&of_start, axis));
-    let effects: Vec<Histories> = effects.collect();
+) -> Option<Repeats> {
+    let about = MeanRun::of((simulation, start), posterior, model)?;
+    if about.derivatives.is_empty() {
+        return None;
+    }
+    let (values, derivatives): (Vec<usize>, Vec<usize>) = about.derivatives.into_iter().unzip();
+    let root = continuous_root(&of_places(&posterior.covariance, &values));
+    let root_of_start = continuous_root(&about.start_covariance);
     let mut stream = RandomStream::new(SEED, &simulation.recording.start_s.to_string());
     let draw = |_| {
-        let mut deviates = of_derivatives.deviations.drawn(&mut stream);
+        let drawn = stream.deviations(&root);
         let dutch_roll = modes.and_then(|modes| {
-            let mean = &simulation.aerodynamics.table;
-            modes.of_repeat(mean, |i| of_derivatives.drawn(i, &deviates), &mut stream)
+            let deviation = |derivative: usize| {
+                let own = derivatives.iter().position(|own| *own == derivative);
+                own.map_or(0.0, |own| drawn[own])
+            };
+            let table = &simulation.aerodynamics.table;
+            modes.of_repeat(table, deviation, &mut stream)
         });
-        deviates.extend(of_start.drawn(&mut stream));
+        let of_start = stream.deviations(&root_of_start);
         Draw {
-            deviates,
+            deviations: drawn.iter().chain(&of_start).copied().collect(),
             dutch_roll,
         }
     };
     let draws = (0..draws).map(draw).collect();
-    Some(Effects {
-        effects,
-        stride: runs.stride,
-        // Long steps do for the effects; the mean is compared with runs in short ones.
-        mean: mean.outputs.iter().copied().step_by(runs.stride).collect(),
+    Some(Repeats {
+        slopes: about.slopes,
+        stride: about.stride,
+        // Long steps do for the slopes; the mean is compared with runs in short ones.
+        mean: mean.outputs.iter().copied().step_by(about.stride).collect(),
         draws,
     })
 }
@@ -192,46 +182,6 @@ pub fn moving(posterior: &LocalPosterior, buildup: &Buildup) -> Vec<(usize, usiz
     values.filter_map(|(i, v)| Some((i, index(v)?))).collect()
 }
 
-/// Deviations of the derivatives that move a simulation.
-struct OfDerivatives {
-    deviations: Deviations,
-    /// Each direction by the derivatives' places in the build-up.
-    named: Vec<Vec<(usize, f64)>>,
-}
-
-impl OfDerivatives {
-    /// Deviations by a posterior; `None` where it knows no derivative of the axis.
-    fn of(posterior: &LocalPosterior, buildup: &Buildup) -> Option<OfDerivatives> {
-        let known = moving(posterior, buildup);
-        if known.is_empty() {
-            return None;
-        }
-        let deviations = Deviations::of(&DMatrix::from_fn(known.len(), known.len(), |i, j| {
-            posterior.covariance[(known[i].0, known[j].0)]
-        }));
-        let named = |direction: &DVector<f64>| {
-            let pairs = known.iter().zip(direction.iter());
-            pairs
-                .map(|((_, derivative), by)| (*derivative, *by))
-                .collect()
-        };
-        Some(OfDerivatives {
-            named: deviations.directions.iter().map(named).collect(),
-            deviations,
-        })
-    }
-
-    /// Deviation of one derivative in a draw.
-    fn drawn(&self, derivative: usize, deviates: &[f64]) -> f64 {
-        let both = self.named.iter().zip(deviates);
-        let own = both.map(|(direction, deviate)| {
-            let own = direction.iter().find(|(i, _)| *i == derivative);
-            own.map_or(0.0, |(_, by)| by * deviate)
-        });
-        own.sum()
-    }
-}
-
 /// Parameters of a start that an axis determines.
 fn start_parameters(axis: Axis) -> [usize; 7] {
     // α, airspeed, q, θ with CN, Cm, CA; β, p, r, φ with CY, Cl, Cn.
@@ -241,30 +191,12 @@ fn start_parameters(axis: Axis) -> [usize; 7] {
     }
 }
 
-/// Errors of a start in the axis's own parameters, from the covariance of all.
-#[must_use]
-pub fn start_errors(covariance: &DMatrix<f64>, axis: Axis) -> Deviations {
-    let own = start_parameters(axis);
-    Deviations::of(&DMatrix::from_fn(own.len(), own.len(), |i, j| {
-        covariance[(own[i], own[j])]
-    }))
+/// Covariance of the quantities at some places.
+fn of_places(covariance: &DMatrix<f64>, places: &[usize]) -> DMatrix<f64> {
+    covariance.select_rows(places).select_columns(places)
 }
 
-/// Difference of two runs; after a departure the last one stays.
-fn difference(run: &FreeRun, mean: &FreeRun) -> Histories {
-    std::array::from_fn(|i| {
-        let mut last = 0.0;
-        let at = |(k, mean): (usize, &Outputs)| {
-            if let Some(own) = run.outputs.get(k) {
-                last = own[i] - mean[i];
-            }
-            last
-        };
-        mean.outputs.iter().enumerate().map(at).collect()
-    })
-}
-
-impl Effects {
+impl Repeats {
     /// Probabilities that a repeat flight meets the tolerances, when a model's simulation predicts it. A
     /// run that departs meets none.
     #[must_use]
@@ -293,7 +225,7 @@ impl Effects {
             ))
         });
         let repeat = Repeat {
-            effects: self,
+            repeats: self,
             judged,
             limits: limits.collect(),
             simulated,
@@ -318,12 +250,12 @@ impl Effects {
     }
 
     /// Drawn differences of one output at every `stride`-th sample.
-    fn drawn(&self, bias: &Histories, deviates: &[f64], output: usize) -> Vec<f64> {
+    fn drawn(&self, bias: &Histories, deviations: &[f64], output: usize) -> Vec<f64> {
         let mut drawn = bias[output].clone();
         Arch::new().dispatch(|| {
-            for (effect, deviate) in self.effects.iter().zip(deviates) {
-                for (sum, effect) in drawn.iter_mut().zip(&effect[output]) {
-                    *sum += deviate * effect;
+            for (slopes, deviation) in self.slopes.iter().zip(deviations) {
+                for (sum, slope) in drawn.iter_mut().zip(&slopes[output]) {
+                    *sum += deviation * slope;
                 }
             }
         });
@@ -333,7 +265,7 @@ impl Effects {
 
 /// Repeat flights that one model's simulation predicts.
 struct Repeat<'a> {
-    effects: &'a Effects,
+    repeats: &'a Repeats,
     judged: &'a [Judged<'a>],
     /// Limits of each tolerance; `None` for one of the Dutch roll.
     limits: Vec<Option<SampleLimits>>,
@@ -344,11 +276,11 @@ struct Repeat<'a> {
 impl Repeat<'_> {
     /// Probabilities of one aircraft and start, over the sensors' noise.
     fn probabilities(&self, draw: &Draw) -> Probabilities {
-        let effects = self.effects;
+        let repeats = self.repeats;
         let inside = |(own, limits): (&Judged, &Option<SampleLimits>)| match limits {
             None => f64::from(u8::from(self.meets(draw.dutch_roll, &own.tolerance))),
             Some(limits) => {
-                limits.inside(&effects.drawn(&self.bias, &draw.deviates, limits.output))
+                limits.inside(&repeats.drawn(&self.bias, &draw.deviations, limits.output))
             }
         };
         let tolerances: Vec<f64> = self.judged.iter().zip(&self.limits).map(inside).collect();

@@ -8,8 +8,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::aerodynamics::{AboutTrim, COEFFICIENTS, Flow, Trim};
-use super::free_run::{STATES, Simulation, Start};
-use super::outputs::{COUNT, Outputs};
+use super::free_run::{FreeRun, STATES, Simulation, Start};
+use super::linear_run::{LinearRun, Parameter};
+use super::outputs::COUNT;
+use super::recording::Recording;
 use crate::dynamics::{Equations, Lateral, Longitudinal, Motion};
 use crate::earth::air;
 use crate::numerics::symmetric;
@@ -22,11 +24,6 @@ pub const PARAMETERS: usize = STATES + COEFFICIENTS;
 /// its start.
 const ITERATIONS: usize = 3;
 
-/// Steps of the differences, in the order of the parameters.
-const STEPS: [f64; PARAMETERS] = [
-    1e-4, 1e-4, 1e-1, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4,
-];
-
 /// Matched start with the covariance of its parameters.
 #[derive(Clone, Debug)]
 pub struct MatchedStart {
@@ -38,19 +35,23 @@ pub struct MatchedStart {
 /// Matches initial state and trim of a simulation.
 #[must_use]
 pub fn matched(simulation: &Simulation) -> MatchedStart {
+    let recording = simulation.recording;
     let mut start = as_measured(simulation);
-    let Some(slopes) = Slopes::of(simulation, &start) else {
+    let Some((slopes, mut computed)) = Slopes::of(simulation, &start) else {
         return MatchedStart {
             start,
             covariance: None,
         };
     };
-    for _ in 0..ITERATIONS {
-        let Some(step) = slopes.step(simulation, &start) else {
+    for left in (0..ITERATIONS).rev() {
+        let Some(step) = slopes.step(recording, &computed) else {
             break;
         };
         for (parameter, by) in step.iter().enumerate() {
             start = start.moved(parameter, *by);
+        }
+        if left > 0 {
+            computed = simulation.fly(&start, recording.trim_samples, 1);
         }
     }
     MatchedStart {
@@ -67,49 +68,44 @@ struct Slopes {
 }
 
 impl Slopes {
-    /// Slopes by differences; `None` where the samples do not determine all parameters.
-    fn of(simulation: &Simulation, start: &Start) -> Option<Slopes> {
+    /// Slopes, with the run at the start; `None` where the simulated aircraft departs or the samples do not
+    /// determine all parameters.
+    fn of(simulation: &Simulation, start: &Start) -> Option<(Slopes, FreeRun)> {
         let recording = simulation.recording;
-        let computed = trim_run(simulation, start)?;
-        let moved: Option<Vec<Vec<Outputs>>> = (0..PARAMETERS)
-            .map(|parameter| trim_run(simulation, &start.moved(parameter, STEPS[parameter])))
-            .collect();
-        let moved = moved?;
+        let parameters: [Parameter; PARAMETERS] = std::array::from_fn(Parameter::Start);
+        let LinearRun { run, slopes } =
+            simulation.fly_with_slopes((start, &parameters), (recording.trim_samples, 1));
+        if run.has_departed {
+            return None;
+        }
         let mut information = DMatrix::zeros(PARAMETERS, PARAMETERS);
         let mut rows = Vec::with_capacity(recording.trim_samples * COUNT);
         for sample in 0..recording.trim_samples {
             for output in (0..COUNT).filter(|output| !recording.repaired[sample][*output]) {
-                let slopes = DVector::from_fn(PARAMETERS, |parameter, _| {
-                    let change = moved[parameter][sample][output] - computed[sample][output];
-                    change / (STEPS[parameter] * recording.noise[output])
-                });
-                information.ger(1.0, &slopes, &slopes, 1.0);
-                rows.push((sample, output, slopes));
+                let own = slopes.iter().map(|slopes| slopes[output][sample]);
+                let own = DVector::from_iterator(PARAMETERS, own) / recording.noise[output];
+                information.ger(1.0, &own, &own, 1.0);
+                rows.push((sample, output, own));
             }
         }
         let covariance = symmetric::inverse(&information)?;
-        Some(Slopes { rows, covariance })
+        Some((Slopes { rows, covariance }, run))
     }
 
-    /// Step of Gauss and Newton; `None` where it is not finite.
-    fn step(&self, simulation: &Simulation, start: &Start) -> Option<DVector<f64>> {
-        let recording = simulation.recording;
-        let computed = trim_run(simulation, start)?;
+    /// Step of Gauss and Newton; `None` where the aircraft departs or the step is not finite.
+    fn step(&self, recording: &Recording, computed: &FreeRun) -> Option<DVector<f64>> {
+        if computed.has_departed {
+            return None;
+        }
         let mut gradient = DVector::zeros(PARAMETERS);
         for (sample, output, slopes) in &self.rows {
-            let residual = recording.measured[*sample][*output] - computed[*sample][*output];
+            let residual =
+                recording.measured[*sample][*output] - computed.outputs[*sample][*output];
             gradient.axpy(residual / recording.noise[*output], slopes, 1.0);
         }
         let step = &self.covariance * gradient;
         step.iter().all(|s| s.is_finite()).then_some(step)
     }
-}
-
-/// Outputs over the trim; `None` where the simulated aircraft departs.
-fn trim_run(simulation: &Simulation, start: &Start) -> Option<Vec<Outputs>> {
-    let samples = simulation.recording.trim_samples;
-    let run = simulation.fly(start, samples, 1);
-    (!run.has_departed).then_some(run.outputs)
 }
 
 /// State on straight lines through the measured one, and coefficients that the measured motion

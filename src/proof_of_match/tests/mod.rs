@@ -6,5 +6,6 @@ mod fixture;
 mod free_run;
 mod judgement;
 mod lag;
+mod linear_run;
 mod repeat_flight;
 mod wrong_models;

@@ -1,0 +1,280 @@
+//! A free run with the slopes of its outputs along its start and the derivatives of its model.
+//!
+//! The slopes are those of the discrete run: each stage of a step is differentiated at the state where its
+//! rate was taken. All parameters advance together, side by side in the lanes of vectors, along one run.
+#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
+
+use std::array::from_fn;
+
+use pulp::{Arch, Simd, WithSimd};
+
+use super::aerodynamics::COEFFICIENTS;
+use super::free_run::{Companion, FreeRun, RunEquations, STATES, Simulation, Start};
+use super::load_changes::LoadSlopes;
+use super::outputs::COUNT;
+use crate::numerics::lanes::Lanes;
+use crate::numerics::runge_kutta::{self, STAGES};
+use crate::numerics::simd::{AlignedBuffer, VECTOR};
+use crate::rigid_body::{
+    AirSlopes, BodySlopes, BodyState, CHANGING, Instant, ReadingSlopes, StateChange,
+};
+
+/// Parameter of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Parameter {
+    /// Place among the states of the start, and after them the coefficients at its trim.
+    Start(usize),
+    /// Place of a derivative in the build-up; it is raised alike at every angle of attack.
+    Derivative(usize),
+}
+
+/// History of each output.
+pub type Histories = [Vec<f64>; COUNT];
+
+/// A run with the slopes of its outputs along parameters.
+#[derive(Clone, Debug)]
+pub struct LinearRun {
+    pub run: FreeRun,
+    /// In the order of the parameters, up to a departure.
+    pub slopes: Vec<Histories>,
+}
+
+impl Simulation<'_> {
+    /// Flies the first `samples` samples, every `stride`-th of which is a step, with the slopes along
+    /// parameters.
+    #[must_use]
+    pub fn fly_with_slopes(
+        &self,
+        (start, parameters): (&Start, &[Parameter]),
+        (samples, stride): (usize, usize),
+    ) -> LinearRun {
+        let step_s = stride as f64 * self.recording.step_s;
+        let mut slopes = RunSlopes::new(self, (start, parameters), step_s);
+        let run = self.fly_with(start, (samples, stride), &mut slopes);
+        LinearRun {
+            run,
+            slopes: slopes.histories,
+        }
+    }
+}
+
+/// Slopes along a run, as far as it has come.
+struct RunSlopes<'a> {
+    simulation: &'a Simulation<'a>,
+    parameters: &'a [Parameter],
+    /// Coefficient that each parameter changes by itself.
+    coefficients: Vec<Option<usize>>,
+    step_s: f64,
+    stages: [Option<StageSlopes>; STAGES],
+    /// Change of the coefficients by the parameters themselves at each stage: coefficient by coefficient, each
+    /// parameter.
+    own: [AlignedBuffer; STAGES],
+    /// Slopes of the state: state by state, each parameter.
+    states: AlignedBuffer,
+    /// Number of the parameters, padded to whole vectors.
+    width: usize,
+    histories: Vec<Histories>,
+}
+
+/// Slopes of the equations at a stage.
+#[derive(Clone, Copy, Debug)]
+struct StageSlopes {
+    air: AirSlopes,
+    loads: LoadSlopes,
+    body: BodySlopes,
+}
+
+impl<'a> RunSlopes<'a> {
+    fn new(
+        simulation: &'a Simulation<'a>,
+        (start, parameters): (&Start, &'a [Parameter]),
+        step_s: f64,
+    ) -> RunSlopes<'a> {
+        let width = parameters.len().next_multiple_of(VECTOR);
+        let mut states = AlignedBuffer::zeros(CHANGING * width);
+        for (column, parameter) in parameters.iter().enumerate() {
+            if let Parameter::Start(place @ 0..STATES) = parameter {
+                for (state, slope) in start.slopes(*place).into_iter().enumerate() {
+                    states.slice_mut()[state * width + column] = slope;
+                }
+            }
+        }
+        let coefficient = |parameter: &Parameter| match parameter {
+            Parameter::Start(place) => place.checked_sub(STATES),
+            Parameter::Derivative(place) => Some(simulation.aerodynamics.coefficient(*place)),
+        };
+        RunSlopes {
+            simulation,
+            parameters,
+            coefficients: parameters.iter().map(coefficient).collect(),
+            step_s,
+            stages: [None; STAGES],
+            own: from_fn(|_| AlignedBuffer::zeros(COEFFICIENTS * width)),
+            states,
+            width,
+            histories: vec![[const { Vec::new() }; COUNT]; parameters.len()],
+        }
+    }
+}
+
+impl Companion for RunSlopes<'_> {
+    fn at_stage(&mut self, stage: usize, instant: &Instant, at: (&mut RunEquations, usize)) {
+        let (equations, point) = at;
+        let inputs = self.simulation.recording.inputs(point);
+        let (loads, by_derivative) = equations.load_slopes(instant, point);
+        self.stages[stage] = Some(StageSlopes {
+            air: AirSlopes::new(&instant.state, &instant.air),
+            loads,
+            body: BodySlopes::new(
+                &instant.state,
+                &inputs.mass,
+                inputs.engine_momentum,
+                inputs.gravity_ft_s2,
+            ),
+        });
+        let own = self.own[stage].slice_mut();
+        let parameters = self.parameters.iter().zip(&self.coefficients);
+        for (column, (parameter, coefficient)) in parameters.enumerate() {
+            if let Some(coefficient) = coefficient {
+                own[coefficient * self.width + column] = match parameter {
+                    Parameter::Start(_) => 1.0,
+                    Parameter::Derivative(place) => by_derivative[*place],
+                };
+            }
+        }
+    }
+
+    fn at_sample(&mut self, instant: &Instant) {
+        let Some(stage) = self.stages[0] else {
+            return;
+        };
+        let mut outputs = AlignedBuffer::zeros(COUNT * self.width);
+        Arch::new().dispatch(Read {
+            readings: &ReadingSlopes::new(instant, self.simulation.aircraft),
+            stage: &stage,
+            own: self.own[0].slice(),
+            states: self.states.slice(),
+            width: self.width,
+            outputs: outputs.slice_mut(),
+        });
+        for (column, histories) in self.histories.iter_mut().enumerate() {
+            for (output, history) in histories.iter_mut().enumerate() {
+                history.push(outputs.slice()[output * self.width + column]);
+            }
+        }
+    }
+
+    fn after_step(&mut self, end: &BodyState) {
+        let [Some(a), Some(b), Some(c), Some(d)] = self.stages else {
+            return;
+        };
+        Arch::new().dispatch(Advance {
+            stages: &[a, b, c, d],
+            own: from_fn(|stage| self.own[stage].slice()),
+            end: end.attitude.coords.into(),
+            step_s: self.step_s,
+            width: self.width,
+            states: self.states.slice_mut(),
+        });
+    }
+}
+
+/// Changes of states and coefficients of some parameters, from buffers whose rows have `width`.
+#[inline(always)]
+fn load<S: Simd, const N: usize>(
+    simd: S,
+    rows: &[f64],
+    width: usize,
+    column: usize,
+) -> [Lanes<S>; N] {
+    from_fn(|row| Lanes::load(simd, rows, row * width + column))
+}
+
+impl StageSlopes {
+    /// Change of the state's rate, and of the force.
+    #[inline(always)]
+    fn rate<S: Simd>(
+        &self,
+        state: &StateChange<S>,
+        own: &[Lanes<S>; COEFFICIENTS],
+    ) -> (StateChange<S>, [Lanes<S>; 3]) {
+        let air = self.air.change(state);
+        let loads = self.loads.change(&self.body, state, &air, own);
+        let rate = self.body.change(state, &loads.force, &loads.moment);
+        (rate, loads.force)
+    }
+}
+
+/// Slopes of the outputs at a sample.
+struct Read<'a> {
+    readings: &'a ReadingSlopes,
+    stage: &'a StageSlopes,
+    own: &'a [f64],
+    states: &'a [f64],
+    width: usize,
+    /// Output by output, each parameter.
+    outputs: &'a mut [f64],
+}
+
+impl WithSimd for Read<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        for column in (0..self.width).step_by(S::F64_LANES) {
+            let state = StateChange(load(simd, self.states, self.width, column));
+            let own = load(simd, self.own, self.width, column);
+            let (rate, force) = self.stage.rate(&state, &own);
+            let air = self.stage.air.change(&state);
+            let read = self.readings.change(&state, &rate, &air, &force);
+            let [p, q, r] = read.rates_deg_s;
+            let [phi, theta] = read.euler_deg;
+            let outputs: [Lanes<S>; COUNT] = [
+                read.alpha_vane_deg,
+                read.beta_vane_deg,
+                air.velocity,
+                p,
+                q,
+                r,
+                theta,
+                phi,
+                read.an_g,
+                read.ax_g,
+                read.ay_g,
+            ];
+            for (output, value) in outputs.into_iter().enumerate() {
+                value.store(self.outputs, output * self.width + column);
+            }
+        }
+    }
+}
+
+/// Slopes of the state after a step.
+struct Advance<'a> {
+    stages: &'a [StageSlopes; STAGES],
+    own: [&'a [f64]; STAGES],
+    /// Attitude at the end, before it is normalised.
+    end: [f64; 4],
+    step_s: f64,
+    width: usize,
+    states: &'a mut [f64],
+}
+
+impl WithSimd for Advance<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        for column in (0..self.width).step_by(S::F64_LANES) {
+            let state = StateChange(load(simd, self.states, self.width, column));
+            let rate = |stage: usize, at: &StateChange<S>| {
+                let own = load(simd, self.own[stage], self.width, column);
+                self.stages[stage].rate(at, &own).0
+            };
+            let end = runge_kutta::step(&state, self.step_s, rate, StateChange::plus);
+            for (row, value) in end.normalised(&self.end).0.into_iter().enumerate() {
+                value.store(self.states, row * self.width + column);
+            }
+        }
+    }
+}

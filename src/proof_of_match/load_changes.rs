@@ -1,0 +1,138 @@
+//! Changes of the aerodynamic force and moment to first order.
+#![expect(
+    clippy::inline_always,
+    reason = "compiled into free runs for the processor at hand"
+)]
+
+use std::array::from_fn;
+
+use pulp::Simd;
+
+use super::aerodynamics::{Aerodynamics, COEFFICIENTS, FORCE, Flow, FlowSlopes, MOMENT};
+use crate::numerics::lanes::{Lanes, combination};
+use crate::rigid_body::{AirChange, BodySlopes, Instant, StateChange};
+use crate::units::DEG;
+
+/// Changes of force and moment.
+#[derive(Clone, Copy)]
+pub struct LoadsChange<S: Simd> {
+    pub force: [Lanes<S>; 3],
+    pub moment: [Lanes<S>; 3],
+}
+
+/// Slopes of the aerodynamic loads at an instant.
+#[derive(Clone, Copy, Debug)]
+pub struct LoadSlopes {
+    /// Slopes of the coefficients, along angles in rad and relative changes of dynamic pressure.
+    coefficients: [FlowSlopes; COEFFICIENTS],
+    /// Aerodynamic force and moment, to which dynamic pressure is a factor.
+    force: [f64; 3],
+    moment: [f64; 3],
+    /// Slopes of force and moment along their own coefficients.
+    force_by_own: [f64; 3],
+    moment_by_own: [f64; 3],
+    lag: Option<Lag>,
+}
+
+/// Slopes of α̇ where the loads depend on it, so that it depends on itself.
+#[derive(Clone, Copy, Debug)]
+struct Lag {
+    by_velocity: [f64; 3],
+    /// Along the accelerations at a constant α̇.
+    by_acceleration: [f64; 3],
+    /// Slopes of force and moment along α̇.
+    force: [f64; 3],
+    moment: [f64; 3],
+}
+
+impl LoadSlopes {
+    /// Slopes of the loads by the coefficients and their slopes along the flow.
+    #[must_use]
+    pub fn new(
+        aerodynamics: &Aerodynamics,
+        instant: &Instant,
+        coefficients: &[f64; COEFFICIENTS],
+        mut by_flow: [FlowSlopes; COEFFICIENTS],
+        has_lag: bool,
+    ) -> LoadSlopes {
+        let qbar = instant.air.qbar_psf;
+        let area = qbar * aerodynamics.area();
+        let (force, moment) = aerodynamics.loads(coefficients, qbar);
+        for slopes in &mut by_flow {
+            slopes[Flow::ALPHA] *= DEG;
+            slopes[Flow::BETA] *= DEG;
+            slopes[Flow::QBAR] *= qbar;
+        }
+        let mut slopes = LoadSlopes {
+            coefficients: by_flow,
+            force: force.into(),
+            moment: moment.into(),
+            force_by_own: FORCE.map(|(_, sign)| sign * area),
+            moment_by_own: aerodynamics.lengths().map(|length| length * area),
+            lag: None,
+        };
+        slopes.lag = has_lag.then(|| slopes.lag(instant));
+        slopes
+    }
+
+    /// α̇ = (u ẇ − w u̇)/(u² + w²), in which ẇ and u̇ are straight lines in α̇.
+    fn lag(&self, instant: &Instant) -> Lag {
+        let along = |i: usize| self.coefficients[i][Flow::ALPHA_RATE];
+        let force: [f64; 3] = from_fn(|i| self.force_by_own[i] * along(FORCE[i].0));
+        let moment = from_fn(|i| self.moment_by_own[i] * along(MOMENT[i]));
+        let [u, _, w]: [f64; 3] = instant.state.velocity.into();
+        let [u_rate, _, w_rate]: [f64; 3] = instant.rate.velocity.into();
+        let per_square = 1.0 / (u * u + w * w);
+        let alpha_rate = (u * w_rate - w * u_rate) * per_square;
+        let own = (u * force[2] - w * force[0]) * per_square / instant.loading.mass_slug;
+        let per_balance = per_square / (1.0 - own);
+        Lag {
+            by_velocity: [
+                (w_rate - 2.0 * alpha_rate * u) * per_balance,
+                0.0,
+                (-u_rate - 2.0 * alpha_rate * w) * per_balance,
+            ],
+            by_acceleration: [-w * per_balance, 0.0, u * per_balance],
+            force,
+            moment,
+        }
+    }
+
+    /// Change of the loads with the state, and with the coefficients themselves.
+    #[inline(always)]
+    pub fn change<S: Simd>(
+        &self,
+        body: &BodySlopes,
+        state: &StateChange<S>,
+        air: &AirChange<S>,
+        own: &[Lanes<S>; COEFFICIENTS],
+    ) -> LoadsChange<S> {
+        let [p, q, r] = state.rates();
+        let flow = [air.alpha, air.beta, air.velocity, air.mach, p, q, r];
+        let coefficients: [Lanes<S>; COEFFICIENTS] = from_fn(|i| {
+            let slopes = &self.coefficients[i];
+            let along_flow = combination(&from_fn(|n| slopes[n]), &flow);
+            own[i] + along_flow.plus(slopes[Flow::QBAR], air.relative_qbar)
+        });
+        let mut loads = LoadsChange {
+            force: from_fn(|i| {
+                let own = coefficients[FORCE[i].0] * self.force_by_own[i];
+                own.plus(self.force[i], air.relative_qbar)
+            }),
+            moment: from_fn(|i| {
+                let own = coefficients[MOMENT[i]] * self.moment_by_own[i];
+                own.plus(self.moment[i], air.relative_qbar)
+            }),
+        };
+        if let Some(lag) = &self.lag {
+            let rate = body.change(state, &loads.force, &loads.moment);
+            let alpha_rate = combination(&lag.by_velocity, &state.velocity())
+                + combination(&lag.by_acceleration, &rate.velocity());
+            for i in 0..3 {
+                loads.force[i] = loads.force[i].plus(lag.force[i], alpha_rate);
+                loads.moment[i] = loads.moment[i].plus(lag.moment[i], alpha_rate);
+            }
+        }
+        loads
+    }
+}
