@@ -22,9 +22,13 @@ pub(super) fn read(
     let error = |line: Option<usize>, what: String| Error::config(path, line, what);
     let mut tunnel = WindTunnel::new(settings.clone());
     let mut read = RowsRead::default();
+    let derivatives = buildup.derivatives.iter();
+    let derivatives: BTreeMap<String, &Derivative> = derivatives
+        .map(|d| (wind_tunnel::key(&d.name), d))
+        .collect();
     for (line, mut row) in tunnel_rows(path, buildup, settings)? {
-        check_numbers(&row)
-            .and_then(|()| convert(&mut row, buildup))
+        check(&row)
+            .and_then(|()| convert(&mut row, &derivatives))
             .and_then(|()| read.add(line, &row))
             .map_err(|what| error(Some(line), what))?;
         tunnel.insert_at(&row.derivative, row.third, row.point());
@@ -72,9 +76,16 @@ pub(crate) fn tunnel_rows(
     })
 }
 
-/// Refuses a row whose numbers are none, or none that a tunnel can have.
-fn check_numbers(row: &TunnelRow) -> std::result::Result<(), String> {
+/// Longest name of a derivative, bytes.
+const LONGEST_NAME: usize = 200;
+
+/// Refuses a row whose name is too long, or whose numbers are none or none that a tunnel can have.
+fn check(row: &TunnelRow) -> std::result::Result<(), String> {
     let name = &row.derivative;
+    if name.len() > LONGEST_NAME {
+        let length = name.len();
+        return Err(format!("the name of a derivative has {length} characters"));
+    }
     let numbers = [
         Some(row.alpha_deg),
         Some(row.value),
@@ -101,10 +112,11 @@ fn check_numbers(row: &TunnelRow) -> std::result::Result<(), String> {
 
 /// Converts value and uncertainty of a row into the unit of the model's derivative. A row of a sum, or of a
 /// derivative that the model lacks, stays as written.
-fn convert(row: &mut TunnelRow, buildup: &Buildup) -> std::result::Result<(), String> {
-    let key = wind_tunnel::key(&row.derivative);
-    let mut derivatives = buildup.derivatives.iter();
-    let Some(derivative) = derivatives.find(|d| wind_tunnel::key(&d.name) == key) else {
+fn convert(
+    row: &mut TunnelRow,
+    derivatives: &BTreeMap<String, &Derivative>,
+) -> std::result::Result<(), String> {
+    let Some(derivative) = derivatives.get(&wind_tunnel::key(&row.derivative)) else {
         return Ok(());
     };
     let factor = derivative
@@ -146,6 +158,9 @@ struct FirstLine {
     written: String,
 }
 
+/// Most derivatives of a tunnel's tables; a model has some hundred.
+const MOST_NAMES: usize = 10_000;
+
 /// Rows of the tunnel read so far. Each point stands once, and all rows of a derivative have the same
 /// variables.
 #[derive(Default)]
@@ -165,6 +180,11 @@ impl RowsRead {
                 line,
                 written: row.derivative.clone(),
             });
+        if self.first_lines.len() > MOST_NAMES {
+            return Err(format!(
+                "these are more than {MOST_NAMES} derivatives: a row is one derivative at one angle of attack"
+            ));
+        }
         let given = Variables {
             mach: row.mach.is_some(),
             third: row.third.is_some(),

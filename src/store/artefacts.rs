@@ -17,6 +17,7 @@ use super::fingerprint::{Digest, sealed, unsealed};
 use super::in_work::{InWorkList, Listed};
 use super::input_digests::InputDigests;
 use super::lock::Lock;
+use super::regular;
 use super::shared::Shared;
 use crate::error::{Error, Result};
 
@@ -161,7 +162,7 @@ impl Store {
     pub fn load<T: DeserializeOwned>(&self, name: &ArtefactName) -> Option<T> {
         let parse = |bytes: &[u8]| serde_json::from_slice(unsealed(name.as_str(), bytes)?).ok();
         let path = self.path(name);
-        if let Some(artefact) = std::fs::read(&path).ok().and_then(|bytes| parse(&bytes)) {
+        if let Some(artefact) = regular::read(&path).ok().and_then(|bytes| parse(&bytes)) {
             self.note_present(name);
             return Some(artefact);
         }
@@ -285,7 +286,7 @@ impl Store {
     #[must_use]
     pub fn has_sealed(&self, name: &ArtefactName) -> bool {
         let is_sealed = |bytes: &Vec<u8>| unsealed(name.as_str(), bytes).is_some();
-        if std::fs::read(self.path(name)).is_ok_and(|bytes| is_sealed(&bytes)) {
+        if regular::read(&self.path(name)).is_ok_and(|bytes| is_sealed(&bytes)) {
             self.note_present(name);
             return true;
         }
@@ -350,7 +351,7 @@ impl Store {
     /// exist, so that nothing is removed.
     #[must_use]
     pub fn reports(&self) -> BTreeSet<PathBuf> {
-        let Ok(bytes) = std::fs::read(self.folder.join(REPORTS)) else {
+        let Ok(bytes) = regular::read(&self.folder.join(REPORTS)) else {
             return BTreeSet::new();
         };
         serde_json::from_slice(&bytes)

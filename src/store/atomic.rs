@@ -5,7 +5,7 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use super::Digest;
+use super::{Digest, regular};
 use crate::error::{Error, Result};
 
 /// Prefix of temporary files, by which those of a killed run are found.
@@ -16,7 +16,7 @@ pub const TEMPORARY: &str = ".harvest-";
 /// # Errors
 /// [`Error::Io`] naming the path.
 pub fn place(path: &Path, bytes: &[u8]) -> Result<()> {
-    if fs::read(path).is_ok_and(|present| present == bytes) {
+    if regular::read(path).is_ok_and(|present| present == bytes) {
         return Ok(());
     }
     let mut draft = Draft::of(path)?;
@@ -85,6 +85,21 @@ impl Draft {
         std::io::BufWriter::with_capacity(1 << 20, through)
     }
 
+    /// A handle of the draft for a writer of its own, whose bytes [`Draft::digest`] does not count.
+    ///
+    /// # Errors
+    /// [`Error::Io`]: the system has no further handle.
+    pub fn handle(&self) -> Result<fs::File> {
+        let handle = self.file.as_file().try_clone();
+        handle.map_err(Error::io(&self.path, "cannot write it"))
+    }
+
+    /// Path at which the file is to be.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Digest of the bytes written so far.
     #[must_use]
     pub fn digest(&self) -> Digest {
@@ -106,9 +121,12 @@ impl Draft {
             .as_file()
             .sync_all()
             .map_err(Error::io(&self.path, "cannot write it to the disk"))?;
-        self.file
-            .persist(&self.path)
-            .map_err(|e| Error::io(&self.path, "cannot put it in its place")(e.error))?;
+        let placed = self.file.persist(&self.path).or_else(|e| {
+            // An empty folder in its place is nobody's.
+            let _ = fs::remove_dir(&self.path);
+            e.file.persist(&self.path)
+        });
+        placed.map_err(|e| Error::io(&self.path, "cannot put it in its place")(e.error))?;
         Ok(())
     }
 }

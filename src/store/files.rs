@@ -7,9 +7,9 @@ use std::path::Path;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::{atomic, object};
+use super::{atomic, object, regular};
 use crate::aero::wind_tunnel::TunnelPoint;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, did_you_mean};
 use crate::maneuver::Event;
 use crate::tables::PublishedTrend;
 
@@ -29,28 +29,24 @@ pub fn text(path: &Path) -> Result<String> {
 /// Largest file that is read whole, bytes: a tunnel database of a million rows has a quarter of it.
 const LARGEST: u64 = 1 << 28;
 
+/// Most rows of a table that an analyst wrote: more than any tunnel's.
+const MOST_ROWS: usize = 1_000_000;
+
 /// Reads a file whole.
 ///
 /// # Errors
-/// [`Error::Io`], or [`Error::Config`] for what is no file, such as a pipe, or too large: it may
-/// never end.
+/// [`Error::Io`], also for what is no file, such as a pipe; [`Error::Config`] for a file that is too
+/// large.
 pub(super) fn bytes(path: &Path) -> Result<Vec<u8>> {
     let unreadable = |cause| Error::io(path, "cannot read it")(cause);
-    let metadata = std::fs::metadata(path).map_err(unreadable)?;
-    let refused = |what: &str| Err(Error::config(path, None, what));
-    if metadata.is_dir() {
-        return refused("it is a folder, not a file");
-    }
-    if !metadata.is_file() {
-        return refused("it is no regular file but a device or a pipe, which may never end");
-    }
+    let file = regular::open(path).map_err(unreadable)?;
     let mut bytes = Vec::new();
-    let file = std::fs::File::open(path).map_err(unreadable)?;
     file.take(LARGEST + 1)
         .read_to_end(&mut bytes)
         .map_err(unreadable)?;
     if bytes.len() as u64 > LARGEST {
-        return refused("it is larger than 268 MB, more than any such file has");
+        let what = "it is larger than 268 MB, more than any such file has";
+        return Err(Error::config(path, None, what));
     }
     Ok(bytes)
 }
@@ -163,7 +159,7 @@ impl TunnelRow {
 /// # Errors
 /// [`Error::Config`] naming file, line and column of what cannot be read.
 pub fn events(path: &Path) -> Result<Vec<(usize, Event)>> {
-    rows(path)
+    written(path, &["flight_id", "class", "start_s", "end_s"])
 }
 
 /// Reads the rows of a published CSV. Columns that the row type lacks are ignored.
@@ -171,7 +167,8 @@ pub fn events(path: &Path) -> Result<Vec<(usize, Event)>> {
 /// # Errors
 /// [`Error::Io`] or [`Error::Config`] naming the file, and line and column of what cannot be read.
 pub fn published<T: DeserializeOwned>(folder: &Path, table: &str) -> Result<Vec<T>> {
-    Ok(rows(&folder.join(format!("{table}.csv")))?
+    let path = folder.join(format!("{table}.csv"));
+    Ok(rows(&path, &text(&path)?)?
         .into_iter()
         .map(|(_, row)| row)
         .collect())
@@ -230,6 +227,16 @@ pub fn place_rows<T: Serialize>(path: &Path, rows: &[T]) -> Result<()> {
     atomic::place(path, &bytes)
 }
 
+/// Fault of a field in words.
+fn fault(error: &csv::DeserializeError, value: &str) -> String {
+    let point = value.replace(',', ".");
+    if value.contains(',') && point.trim().parse::<f64>().is_ok() {
+        format!("`{value}` has a decimal comma; write `{point}`")
+    } else {
+        error.kind().to_string()
+    }
+}
+
 /// Form of a text that is no CSV, in words; `None` for a CSV.
 fn other_form(text: &str) -> Option<&'static str> {
     let header = text.lines().find(|line| !line.trim().is_empty());
@@ -250,9 +257,46 @@ fn other_form(text: &str) -> Option<&'static str> {
     }
 }
 
-pub(super) fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<(usize, T)>> {
+/// Reads the rows of a CSV that an analyst wrote and that needs some columns, each with its line number.
+///
+/// # Errors
+/// [`Error::Io`], or [`Error::Config`] naming the file, and line and column of what cannot be read.
+pub(super) fn written<T: DeserializeOwned>(
+    path: &Path,
+    columns: &[&str],
+) -> Result<Vec<(usize, T)>> {
     let content = text(path)?;
-    if let Some(what) = other_form(&content) {
+    if content.bytes().filter(|byte| *byte == b'\n').count() > MOST_ROWS {
+        let what = format!("it has more than {MOST_ROWS} lines");
+        return Err(Error::config(path, None, what));
+    }
+    if let Some(what) = lacking(&content, columns) {
+        return Err(Error::config(path, Some(1), what));
+    }
+    rows(path, &content)
+}
+
+/// Message for a text whose first line lacks a column; `None` where it has all, or is no CSV.
+fn lacking(text: &str, columns: &[&str]) -> Option<String> {
+    if other_form(text).is_some() {
+        return None;
+    }
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .from_reader(text.as_bytes());
+    let header = reader.headers().ok()?;
+    let column = columns
+        .iter()
+        .find(|name| !header.iter().any(|own| own == **name))?;
+    let near = did_you_mean(column, header.iter());
+    Some(format!(
+        "no column `{column}`{near}: the first line names the columns, among them {}",
+        columns.join(", ")
+    ))
+}
+
+fn rows<T: DeserializeOwned>(path: &Path, content: &str) -> Result<Vec<(usize, T)>> {
+    if let Some(what) = other_form(content) {
         return Err(Error::config(path, None, what));
     }
     let mut reader = csv::ReaderBuilder::new()
@@ -273,8 +317,8 @@ pub(super) fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<(usize, T)>> 
                     csv::ErrorKind::Deserialize { err, .. } => {
                         let field = err.field().and_then(|f| usize::try_from(f).ok());
                         field
-                            .and_then(|f| header.get(f))
-                            .map(|name| format!("column `{name}`: {}", err.kind()))
+                            .and_then(|f| Some((header.get(f)?, record.get(f)?)))
+                            .map(|(name, value)| format!("column `{name}`: {}", fault(err, value)))
                     }
                     _ => None,
                 };
@@ -290,6 +334,28 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_decimal_comma_and_too_many_rows_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("events.csv");
+        let header = "flight_id,class,start_s,end_s\n";
+        let error = |rows: &str| {
+            std::fs::write(&path, format!("{header}{rows}")).unwrap();
+            events(&path).unwrap_err().to_string()
+        };
+        let comma = error("f,A,\"11,5\",20\n");
+        let wanted = ":2: column `start_s`: `11,5` has a decimal comma; write `11.5`";
+        assert!(comma.ends_with(wanted), "{comma}");
+        std::fs::write(&path, "f,A,11.5,20\n").unwrap();
+        let error_without = events(&path).unwrap_err().to_string();
+        assert!(
+            error_without.contains(":1: no column `flight_id`"),
+            "{error_without}"
+        );
+        let many = error(&"f,A,1,2\n".repeat(1_000_001));
+        assert!(many.ends_with("it has more than 1000000 lines"), "{many}");
+    }
+
+    #[test]
     fn a_text_of_another_form_is_named_as_that() {
         let form = |text: &str| other_form(text).unwrap_or_default();
         assert!(form("").contains("is empty") && form(" \n\n").contains("is empty"));
@@ -297,20 +363,5 @@ mod tests {
         assert!(form("flight_id\tstart_s").contains("tabs"));
         assert_eq!(other_form("flight_id,start_s"), None);
         assert_eq!(other_form("flight_id"), None);
-    }
-
-    #[cfg(target_os = "linux")]
-    #[test]
-    fn what_may_never_end_is_not_opened() {
-        let folder = tempfile::tempdir().unwrap();
-        let pipe = folder.path().join("pipe");
-        let made = std::process::Command::new("mkfifo").arg(&pipe).status();
-        assert!(made.unwrap().success());
-        for path in [Path::new("/dev/zero"), &pipe] {
-            let error = text(path).unwrap_err().to_string();
-            assert!(error.contains("which may never end"), "{error}");
-        }
-        let error = text(folder.path()).unwrap_err().to_string();
-        assert!(error.ends_with("it is a folder, not a file"), "{error}");
     }
 }

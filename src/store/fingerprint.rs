@@ -7,6 +7,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::regular;
 use crate::error::{Error, Result};
 
 /// Hash over everything that decides a result. Name and version of the method come first: a change
@@ -50,7 +51,7 @@ impl Digest {
     /// # Errors
     /// [`Error::Io`] naming the file.
     pub fn of_file(path: &Path) -> Result<Digest> {
-        let mut file = std::fs::File::open(path).map_err(Error::io(path, "cannot open it"))?;
+        let mut file = regular::open(path).map_err(Error::io(path, "cannot open it"))?;
         Digest::of(&mut file).map_err(Error::io(path, "cannot read it"))
     }
 

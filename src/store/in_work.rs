@@ -9,6 +9,7 @@ use std::time::SystemTime;
 
 use super::lock::Lock;
 use super::log::timestamp;
+use super::regular;
 
 /// File of the list.
 const FILE: &str = "in_work.json";
@@ -76,7 +77,7 @@ impl Drop for Listed<'_> {
 /// Flights that another run has in work; none if no run holds the store.
 #[must_use]
 pub fn in_work(folder: &Path) -> InWork {
-    let list = std::fs::read(folder.join(FILE));
+    let list = regular::read(&folder.join(FILE));
     let list: Option<InWork> = list
         .ok()
         .and_then(|text| serde_json::from_slice(&text).ok());

@@ -18,7 +18,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use serde::{Deserialize, Serialize};
 
 use super::fingerprint::{sealed, unsealed};
-use super::{Digest, atomic, object};
+use super::{Digest, atomic, object, regular};
 use crate::error::Result;
 
 /// Shortest time between the last change of a file and its reading, for its digest to be
@@ -51,7 +51,7 @@ impl InputDigests {
     /// Loads the digests saved at `path`; none from a missing or damaged file.
     #[must_use]
     pub fn load(path: &Path) -> InputDigests {
-        let remembered = std::fs::read(path)
+        let remembered = regular::read(path)
             .ok()
             .and_then(|bytes| serde_json::from_slice(unsealed(SEALED_AS, &bytes)?).ok());
         let remembered = remembered.unwrap_or_default();
@@ -142,7 +142,10 @@ impl InputDigests {
         if !metadata.is_file() {
             return Err(if metadata.is_dir() {
                 let why = std::fs::read_dir(path).err().map_or_else(
-                    || ", or a link to one that is searched already".to_owned(),
+                    || {
+                        ", or a link to one that is searched already or holds the archive"
+                            .to_owned()
+                    },
                     |e| format!(" that cannot be read: {e}"),
                 );
                 format!("is a folder{why}")

@@ -18,9 +18,11 @@ pub mod object;
 pub mod record_file;
 pub mod recorder;
 pub mod recording;
+mod regular;
 mod shared;
 pub mod table;
 pub mod tunnel;
+mod visible_text;
 
 pub use artefact_name::{ArtefactName, Kind};
 pub use artefacts::Store;

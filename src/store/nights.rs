@@ -22,6 +22,7 @@ use super::artefact_name::ArtefactName;
 use super::atomic;
 use super::fingerprint::Digest;
 use super::lock::Lock;
+use super::regular;
 use crate::error::{Error, Problem, Result};
 use crate::lineage::{Lineage, Stage};
 
@@ -147,7 +148,7 @@ impl Nights {
     #[must_use]
     pub fn night(&self, name: &str) -> Option<Night> {
         let night: Night =
-            serde_json::from_slice(&fs::read(self.folder(name).join(MANIFEST)).ok()?).ok()?;
+            serde_json::from_slice(&regular::read(&self.folder(name).join(MANIFEST)).ok()?).ok()?;
         (night.clone().sealed() == night).then_some(night)
     }
 

@@ -11,6 +11,7 @@ use super::atomic::Draft;
 use super::clock_column::is_clock;
 use super::import::tall::Tall;
 use super::recorder::UNIT;
+use super::regular;
 use crate::error::{Error, Result};
 use crate::flight::{Channel, signal};
 use crate::ingest::ColumnSource;
@@ -89,9 +90,11 @@ fn widened(path: &Path) -> Result<Vec<Draft>> {
 
 /// A channel for each column of numbers or times. Times of day count in seconds.
 fn channels(path: &Path) -> Result<BTreeMap<String, Channel>, String> {
-    let file = std::fs::File::open(path).map_err(|e| format!("cannot open the file: {e}"))?;
+    let file = regular::open(path).map_err(|e| format!("cannot open the file: {e}"))?;
     let metadata = ArrowReaderMetadata::load(&file, ArrowReaderOptions::default())
-        .map_err(|e| format!("not a readable Parquet file: {e}"))?;
+        .map_err(|e| {
+            format!("not a readable Parquet file: {e}; `harvest import` makes one of CSV, MATLAB or HDF5")
+        })?;
     let fields = metadata.schema().fields().iter();
     let channel = |field: &arrow::datatypes::FieldRef| {
         let kind = field.data_type();

@@ -11,7 +11,7 @@ use polars::prelude::{
 };
 use serde_json::json;
 
-use super::atomic;
+use super::{atomic, regular, visible_text};
 use crate::error::{Error, Result};
 use crate::schema::{Cells, Column, Row, Table};
 use crate::tables::{ExportRow, FitRow, PredictedRow};
@@ -47,7 +47,7 @@ impl Shelf {
 /// # Errors
 /// [`Error::Io`] or [`Error::Damaged`] naming the file.
 pub fn provenance(path: &Path) -> Result<BTreeMap<String, String>> {
-    let file = std::fs::File::open(path).map_err(Error::io(path, "cannot open the table"))?;
+    let file = regular::open(path).map_err(Error::io(path, "cannot open the table"))?;
     let reader = SerializedFileReader::new(file).map_err(|e| Error::damaged(path, &e))?;
     let pairs = reader
         .metadata()
@@ -147,7 +147,13 @@ fn place(shelf: &Shelf, name: &str, rows: usize, columns: &[Column]) -> Result<(
 fn series(column: &Column) -> Series {
     let name = column.name.as_str().into();
     match &column.cells {
-        Cells::Text(cells) => Series::new(name, cells),
+        Cells::Text(cells) => {
+            let texts: Vec<_> = cells
+                .iter()
+                .map(|text| text.map(visible_text::of))
+                .collect();
+            Series::new(name, texts)
+        }
         Cells::Number(cells) => Series::new(name, cells),
         Cells::Whole(cells) => Series::new(name, cells),
     }
@@ -157,7 +163,11 @@ fn series(column: &Column) -> Series {
 fn series_of_csv(column: &Column) -> Series {
     match &column.cells {
         Cells::Text(cells) => {
-            let texts: Vec<_> = cells.iter().map(|text| text.map(no_formula)).collect();
+            let texts = cells.iter().map(|text| {
+                let text = visible_text::of((*text)?);
+                Some(no_formula(&text).into_owned())
+            });
+            let texts: Vec<Option<String>> = texts.collect();
             Series::new(column.name.as_str().into(), texts)
         }
         _ => series(column),
@@ -249,10 +259,20 @@ mod tests {
             correlation: None,
             verdict: CheckVerdict::NotExcited,
         };
+        publish(&Shelf::of(folder.path()), std::slice::from_ref(&row)).unwrap();
+        let csv = std::fs::read_to_string(folder.path().join("checks.csv")).unwrap();
+        let written = csv.lines().nth(1).unwrap();
+        assert!(
+            written.starts_with("'=1+1,") && written.contains(",-1.5,"),
+            "{written}"
+        );
+        let row = CheckRow {
+            flight_id: "a\u{1}\u{202e}b".into(),
+            ..row
+        };
         publish(&Shelf::of(folder.path()), &[row]).unwrap();
         let csv = std::fs::read_to_string(folder.path().join("checks.csv")).unwrap();
-        let row = csv.lines().nth(1).unwrap();
-        assert!(row.starts_with("'=1+1,") && row.contains(",-1.5,"), "{row}");
+        assert!(csv.lines().nth(1).unwrap().starts_with("a__b,"), "{csv}");
     }
 
     #[test]

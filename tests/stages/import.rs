@@ -288,6 +288,45 @@ fn hdf5_of_other_programs_has_its_units_as_attributes() {
 }
 
 #[test]
+fn references_that_branch_at_every_level_are_refused() {
+    // Each cell array refers ten times to the next one: 10^9 arrays for who follows them all.
+    let folder = tempfile::tempdir().unwrap();
+    shipped(folder.path(), "references.h5");
+    let outcome = import(folder.path(), "references.h5");
+    assert_eq!(outcome.code, Some(1));
+    let wanted = "more than 100000 arrays and structs";
+    assert!(outcome.stderr.contains(wanted), "{}", outcome.stderr);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_pipe_is_refused_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("pipe.csv");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+    assert!(made.unwrap().success());
+    for command in ["import", "init"] {
+        let mut harvest = harvest();
+        match command {
+            "import" => harvest
+                .args(["import"])
+                .arg(&pipe)
+                .arg("--to")
+                .arg(folder.path()),
+            _ => harvest.args(["init", "piped", "--from"]).arg(&pipe),
+        };
+        let outcome = run(&mut harvest);
+        assert_eq!(outcome.code, Some(1), "{command}");
+        let wanted = "which may never end";
+        assert!(
+            outcome.stderr.contains(wanted),
+            "{command}: {}",
+            outcome.stderr
+        );
+    }
+}
+
+#[test]
 fn damaged_hdf5_is_refused_or_read() {
     let folder = tempfile::tempdir().unwrap();
     let mut random = Random::new(23);

@@ -504,6 +504,7 @@ fn init_writes_a_pipeline_whose_questions_check_lists() {
     ] {
         assert!(text.contains(line), "`{line}` is not in\n{text}");
     }
+    let text = text.replace("wing_area_ft2: FILL_IN", "wing_area_ft2: 80");
     fs::write(&aircraft, text.replace("FILL_IN", "10")).unwrap();
     let pipeline = folder.path().join("pipelines/mine/pipeline.yaml");
     let text = fs::read_to_string(&pipeline).unwrap();

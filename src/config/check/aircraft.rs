@@ -14,6 +14,10 @@ use crate::flight::{Channel, StandIn, signal};
 use crate::ingest;
 use crate::units::Unit;
 
+/// Reference chord times span over wing area: one for a rectangle, 4/3 for a triangle. The margins leave room for other
+/// reference chords; lengths in metres for feet make it a third.
+const WING_SHAPES: std::ops::Range<f64> = 0.45..3.0;
+
 /// Checks the numbers of the geometry.
 pub(super) fn geometry(config: &Config, source: &Source) -> Result<()> {
     let a = &config.aircraft;
@@ -26,6 +30,15 @@ pub(super) fn geometry(config: &Config, source: &Source) -> Result<()> {
     ];
     for (key, name, value) in positive {
         numbers::positive(source, key, name, value)?;
+    }
+    let (key, inertia) = ("engine_inertia_slug_ft2", a.engine_inertia_slug_ft2);
+    numbers::not_negative(source, "aircraft", key, inertia)?;
+    let share = a.chord_ft * a.span_ft / a.wing_area_ft2;
+    if !WING_SHAPES.contains(&share) {
+        let what = format!(
+            "`chord_ft` times `span_ft` is {share:.3} of `wing_area_ft2`; wings have 1 to 1.5: is one of them in another unit?"
+        );
+        return Err(source.error_under("aircraft", "chord_ft", what));
     }
     if !(-90.0..=90.0).contains(&a.latitude_deg) {
         return Err(source.error("latitude_deg", "`latitude_deg` must lie between -90 and 90"));

@@ -1,6 +1,8 @@
 //! Rules for the files of an archive: names that are no flights, ids from names, the message for
 //! unreadable files.
 
+use crate::store::visible_text::is_invisible;
+
 /// `true` for a name that other programs reserve for temporary files.
 pub(super) fn is_hidden(name: &str) -> bool {
     name.starts_with(['.', '_'])
@@ -21,14 +23,6 @@ pub(super) fn flight_id(name: &str) -> String {
     } else {
         id
     }
-}
-
-/// `true` for control characters, marks of writing direction, and characters without width.
-fn is_invisible(c: char) -> bool {
-    c.is_control()
-        || matches!(c,
-            '\u{ad}' | '\u{61c}' | '\u{180e}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}'
-            | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}')
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
-use super::flight_file::{BATCH_ROWS, write};
+use super::flight_file::{FlightWriter, batch_rows};
 use super::imported_contents::{ImportedColumn, ImportedContents, refused};
 use crate::error::{Error, Result};
 
@@ -45,6 +45,9 @@ pub fn import(source: &Path, file: &Path) -> Result<ImportedContents> {
         .take(HEAD_BYTES)
         .read_to_end(&mut head)
         .map_err(unreadable)?;
+    if let Some(what) = other_text(&head) {
+        return Err(refused(source, what));
+    }
     let head = String::from_utf8_lossy(&head).into_owned();
     let layout = Layout::of(&head).map_err(|what| refused(source, &what))?;
     let columns: Vec<ImportedColumn> = layout
@@ -54,34 +57,32 @@ pub fn import(source: &Path, file: &Path) -> Result<ImportedContents> {
         .collect();
     let mut reader = BufReader::new(opened()?);
     let mut failures = Failures::default();
-    let rows = write(file, &columns, |sink| {
-        let mut batch = vec![Vec::with_capacity(BATCH_ROWS); columns.len()];
-        let mut line = Vec::new();
-        let mut number = 0;
-        loop {
-            line.clear();
-            let read = (&mut reader)
-                .take(LONGEST_LINE)
-                .read_until(b'\n', &mut line)
-                .map_err(unreadable)?;
-            if read == 0 {
-                break;
-            }
-            number += 1;
-            let text = String::from_utf8_lossy(&line);
-            if number > layout.skipped && !text.trim().is_empty() {
-                layout.append(&text, number, &mut batch, &mut failures);
-            }
-            if batch
-                .first()
-                .is_some_and(|column| column.len() == BATCH_ROWS)
-            {
-                sink(&batch)?;
-                batch.iter_mut().for_each(Vec::clear);
-            }
+    let mut writer = FlightWriter::of(file, &columns)?;
+    let mut batch = vec![Vec::new(); columns.len()];
+    let at_once = batch_rows(columns.len());
+    let mut line = Vec::new();
+    let mut number = 0;
+    loop {
+        line.clear();
+        let read = (&mut reader)
+            .take(LONGEST_LINE)
+            .read_until(b'\n', &mut line)
+            .map_err(unreadable)?;
+        if read == 0 {
+            break;
         }
-        sink(&batch)
-    })?;
+        number += 1;
+        let text = String::from_utf8_lossy(&line);
+        if number > layout.skipped && !text.trim().is_empty() {
+            layout.append(&text, number, &mut batch, &mut failures);
+        }
+        if batch.first().is_some_and(|column| column.len() == at_once) {
+            writer.write(&batch)?;
+            batch.iter_mut().for_each(Vec::clear);
+        }
+    }
+    writer.write(&batch)?;
+    let rows = writer.place()?;
     let mut notes = failures.notes();
     if !layout.dropped.is_empty() {
         notes.push(format!(
@@ -95,6 +96,16 @@ pub fn import(source: &Path, file: &Path) -> Result<ImportedContents> {
         notes,
         folder: None,
     })
+}
+
+/// Kind of a text whose lines cannot be read, in words.
+fn other_text(head: &[u8]) -> Option<&'static str> {
+    if head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff") {
+        return Some("it is UTF-16 text; save it as UTF-8");
+    }
+    let has = |byte: u8| head.contains(&byte);
+    (has(b'\r') && !has(b'\n'))
+        .then_some("its lines end with carriage returns alone; save it with line feeds")
 }
 
 /// Fields that are no numbers, in rows of numbers.
@@ -142,15 +153,23 @@ impl Layout {
             .into_iter()
             .chain([Delimiter::Space])
             .flat_map(|delimiter| [false, true].map(|comma| (delimiter, comma)));
-        let sensible = layouts
-            .filter(|(delimiter, comma)| !(*comma && *delimiter == Delimiter::Character(',')));
+        // Between commas only quotes make a decimal comma: `"1,5","2,5"`.
+        let has_quotes = head.contains('"');
+        let sensible = layouts.filter(|(delimiter, comma)| {
+            has_quotes || !(*comma && *delimiter == Delimiter::Character(','))
+        });
         let best = sensible
             .filter_map(|(delimiter, comma)| Layout::with(lines, delimiter, comma))
             // Of layouts that read as many numbers the first counts: a space also separates `1, 2`.
             .reduce(|best, other| if other.0 > best.0 { other } else { best });
-        best.map(|(_, layout)| layout).ok_or_else(|| {
-            "no table of numbers: harvest imports text with one row a sample and a header, MATLAB 5 and Parquet".to_owned()
-        })
+        let layout = best.map(|(_, layout)| layout).ok_or_else(|| {
+            "no table of numbers: harvest imports text with one row a sample and a header, MATLAB, HDF5 and tall Parquet"
+                .to_owned()
+        })?;
+        match layout.decimal_commas_between_commas(lines) {
+            Some(what) => Err(what),
+            None => Ok(layout),
+        }
     }
 
     /// Layout with one delimiter, and the count of numbers that it reads; `None` without a row of two or
@@ -158,10 +177,12 @@ impl Layout {
     fn with(lines: &[&str], delimiter: Delimiter, decimal_comma: bool) -> Option<(usize, Layout)> {
         let fields = |line: &str| fields(line, delimiter);
         let value = |field: &String| number(field, decimal_comma);
+        // A recording may begin with missing values; lines above it have text beside their numbers.
         let is_data = |line: &&str| {
             let fields = fields(line);
             let numbers = fields.iter().filter(|f| value(f).is_some()).count();
-            fields.len() >= 2 && numbers * 2 > fields.len()
+            let has_text = || fields.iter().any(|f| value(f).is_none() && !is_missing(f));
+            fields.len() >= 2 && (numbers * 2 > fields.len() || numbers > 0 && !has_text())
         };
         let first = lines.iter().position(is_data)?;
         let width = fields(lines[first]).len();
@@ -217,6 +238,23 @@ impl Layout {
                 dropped,
             },
         ))
+    }
+
+    /// Message for rows of twice as many fields as the line of names above them has: their decimal commas look
+    /// like separators.
+    fn decimal_commas_between_commas(&self, lines: &[&str]) -> Option<String> {
+        let count = |line: &&str| fields(line, self.delimiter).len();
+        let rows = lines.get(self.skipped).map_or(0, count);
+        let above = self.skipped.checked_sub(1).and_then(|k| lines.get(k));
+        let above = above.filter(|line| !line.starts_with(['#', '%', '!']));
+        let names = above.map_or(0, count);
+        let is_comma = self.delimiter == Delimiter::Character(',') && !self.decimal_comma;
+        (is_comma && names >= 2 && rows == 2 * names).then(|| {
+            format!(
+                "its rows have {rows} fields and the line above them {names}: decimal commas between commas cannot be \
+                 told apart; save it with semicolons or decimal points"
+            )
+        })
     }
 
     /// Appends a row to a batch; what is no number is missing.
@@ -407,6 +445,36 @@ mod tests {
         );
         let bare = layout("0 1 2\n1 2 3\n");
         assert_eq!(names(&bare)[2].0, "column_3");
+    }
+
+    #[test]
+    fn a_recording_may_begin_with_missing_values() {
+        let slow = layout("time,mach,q,note\n0.0,nan,,\n0.1,nan,1,\n0.2,0.5,2,\n");
+        assert_eq!(slow.skipped, 1);
+        assert_eq!(names(&slow)[..3], [("time", ""), ("mach", ""), ("q", "")]);
+        let empty = layout("time;q\n0,0;nan\n0,1;nan\n");
+        assert_eq!((empty.skipped, names(&empty).len()), (1, 2));
+        let padded = layout("Sample rate,40,,\ntime,a,b,c\n0,1,2,3\n1,2,3,4\n");
+        assert_eq!((padded.skipped, names(&padded)[1].0), (2, "a"));
+    }
+
+    #[test]
+    fn decimal_commas_between_commas_are_read_in_quotes_and_else_named() {
+        let quoted = layout("time,q\n\"0,0\",\"1,5\"\n\"0,1\",\"2,5\"\n");
+        assert_eq!(
+            (quoted.delimiter, quoted.decimal_comma, names(&quoted).len()),
+            (Delimiter::Character(','), true, 2)
+        );
+        let bare = Layout::of("time,q\n0,0,1,5\n0,1,2,5\n").unwrap_err();
+        assert!(bare.contains("decimal commas between commas"), "{bare}");
+    }
+
+    #[test]
+    fn other_encodings_and_line_ends_are_named() {
+        let said = |head: &[u8]| other_text(head).unwrap_or_default();
+        assert!(said(b"\xff\xfet\0").contains("UTF-16"));
+        assert!(said(b"time,q\r0,1\r1,2\r").contains("carriage returns"));
+        assert_eq!(said(b"time,q\r\n0,1\r\n"), "");
     }
 
     #[test]

@@ -1,54 +1,103 @@
 //! A flight written as Parquet, batch by batch.
 
+use std::fs::File;
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use arrow::array::RecordBatch;
+use arrow::datatypes::SchemaRef;
 use parquet::arrow::ArrowWriter;
 
-use super::imported_contents::ImportedColumn;
+use super::imported_contents::{ImportedColumn, refused};
 use crate::error::{Error, Result};
 use crate::store::atomic::Draft;
 use crate::store::recorder::{array, properties, schema};
 
-/// Rows that are in memory at once.
-pub const BATCH_ROWS: usize = 16_384;
+/// Most rows that are in memory at once.
+const BATCH_ROWS: usize = 16_384;
 
-/// Sink of batches: columns of one length, NaN for a value that is missing.
-pub type Sink<'a> = dyn FnMut(&[Vec<f64>]) -> Result<()> + 'a;
+/// Numbers that are in memory at once: those of 256 columns.
+const BATCH_NUMBERS: usize = BATCH_ROWS << 8;
 
-/// Writes a file from batches; it appears whole or not at all. Returns the number of rows.
-pub fn write(
-    path: &Path,
-    columns: &[ImportedColumn],
-    batches: impl FnOnce(&mut Sink) -> Result<()>,
-) -> Result<usize> {
-    let (draft, rows) = write_draft(path, columns, batches)?;
-    draft.place()?;
-    Ok(rows)
+/// Rows of so many columns that are in memory at once.
+pub fn batch_rows(columns: usize) -> usize {
+    (BATCH_NUMBERS / columns.max(1)).min(BATCH_ROWS)
 }
 
-/// Writes a draft beside a path from batches. Returns it with the number of rows.
-pub fn write_draft(
-    path: &Path,
-    columns: &[ImportedColumn],
-    batches: impl FnOnce(&mut Sink) -> Result<()>,
-) -> Result<(Draft, usize)> {
-    let heads = columns.iter().map(|c| (c.name.as_str(), c.unit.as_deref()));
-    let schema = schema(heads);
-    let properties = properties().map_err(|e| Error::store(path, &e))?;
-    let mut draft = Draft::of(path)?;
-    let mut rows = 0;
-    {
-        let mut writer = ArrowWriter::try_new(draft.writer(), schema.clone(), Some(properties))
+/// Most columns of a file: each takes some hundred kilobytes while it is written.
+const MOST_COLUMNS: usize = 4000;
+
+/// A file being written; it appears whole or not at all.
+pub struct FlightWriter {
+    draft: Draft,
+    writer: ArrowWriter<BufWriter<File>>,
+    schema: SchemaRef,
+    rows: usize,
+}
+
+impl FlightWriter {
+    /// Begins a file that is to be at `path`.
+    ///
+    /// # Errors
+    /// [`Error::Archive`] for more columns than a file may have; [`Error::Io`] or [`Error::Store`] for the
+    /// disk.
+    pub fn of(path: &Path, columns: &[ImportedColumn]) -> Result<FlightWriter> {
+        if columns.len() > MOST_COLUMNS {
+            let what = format!(
+                "{} columns are more than the {MOST_COLUMNS} that a file may have",
+                columns.len()
+            );
+            return Err(refused(path, &what));
+        }
+        let heads = columns.iter().map(|c| (c.name.as_str(), c.unit.as_deref()));
+        let schema = schema(heads);
+        let properties = properties().map_err(|e| Error::store(path, &e))?;
+        let draft = Draft::of(path)?;
+        let file = BufWriter::with_capacity(1 << 16, draft.handle()?);
+        let writer = ArrowWriter::try_new(file, schema.clone(), Some(properties))
             .map_err(|e| Error::store(path, &e))?;
-        batches(&mut |values: &[Vec<f64>]| {
-            rows += values.first().map_or(0, Vec::len);
-            let arrays = values.iter().map(|values| array(values));
-            let batch = RecordBatch::try_new(schema.clone(), arrays.collect())
-                .map_err(|e| Error::store(path, &e))?;
-            writer.write(&batch).map_err(|e| Error::store(path, &e))
-        })?;
-        writer.close().map_err(|e| Error::store(path, &e))?;
+        Ok(FlightWriter {
+            draft,
+            writer,
+            schema,
+            rows: 0,
+        })
     }
-    Ok((draft, rows))
+
+    /// Writes columns of one length, NaN for a value that is missing.
+    ///
+    /// # Errors
+    /// [`Error::Store`] naming the file.
+    pub fn write(&mut self, values: &[Vec<f64>]) -> Result<()> {
+        self.rows += values.first().map_or(0, Vec::len);
+        let arrays = values.iter().map(|values| array(values));
+        let path = self.draft.path();
+        let batch = RecordBatch::try_new(self.schema.clone(), arrays.collect())
+            .map_err(|e| Error::store(path, &e))?;
+        self.writer
+            .write(&batch)
+            .map_err(|e| Error::store(path, &e))
+    }
+
+    /// Ends the file, whose draft is yet to be placed. Returns it with the number of rows.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Store`] naming the file.
+    pub fn finish(self) -> Result<(Draft, usize)> {
+        let path = self.draft.path();
+        let file = self.writer.into_inner();
+        let mut file = file.map_err(|e| Error::store(path, &e))?;
+        file.flush().map_err(Error::io(path, "cannot write it"))?;
+        Ok((self.draft, self.rows))
+    }
+
+    /// Puts the file in its place and returns the number of rows.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Store`] naming the file.
+    pub fn place(self) -> Result<usize> {
+        let (draft, rows) = self.finish()?;
+        draft.place()?;
+        Ok(rows)
+    }
 }

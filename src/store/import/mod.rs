@@ -9,12 +9,12 @@ mod csv_text;
 mod flight_file;
 mod matlab;
 pub(super) mod tall;
+mod time_order;
 
-use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::{Digest, atomic};
+use super::{Digest, atomic, regular};
 use crate::error::{Error, Result};
 
 use imported_contents::refused;
@@ -118,7 +118,7 @@ enum Format {
 
 impl Format {
     fn of(source: &Path) -> Result<Format> {
-        let file = File::open(source).map_err(Error::io(source, "cannot open it"))?;
+        let file = regular::open(source).map_err(Error::io(source, "cannot open it"))?;
         let mut head = Vec::new();
         file.take(520)
             .read_to_end(&mut head)

@@ -19,6 +19,7 @@ use super::layout::{MARK, PAGE};
 use crate::error::Error;
 use crate::flight::record::{Series, with_margin};
 use crate::flight::{Correction, Mark, Record, StandIn};
+use crate::store::regular;
 
 /// A record on the disk, read by signals and windows of time.
 #[derive(Clone, Debug)]
@@ -37,7 +38,7 @@ pub struct RecordFile {
 /// # Errors
 /// The file cannot be opened, is no Parquet file, or is not a record.
 pub fn open(path: &Path) -> Result<RecordFile, Error> {
-    let file = File::open(path).map_err(Error::io(path, "cannot open the record"))?;
+    let file = regular::open(path).map_err(Error::io(path, "cannot open the record"))?;
     let bad = |what: &dyn Display| not_a_record(path, what);
     let options = ArrowReaderOptions::new().with_offset_index_policy(PageIndexPolicy::Optional);
     let metadata = ArrowReaderMetadata::load(&file, options).map_err(|e| bad(&e))?;

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 
 use roxmltree::{Document, Node, ParsingOptions};
 
+use super::xml_bounds::excess;
 use crate::store::files::TunnelRow;
 use crate::units::DEG;
 
@@ -34,6 +35,9 @@ pub(super) fn rows(
     third: Option<&str>,
     wanted: impl Fn(&str) -> bool,
 ) -> Result<Vec<(usize, TunnelRow)>, Wrong> {
+    if let Some((line, what)) = excess(text) {
+        return Err((line, what.to_owned()));
+    }
     let options = ParsingOptions {
         allow_dtd: true,
         ..ParsingOptions::default()
@@ -44,7 +48,7 @@ pub(super) fn rows(
             format!("not readable as XML: {e}"),
         )
     })?;
-    let file = File::new(&document, third);
+    let file = File::new(&document, text, third);
     if document.root_element().tag_name().name() != "DAVEfunc" {
         return Err((
             Some(1),
@@ -59,7 +63,7 @@ pub(super) fn rows(
             .and_then(|d| d.attribute("varID"))
             .unwrap_or_default();
         if wanted(name) {
-            let line = file.line(function).unwrap_or(0);
+            let line = file.line(function);
             rows.extend(
                 rows_of(name, &file.grid(function)?, file.unit(name)).map(|row| (line, row)),
             );
@@ -76,7 +80,8 @@ pub(super) fn rows(
 
 /// The document with its definitions by id.
 struct File<'a, 'input> {
-    document: &'a Document<'input>,
+    /// Places at which lines end.
+    line_ends: Vec<usize>,
     variables: BTreeMap<&'a str, Node<'a, 'input>>,
     breakpoints: BTreeMap<&'a str, Node<'a, 'input>>,
     tables: BTreeMap<&'a str, Node<'a, 'input>>,
@@ -103,7 +108,7 @@ fn plain(name: &str) -> String {
 }
 
 impl<'a, 'input> File<'a, 'input> {
-    fn new(document: &'a Document<'input>, third: Option<&'a str>) -> File<'a, 'input> {
+    fn new(document: &'a Document<'input>, text: &str, third: Option<&'a str>) -> File<'a, 'input> {
         let by_id = |name: &'static str, id: &'static str| {
             let nodes = document
                 .descendants()
@@ -113,7 +118,7 @@ impl<'a, 'input> File<'a, 'input> {
                 .collect::<BTreeMap<_, _>>()
         };
         File {
-            document,
+            line_ends: text.match_indices('\n').map(|(at, _)| at).collect(),
             variables: by_id("variableDef", "varID"),
             breakpoints: by_id("breakpointDef", "bpID"),
             tables: by_id("griddedTableDef", "gtID"),
@@ -121,12 +126,13 @@ impl<'a, 'input> File<'a, 'input> {
         }
     }
 
-    fn line(&self, node: Node) -> Option<usize> {
-        usize::try_from(self.document.text_pos_at(node.range().start).row).ok()
+    fn line(&self, node: Node) -> usize {
+        let start = node.range().start;
+        1 + self.line_ends.partition_point(|end| *end < start)
     }
 
     fn wrong(&self, node: Node, what: impl Into<String>) -> Wrong {
-        (self.line(node), what.into())
+        (Some(self.line(node)), what.into())
     }
 
     fn unit(&self, variable: &str) -> &'a str {
@@ -239,7 +245,8 @@ impl<'a, 'input> File<'a, 'input> {
 
     /// Grid of a gridded table, with as many values as its breakpoints demand.
     fn whole(&self, at: Node, grid: Grid) -> Result<Grid, Wrong> {
-        let expected: usize = grid.axes.iter().map(|(_, points)| points.len()).product();
+        let sizes = grid.axes.iter().map(|(_, points)| points.len());
+        let expected = sizes.fold(1, usize::saturating_mul);
         if grid.values.len() != expected || grid.axes.is_empty() {
             let what = format!("{} values for {expected} grid points", grid.values.len());
             return Err(self.wrong(at, what));

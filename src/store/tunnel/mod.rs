@@ -4,6 +4,7 @@
 mod daveml;
 #[cfg(test)]
 mod tests;
+mod xml_bounds;
 
 use std::collections::BTreeMap;
 use std::io::Cursor;
@@ -46,11 +47,14 @@ pub fn rows(
     Ok(rows)
 }
 
+/// Columns that a tunnel database needs.
+const COLUMNS: [&str; 4] = ["derivative", "alpha_deg", "value", "unit"];
+
 /// Rows of a CSV with a header.
 fn of_csv(path: &Path, third: Option<&str>) -> Result<Vec<(usize, TunnelRow)>> {
-    let mut rows: Vec<(usize, TunnelRow)> = files::rows(path)?;
+    let mut rows: Vec<(usize, TunnelRow)> = files::written(path, &COLUMNS)?;
     let Some(third) = third else { return Ok(rows) };
-    let fields: Vec<(usize, BTreeMap<String, String>)> = files::rows(path)?;
+    let fields: Vec<(usize, BTreeMap<String, String>)> = files::written(path, &[])?;
     for ((line, row), (_, fields)) in rows.iter_mut().zip(fields) {
         let Some(text) = fields.get(third).filter(|text| !text.is_empty()) else {
             continue;

@@ -4,6 +4,7 @@
 //! sizes in reverse order, and a group for each struct. A cell array refers to datasets of the group
 //! `#refs#`. Other programs write datasets and groups alike, and a unit as an attribute of its dataset.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 
 use hdf5_reader::error::Error;
@@ -27,6 +28,10 @@ const UNITS: [&str; 4] = ["unit", "units", "Unit", "Units"];
 /// Bytes of a variable over those of its file, at most: the best that its compression can do.
 const LARGEST_RATIO: usize = 1100;
 
+/// Most datasets and groups of a file, each counted as often as others refer to it: references may form a tree whose
+/// branches are one dataset.
+const MOST_MEMBERS: usize = 100_000;
+
 type Result<T> = std::result::Result<T, String>;
 
 /// Variables of a file, in the order of their names.
@@ -45,6 +50,7 @@ pub fn variables(bytes: Vec<u8>) -> Result<Vec<(String, Value)>> {
     let reader = Reader {
         referred: referred.map(|own| (own.address(), own)).collect(),
         address_bytes: usize::from(root.offset_size()),
+        members: Cell::new(0),
     };
     reader.fields(&root, 0)
 }
@@ -54,14 +60,31 @@ struct Reader {
     /// Datasets to which cells refer, by their address.
     referred: BTreeMap<u64, Dataset>,
     address_bytes: usize,
+    /// Datasets and groups read so far.
+    members: Cell<usize>,
 }
 
 impl Reader {
+    /// Counts a dataset or a group.
+    ///
+    /// # Errors
+    /// They are more than a recording has.
+    fn count(&self) -> Result<()> {
+        self.members.set(self.members.get() + 1);
+        if self.members.get() > MOST_MEMBERS {
+            return Err(format!(
+                "more than {MOST_MEMBERS} arrays and structs, counted as often as others refer to them"
+            ));
+        }
+        Ok(())
+    }
+
     /// Datasets and groups of a group.
     fn fields(&self, group: &Group, depth: usize) -> Result<Vec<(String, Value)>> {
         if depth > DEEPEST {
             return Err(format!("structs are nested more than {DEEPEST} deep"));
         }
+        self.count()?;
         let (groups, datasets) = group.members().map_err(|e| damaged(&e))?;
         let mut fields = Vec::new();
         for dataset in &datasets {
@@ -81,6 +104,7 @@ impl Reader {
 
     /// Value of a dataset, with its unit where an attribute names it.
     fn dataset(&self, dataset: &Dataset, depth: usize) -> Result<Value> {
+        self.count()?;
         let value = self.bare(dataset, depth)?;
         let mut units = UNITS.iter().filter_map(|name| attribute(dataset, name));
         Ok(match (value, units.next()) {

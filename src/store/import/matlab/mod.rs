@@ -7,7 +7,7 @@ mod level_5;
 use std::io::Read;
 use std::path::Path;
 
-use super::flight_file::{BATCH_ROWS, write};
+use super::flight_file::{FlightWriter, batch_rows};
 use super::imported_contents::{ImportedColumn, ImportedContents, refused};
 use crate::error::{Error, Result};
 use columns::{Table, Value};
@@ -54,19 +54,18 @@ fn write_columns(source: &Path, file: &Path, variables: Variables) -> Result<Imp
         return Err(refused(source, what));
     }
     let heads: Vec<ImportedColumn> = columns.iter().map(|(head, _)| head.clone()).collect();
-    let rows = write(file, &heads, |sink| {
-        for from in (0..rows).step_by(BATCH_ROWS) {
-            let to = (from + BATCH_ROWS).min(rows);
-            let batch: Vec<Vec<f64>> = columns
-                .iter()
-                .map(|(_, values)| values[from..to].to_vec())
-                .collect();
-            sink(&batch)?;
-        }
-        Ok(())
-    })?;
+    let mut writer = FlightWriter::of(file, &heads)?;
+    let at_once = batch_rows(columns.len());
+    for from in (0..rows).step_by(at_once) {
+        let to = (from + at_once).min(rows);
+        let batch: Vec<Vec<f64>> = columns
+            .iter()
+            .map(|(_, values)| values[from..to].to_vec())
+            .collect();
+        writer.write(&batch)?;
+    }
     Ok(ImportedContents {
-        rows,
+        rows: writer.place()?,
         columns: heads,
         notes,
         folder: None,

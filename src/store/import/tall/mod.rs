@@ -13,11 +13,9 @@ mod wide_table;
 
 use std::path::{Path, PathBuf};
 
-use super::flight_file::{Sink, write, write_draft};
 use super::imported_contents::{ImportedContents, refused};
 use crate::error::Result;
 use crate::store::atomic::Draft;
-use wide_table::RowsOfTime;
 
 pub use source::Tall;
 
@@ -29,23 +27,24 @@ pub fn import(source: &Path, file: &Path) -> Result<ImportedContents> {
         return Err(refused(source, what));
     };
     let survey = tall.survey()?;
-    let parts = tall.parts(&survey)?;
+    let parts = tall.parts(&survey, file)?;
     let folder = (parts.len() > 1).then(|| folder_of(file));
+    let place = |k: usize| match &folder {
+        Some(folder) => folder.join(format!("part_{:03}.parquet", k + 1)),
+        None => file.to_owned(),
+    };
+    let tables = tall.tables(&survey, &parts, &place, |_| true)?;
+    if tables.is_empty() {
+        return Err(refused(source, "it has no values"));
+    }
     let mut contents = ImportedContents::default();
     let mut replaced = 0;
-    for (k, part) in parts.iter().enumerate() {
-        let columns = tall.columns(&survey, |name| part.contains(name));
-        let mut table = RowsOfTime::new(columns.len());
-        let own = folder
-            .as_ref()
-            .map(|folder| folder.join(format!("part_{:03}.parquet", k + 1)));
-        contents.rows += write(own.as_deref().unwrap_or(file), &columns, |sink| {
-            tall.fill(&survey, part, &columns, &mut table, sink)
-        })?;
+    for (k, table) in tall.filled(&survey, tables, file)?.into_iter().enumerate() {
         replaced += table.replaced;
+        contents.rows += table.writer.place()?;
         contents
             .columns
-            .extend(columns.into_iter().skip(usize::from(k > 0)));
+            .extend(table.columns.into_iter().skip(usize::from(k > 0)));
     }
     if replaced > 0 {
         contents.notes.push(format!(
@@ -76,16 +75,9 @@ impl Tall {
     /// [`Error::Archive`] for the file; [`Error::Io`] or [`Error::Store`] for the disk.
     pub fn widened(&self, place: &Path, is_wanted: impl Fn(&str) -> bool) -> Result<Vec<Draft>> {
         let survey = self.survey()?;
-        let mut drafts = Vec::new();
-        for part in self.parts(&survey)? {
-            let columns = self.columns(&survey, |name| part.contains(name) && is_wanted(name));
-            if columns.len() > 1 {
-                let mut table = RowsOfTime::new(columns.len());
-                let filled =
-                    |sink: &mut Sink| self.fill(&survey, &part, &columns, &mut table, sink);
-                drafts.push(write_draft(place, &columns, filled)?.0);
-            }
-        }
-        Ok(drafts)
+        let parts = self.parts(&survey, place)?;
+        let tables = self.tables(&survey, &parts, &|_| place.to_owned(), is_wanted)?;
+        let filled = self.filled(&survey, tables, place)?.into_iter();
+        filled.map(|table| Ok(table.writer.finish()?.0)).collect()
     }
 }

@@ -1,6 +1,7 @@
 //! Parts of a tall file: names that share a clock.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 use super::source::Tall;
 use super::survey::{Clock, NamedValues, Survey};
@@ -8,8 +9,8 @@ use crate::error::Result;
 
 impl Tall {
     /// Names of each part: those on the clock of the name with the most values, then the others by
-    /// their clocks.
-    pub(super) fn parts(&self, survey: &Survey) -> Result<Vec<BTreeSet<String>>> {
+    /// their clocks. Values are put in order beside `scratch`.
+    pub(super) fn parts(&self, survey: &Survey, scratch: &Path) -> Result<Vec<BTreeSet<String>>> {
         let names = || survey.names.iter();
         let most = names().max_by_key(|(_, values)| values.count);
         let Some(main) = most.map(|(_, values)| values.count) else {
@@ -22,7 +23,7 @@ impl Tall {
         let shared = if names().all(|(_, values)| values.clock() == clock) {
             BTreeMap::new()
         } else {
-            self.times_shared(survey, main)?
+            self.times_shared(survey, main, scratch)?
         };
         let mut on_main = BTreeSet::new();
         let mut others: BTreeMap<Clock, BTreeSet<String>> = BTreeMap::new();
@@ -45,6 +46,7 @@ impl Tall {
         &self,
         survey: &'s Survey,
         main: &str,
+        scratch: &Path,
     ) -> Result<BTreeMap<&'s String, usize>> {
         let places: BTreeMap<&str, usize> =
             survey.names.keys().map(String::as_str).zip(0..).collect();
@@ -61,7 +63,7 @@ impl Tall {
             at_once.clear();
         };
         let place = |name: &str| places.get(name).copied();
-        self.in_order(survey, &place, &mut |time, place, _| {
+        self.in_order(survey, scratch, &place, &mut |time, place, _| {
             if time.to_bits() != now.to_bits() {
                 count(&mut at_once);
                 now = time;

@@ -14,10 +14,10 @@ use parquet::arrow::arrow_reader::{
 
 use crate::error::{Error, Result};
 use crate::store::clock_column::{as_floats, is_clock, tick_unit};
-use crate::store::import::flight_file::BATCH_ROWS;
 use crate::store::import::imported_contents::refused;
 use crate::store::object;
 use crate::store::recorder::UNIT;
+use crate::store::regular;
 use crate::units::Unit;
 
 /// Names of the columns of tall files.
@@ -34,6 +34,9 @@ const NAMES: [&str; 8] = [
 ];
 const VALUES: [&str; 3] = ["value", "val", "data"];
 const UNITS: [&str; 2] = ["unit", "units"];
+
+/// Rows that are read at once.
+const READ_ROWS: usize = 16_384;
 
 /// A tall file and the names of its columns.
 #[derive(Debug)]
@@ -79,7 +82,7 @@ impl Tall {
     /// # Errors
     /// [`Error::Archive`] for a file that is no readable Parquet.
     pub fn open(source: &Path) -> Result<Option<Tall>> {
-        let file = File::open(source)
+        let file = regular::open(source)
             .map_err(|e| refused(source, &format!("cannot open the file: {e}")))?;
         let metadata = ArrowReaderMetadata::load(&file, ArrowReaderOptions::default())
             .map_err(|e| refused(source, &format!("not a readable Parquet file: {e}")))?;
@@ -151,13 +154,13 @@ impl Tall {
         let metadata = self.metadata.clone();
         let reader = if let Some(object) = &self.object {
             ParquetRecordBatchReaderBuilder::new_with_metadata(object.clone(), metadata)
-                .with_batch_size(BATCH_ROWS)
+                .with_batch_size(READ_ROWS)
                 .build()
         } else {
             let file =
                 File::open(&self.source).map_err(|e| refused(&self.source, &e.to_string()))?;
             ParquetRecordBatchReaderBuilder::new_with_metadata(file, metadata)
-                .with_batch_size(BATCH_ROWS)
+                .with_batch_size(READ_ROWS)
                 .build()
         };
         reader.map_err(|e| damaged(&self.source, &e))

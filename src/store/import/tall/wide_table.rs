@@ -1,46 +1,86 @@
-//! The wide table of a part: one column a name, one row a time.
+//! Wide tables of the parts: one column a name, one row a time.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 
 use super::source::Tall;
 use super::survey::Survey;
 use crate::error::Result;
-use crate::store::import::flight_file::{BATCH_ROWS, Sink};
-use crate::store::import::imported_contents::ImportedColumn;
+use crate::store::import::flight_file::{FlightWriter, batch_rows};
+use crate::store::import::imported_contents::{ImportedColumn, refused};
+
+/// Most files that a tall one becomes: more clocks than a recorder has, and files that a system lets open.
+const MOST_CLOCKS: usize = 256;
+
+/// Most numbers of a file that a tall one becomes, missing ones as well: those of a file of the archive.
+const MOST_NUMBERS: usize = 500_000_000;
 
 /// Place of a name without a column.
 const NO_COLUMN: usize = usize::MAX;
 
-/// Rows being filled: one for each time.
-pub(super) struct RowsOfTime {
-    batch: Vec<Vec<f64>>,
-    /// Values that came again for a time and a name.
+/// A part being filled: its names, its file, and the rows that are not written yet.
+pub(super) struct PartTable<'p> {
+    names: &'p BTreeSet<String>,
+    /// The clock, and the names that are wanted, sorted.
+    pub columns: Vec<ImportedColumn>,
+    rows: Rows,
+    pub writer: FlightWriter,
+    /// Values that another one for the same time and name has replaced.
     pub replaced: usize,
 }
 
-impl RowsOfTime {
-    pub(super) fn new(columns: usize) -> RowsOfTime {
-        RowsOfTime {
-            batch: vec![Vec::new(); columns],
-            replaced: 0,
+/// Rows of a part, one for each time: columns of one length.
+struct Rows {
+    columns: Vec<Vec<f64>>,
+    /// Rows that are in memory at once.
+    at_once: usize,
+}
+
+impl Rows {
+    fn new(columns: usize, at_once: usize) -> Rows {
+        Rows {
+            columns: vec![Vec::new(); columns],
+            at_once,
         }
     }
 
-    /// Puts a value into the row of its time; times come in order.
-    fn put(&mut self, time: f64, place: usize, value: f64, sink: &mut Sink) -> Result<()> {
-        let last = self.batch[0].last().map(|t| t.to_bits());
-        if last != Some(time.to_bits()) {
-            if self.batch[0].len() >= BATCH_ROWS {
-                self.finish(sink)?;
-            }
-            self.batch
-                .iter_mut()
-                .for_each(|column| column.push(f64::NAN));
-            if let Some(row) = self.batch[0].last_mut() {
-                *row = time;
-            }
+    fn are_full(&self) -> bool {
+        self.columns[0].len() >= self.at_once
+    }
+
+    /// Bits of the last row's time.
+    fn last(&self) -> Option<u64> {
+        self.columns[0].last().map(|time| time.to_bits())
+    }
+
+    /// Adds a row without values.
+    fn push(&mut self, time: f64) {
+        for column in &mut self.columns {
+            column.push(f64::NAN);
         }
-        let column = self.batch.get_mut(place);
+        if let Some(own) = self.columns[0].last_mut() {
+            *own = time;
+        }
+    }
+}
+
+impl PartTable<'_> {
+    /// Column of a name.
+    fn column(&self, name: &str) -> usize {
+        let named = self.columns.get(1..).unwrap_or_default();
+        let own = named.binary_search_by(|column| column.name.as_str().cmp(name));
+        own.map_or(NO_COLUMN, |k| k + 1)
+    }
+
+    /// Puts a value into the row of its time; times come in order.
+    fn put(&mut self, time: f64, column: usize, value: f64) -> Result<()> {
+        if self.rows.last() != Some(time.to_bits()) {
+            if self.rows.are_full() {
+                self.write()?;
+            }
+            self.rows.push(time);
+        }
+        let column = self.rows.columns.get_mut(column);
         if let Some(cell) = column.and_then(|column| column.last_mut()) {
             self.replaced += usize::from(!cell.is_nan());
             *cell = value;
@@ -48,21 +88,57 @@ impl RowsOfTime {
         Ok(())
     }
 
-    /// Passes the rows on.
-    fn finish(&mut self, sink: &mut Sink) -> Result<()> {
-        sink(&self.batch)?;
-        self.batch.iter_mut().for_each(Vec::clear);
+    /// Writes the rows.
+    fn write(&mut self) -> Result<()> {
+        self.writer.write(&self.rows.columns)?;
+        self.rows.columns.iter_mut().for_each(Vec::clear);
         Ok(())
     }
 }
 
 impl Tall {
-    /// The clock, and the names that are wanted, sorted.
-    pub(super) fn columns(
+    /// Empty tables of the parts that have a name which is wanted, one column for each of these names.
+    ///
+    /// # Errors
+    /// They are more files, or larger ones, than a recorder's names make.
+    pub(super) fn tables<'p>(
         &self,
         survey: &Survey,
+        parts: &'p [BTreeSet<String>],
+        place: &dyn Fn(usize) -> PathBuf,
         is_wanted: impl Fn(&str) -> bool,
-    ) -> Vec<ImportedColumn> {
+    ) -> Result<Vec<PartTable<'p>>> {
+        let columns =
+            |part: &BTreeSet<String>| self.columns(survey, |n| part.contains(n) && is_wanted(n));
+        let parts = parts.iter().map(|part| (part, columns(part)));
+        let parts: Vec<_> = parts.filter(|(_, columns)| columns.len() > 1).collect();
+        if parts.len() > MOST_CLOCKS {
+            let what = format!(
+                "its names have values at {} different sets of times, more than {MOST_CLOCKS}: as an archive it is \
+                 read with the names of the channel map alone",
+                parts.len()
+            );
+            return Err(refused(&self.source, &what));
+        }
+        for (part, columns) in &parts {
+            self.check_size(survey, part, columns.len())?;
+        }
+        let at_once = batch_rows(parts.iter().map(|(_, columns)| columns.len()).sum());
+        let table =
+            |(k, (names, columns)): (usize, (&'p BTreeSet<String>, Vec<ImportedColumn>))| {
+                Ok(PartTable {
+                    names,
+                    rows: Rows::new(columns.len(), at_once),
+                    replaced: 0,
+                    writer: FlightWriter::of(&place(k), &columns)?,
+                    columns,
+                })
+            };
+        parts.into_iter().enumerate().map(table).collect()
+    }
+
+    /// The clock, and the names that are wanted, sorted.
+    fn columns(&self, survey: &Survey, is_wanted: impl Fn(&str) -> bool) -> Vec<ImportedColumn> {
         let time = ImportedColumn {
             name: self.time.clone(),
             unit: self.time_unit.clone(),
@@ -75,29 +151,41 @@ impl Tall {
         std::iter::once(time).chain(named).collect()
     }
 
-    /// Fills the rows of a table, one for each time at which any name of the part has a value. A name
-    /// without a column makes a row all the same: the clock is that of all names.
-    pub(super) fn fill(
+    /// Refuses a part whose table has more numbers than a file may have.
+    fn check_size(&self, survey: &Survey, part: &BTreeSet<String>, columns: usize) -> Result<()> {
+        let times = part.iter().filter_map(|name| survey.names.get(name));
+        let times = times.map(|values| values.count).max().unwrap_or_default();
+        if times.saturating_mul(columns) <= MOST_NUMBERS {
+            return Ok(());
+        }
+        let names = columns - 1;
+        let what = format!("{names} names at {times} times are more than {MOST_NUMBERS} numbers");
+        Err(refused(&self.source, &what))
+    }
+
+    /// Fills the tables in one pass, with a row for each time at which any name of a part has a value. A name
+    /// without a column makes a row all the same: the clock is that of all names. Values are put in order beside
+    /// `scratch`.
+    pub(super) fn filled<'p>(
         &self,
         survey: &Survey,
-        part: &BTreeSet<String>,
-        columns: &[ImportedColumn],
-        table: &mut RowsOfTime,
-        sink: &mut Sink,
-    ) -> Result<()> {
-        let named = columns.iter().enumerate().skip(1);
-        let columns: BTreeMap<&str, usize> = named.map(|(k, c)| (c.name.as_str(), k)).collect();
-        let places: BTreeMap<&str, usize> = part
-            .iter()
-            .map(|name| {
-                let name = name.as_str();
-                (name, columns.get(name).copied().unwrap_or(NO_COLUMN))
-            })
-            .collect();
+        mut tables: Vec<PartTable<'p>>,
+        scratch: &Path,
+    ) -> Result<Vec<PartTable<'p>>> {
+        let mut columns = Vec::new();
+        let mut places: BTreeMap<&str, usize> = BTreeMap::new();
+        for (k, table) in tables.iter().enumerate() {
+            for name in table.names {
+                places.insert(name, columns.len());
+                columns.push((k, table.column(name)));
+            }
+        }
         let place = |name: &str| places.get(name).copied();
-        self.in_order(survey, &place, &mut |time, place, value| {
-            table.put(time, place, value, sink)
+        self.in_order(survey, scratch, &place, &mut |time, place, value| {
+            let (table, column) = columns[place];
+            tables[table].put(time, column, value)
         })?;
-        table.finish(sink)
+        tables.iter_mut().try_for_each(PartTable::write)?;
+        Ok(tables)
     }
 }
