@@ -12,10 +12,9 @@ use crate::dynamics::motion::Window;
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
 use crate::filter_error::bounds::WidePass;
 use crate::filter_error::filter::Filter;
-use crate::filter_error::input_noise::NoisyInputs;
 use crate::output_error::calibration_errors::Misreading;
 use crate::output_error::surface_noise::noisy_surfaces;
-use crate::output_error::{Case, Diverged, Measurements, Model, equation_error};
+use crate::output_error::{Case, Diverged, Measurements, Model, NoisyInputs, equation_error};
 
 /// Maneuver of a group.
 pub(super) struct GroupMember<'g, 'a, const NX: usize, E: Equations<NX>> {
@@ -69,7 +68,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
         let aircraft = self.task.context.aircraft;
         let biases = self.task.bias_uncertainties(model);
         let filter = filter.with_model(aircraft, window, model, &biases);
-        filter.with_noisy_inputs(&self.task.noisy_inputs(self.prepared, window, model))
+        filter.with_noisy_inputs(self.task.noisy_inputs(self.prepared, window, model))
     }
 
     /// Pass at a fit with the held derivatives and the slopes free as well.
@@ -139,7 +138,7 @@ impl Task<'_> {
         let measurements = prepared.case.measurements.clone();
         let biases = self.bias_uncertainties(model);
         let filter = Filter::new(self.context.aircraft, window, measurements, model, &biases);
-        filter.with_noisy_inputs(&self.noisy_inputs(prepared, window, model))
+        filter.with_noisy_inputs(self.noisy_inputs(prepared, window, model))
     }
 
     /// Noise of the inputs of a model in a window of the maneuver.
@@ -151,7 +150,7 @@ impl Task<'_> {
     ) -> NoisyInputs {
         NoisyInputs {
             surfaces: noisy_surfaces(self.context.aircraft, window, model),
-            pressure_variance: prepared.case.pressure_variance,
+            pressure_variance: prepared.case.noisy_inputs.pressure_variance,
         }
     }
 

@@ -6,7 +6,7 @@ use crate::dynamics::motion::Window;
 use crate::dynamics::{Equations, OUTPUTS};
 use crate::maneuver::Maneuver;
 use crate::output_error::surface_noise::noisy_surfaces;
-use crate::output_error::{Case, Model, pressure_noise};
+use crate::output_error::{Case, Model, NoisyInputs, pressure_noise};
 
 /// Everything of a maneuver's estimation that does not depend on the parameters.
 pub(super) struct PreparedCase<'a, const NX: usize, E: Equations<NX>> {
@@ -51,8 +51,10 @@ impl<'a> Task<'a> {
                 case.parameters()
             ));
         }
-        case.noisy_surfaces = noisy_surfaces(self.context.aircraft, &window, &model);
-        case.pressure_variance = pressure_noise::relative_variance(self.record, range);
+        case.noisy_inputs = NoisyInputs {
+            surfaces: noisy_surfaces(self.context.aircraft, &window, &model),
+            pressure_variance: pressure_noise::relative_variance(self.record, range),
+        };
         Ok(PreparedCase {
             model,
             surfaces,

@@ -11,7 +11,7 @@ use pulp::{Arch, Simd, WithSimd};
 use super::gains::{
     self, Outputs, ParameterSlope, Pattern, PatternGain, steady_variance_slopes, steady_variances,
 };
-use super::input_noise::{InputNoise, NoisyInputs};
+use super::input_noise::InputNoise;
 use super::linearised::{Discrete, Linearised};
 use super::noise::{Noise, NoiseParameter, Prior, RotaryCost};
 use super::pass::{
@@ -27,7 +27,7 @@ use crate::numerics::small::product;
 use crate::output_error::case::blocks::samples_per_block;
 use crate::output_error::case::layout::LaneLayout;
 use crate::output_error::kernel::normal_equations::NormalSums;
-use crate::output_error::{Case, Diverged, InitialState, Measurements, Model};
+use crate::output_error::{Case, Diverged, InitialState, Measurements, Model, NoisyInputs};
 use crate::units::RAD;
 
 /// Maneuver prepared for filter error.
@@ -143,8 +143,9 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
 
     /// The filter where the inputs have noise; without it they are exact.
     #[must_use]
-    pub fn with_noisy_inputs(mut self, inputs: &NoisyInputs) -> Self {
-        self.input_noise = InputNoise::of(&self.case, inputs);
+    pub fn with_noisy_inputs(mut self, inputs: NoisyInputs) -> Self {
+        self.case.noisy_inputs = inputs;
+        self.input_noise = InputNoise::of(&self.case);
         self
     }
 

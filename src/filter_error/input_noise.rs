@@ -18,14 +18,6 @@ use crate::output_error::surface_noise::{DerivativeValue, NoisySurface};
 /// Samples between two at which the effects are taken: the mean needs no more.
 const STRIDE: usize = 16;
 
-/// White noise of the inputs of a maneuver.
-#[derive(Clone, Debug, Default)]
-pub struct NoisyInputs {
-    pub surfaces: Vec<NoisySurface>,
-    /// Relative variance of the dynamic pressure's noise.
-    pub pressure_variance: f64,
-}
-
 /// Effect of the inputs' noise on the states of a filter.
 #[derive(Clone, Debug, Default)]
 pub(super) struct InputNoise<const NX: usize> {
@@ -45,7 +37,8 @@ struct StateEffect<const NX: usize> {
 
 impl<const NX: usize> InputNoise<NX> {
     /// Effect in the filter of a case.
-    pub fn of<E: Equations<NX>>(case: &Case<NX, E>, inputs: &NoisyInputs) -> Self {
+    pub fn of<E: Equations<NX>>(case: &Case<NX, E>) -> Self {
+        let inputs = &case.noisy_inputs;
         let samples = (0..case.samples()).step_by(STRIDE);
         let share = 1.0 / samples.len().max(1) as f64;
         let mut effects = vec![];

@@ -33,7 +33,7 @@
 pub mod bounds;
 pub mod filter;
 mod gains;
-pub mod input_noise;
+mod input_noise;
 pub mod joint_filter;
 mod linearised;
 pub mod noise;

@@ -22,6 +22,7 @@ pub mod likelihood;
 pub use bounds::bounded::Bounded;
 pub use bounds::{calibration_errors, coloured, consider, cramer_rao};
 pub use case::layout::MOST_PRODUCTS;
+pub use case::noisy_inputs::NoisyInputs;
 pub use case::{Case, InitialState, Measurements, Model};
 pub use case::{pressure_noise, surface_noise};
 pub use identifiability::holding;

@@ -1,7 +1,7 @@
 //! Noise of the inputs in the filter: exact slopes, white innovations, honest bounds.
 
 use super::*;
-use crate::filter_error::input_noise::NoisyInputs;
+use crate::output_error::NoisyInputs;
 use crate::output_error::surface_noise::noisy_surfaces;
 use crate::output_error::tests::{window_of, with_noisy_surfaces};
 
@@ -39,7 +39,7 @@ fn recorded<const NX: usize, E: InGusts<NX>>(
     let measured = exact.filter.case.measurements.clone();
     let filter = Filter::<NX, E>::new(&aircraft(), &window, measured, &model, &[]);
     Simulated {
-        filter: filter.with_noisy_inputs(&inputs),
+        filter: filter.with_noisy_inputs(inputs),
         own: exact.own,
     }
 }
@@ -54,7 +54,7 @@ fn assert_gradient_matches_differences<const NX: usize, E: InGusts<NX>>(noise: &
         surfaces: noisy_surfaces(&aircraft(), &window, &model_of(&truth)),
         pressure_variance: 1e-4,
     };
-    let filter = recorded.filter.with_noisy_inputs(&inputs);
+    let filter = recorded.filter.with_noisy_inputs(inputs);
     let mut at = filter.with_noise(&recorded.own, noise);
     for (j, value) in at.iter_mut().take(filter.first_noise()).enumerate() {
         *value *= 1.0 + 0.01 * (j % 5) as f64;
@@ -93,7 +93,7 @@ fn innovations_of_maneuvers<const NX: usize, E: InGusts<NX>>(exact: bool) -> (f6
     for _ in 0..20 {
         let mut recorded = recorded::<NX, E>(&truth, &mut draws);
         if exact {
-            recorded.filter = recorded.filter.with_noisy_inputs(&NoisyInputs::default());
+            recorded.filter = recorded.filter.with_noisy_inputs(NoisyInputs::default());
         }
         let still = Noise::still(OUTPUTS_NOISE);
         let at = recorded.filter.with_noise(&recorded.own, &still);

@@ -103,7 +103,7 @@ impl StandardEstimate {
     /// `None` where the information matrix is singular.
     pub fn corrected(&mut self, standard: &StandardCase) -> Option<Vec<f64>> {
         let model = standard.model();
-        self.case.noisy_surfaces = noisy_surfaces(&standard.aircraft, &self.window, &model);
+        self.case.noisy_inputs.surfaces = noisy_surfaces(&standard.aircraft, &self.window, &model);
         let bounds = cramer_rao::bounds(self.inverse.as_ref()?, &self.case, &self.fit);
         Some(
             bounds

@@ -35,8 +35,7 @@ pub(super) fn gradient_covariance<const NX: usize, E: Equations<NX>>(
 ) -> DMatrix<f64> {
     let n = case.parameters();
     let width = n.next_multiple_of(VECTOR);
-    let is_exact = case.noisy_surfaces.is_empty() && case.pressure_variance == 0.0;
-    if is_exact || n == 0 {
+    if case.noisy_inputs.are_exact() || n == 0 {
         return DMatrix::zeros(n, n);
     }
     let mut covariance = AlignedBuffer::zeros(width * width);
@@ -207,12 +206,13 @@ impl<const NX: usize, E: Equations<NX>> Adjoint<'_, NX, E> {
     #[inline(always)]
     fn coefficient_noise(&self, k: usize) -> [[f64; COEFFICIENTS]; COEFFICIENTS] {
         let mut covariance = [[0.0; COEFFICIENTS]; COEFFICIENTS];
-        if self.case.pressure_variance > 0.0 {
+        let inputs = &self.case.noisy_inputs;
+        if inputs.pressure_variance > 0.0 {
             let build_up = self.case.build_up_at(self.parameters, 2 * k);
             let effects = build_up.coefficients(&self.case.motion.states[k]);
-            add_product(&mut covariance, self.case.pressure_variance, &effects);
+            add_product(&mut covariance, inputs.pressure_variance, &effects);
         }
-        for surface in &self.case.noisy_surfaces {
+        for surface in &inputs.surfaces {
             let mut effects = [0.0; COEFFICIENTS];
             for effect in &surface.effects {
                 let value = match effect.value {
@@ -365,10 +365,10 @@ mod tests {
         match source {
             Source::Surfaces { .. } => {
                 let once = window_of(&source.record(&mut noise));
-                case.noisy_surfaces = noisy_surfaces(&aircraft(), &once, &model);
+                case.noisy_inputs.surfaces = noisy_surfaces(&aircraft(), &once, &model);
             }
             Source::Pressure { share, every } => {
-                case.pressure_variance = every as f64 * share * share;
+                case.noisy_inputs.pressure_variance = every as f64 * share * share;
             }
         }
         let series = case.series(&response, &TABLE);

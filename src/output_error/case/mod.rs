@@ -11,6 +11,7 @@ pub(crate) mod chunking;
 pub(crate) mod layout;
 pub(crate) mod regressors;
 mod model;
+pub mod noisy_inputs;
 pub mod pressure_noise;
 pub mod surface_noise;
 
@@ -22,8 +23,8 @@ use nalgebra::SVector;
 
 use self::build_up::{BuildUp, PointBuildUp, Term, ValuedTerm};
 use self::layout::LaneLayout;
+use self::noisy_inputs::NoisyInputs;
 use self::regressors::{PreparedMotion, RegressorColumns};
-use self::surface_noise::NoisySurface;
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
@@ -57,11 +58,8 @@ pub struct Case<const NX: usize, E: Equations<NX>> {
     /// State at which the integration starts unless it is estimated.
     pub(crate) start: SVector<f64, NX>,
     pub(crate) initial_state: InitialState,
-    /// Surfaces whose noise the corrected bounds count; empty by default.
-    pub noisy_surfaces: Vec<NoisySurface>,
-    /// Relative variance of the dynamic pressure's noise that the corrected bounds count; zero by
-    /// default.
-    pub pressure_variance: f64,
+    /// Inputs whose noise the corrected bounds count; none by default.
+    pub noisy_inputs: NoisyInputs,
     pub measurements: Measurements,
     /// Names of the parameters in order; initial states are named `initial alpha` and so on.
     pub names: Vec<String>,
@@ -152,8 +150,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
             start: mean(motion.states.iter().take(TRIMMED_SAMPLES)),
             motion,
             initial_state: model.initial_state,
-            noisy_surfaces: vec![],
-            pressure_variance: 0.0,
+            noisy_inputs: NoisyInputs::default(),
             measurements,
             names: model.parameter_names(&E::STATES),
             equations: PhantomData,
