@@ -118,7 +118,7 @@ install: build ## install program, man pages and shell completions under PREFIX
 	"$(DESTDIR)$(PREFIX)/bin/harvest" manual --to "$(DESTDIR)$(PREFIX)"
 
 test: ## run the tests and name the ten slowest
-	bash tests/run.sh
+	FEATURES='$(FEATURES)' bash tests/run.sh
 
 same: ## are the published tables those of the revision SINCE, byte for byte
 	bash tests/same_tables.sh '$(SINCE)'
@@ -140,7 +140,7 @@ cluster: build ## a campaign on a Slurm of this machine's own: plain, with a fai
 	bash tests/cluster/slurm.sh target/release/harvest
 
 object-store: ## archive and store in an object store: the tests on an S3-compatible server of this machine's own
-	bash tests/cluster/s3.sh
+	HARVEST_S3_SERVER=$$(bash tests/cluster/s3_server.sh) FEATURES=s3 bash tests/run.sh object_store::
 
 FILES ?= 5000
 fuzz: ## FILES spoiled flights, and as many spoiled YAML and CSV files

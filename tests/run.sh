@@ -4,12 +4,14 @@
 #
 #   tests/run.sh             all tests
 #   tests/run.sh nights::    those whose names contain a text
+#
+# FEATURES names features of the crate to build with.
 set -uo pipefail
 cd "$(dirname "$0")/.."
 
 built=$(mktemp) log=$(mktemp)
 trap 'rm -f "$built" "$log"' EXIT
-cargo test --locked --no-run 2>&1 | tee "$built" || exit 1
+cargo test --locked --features "${FEATURES:-}" --no-run 2>&1 | tee "$built" || exit 1
 programs=$(sed -n 's/^ *Executable .*(\(.*\))$/\1/p' "$built")
 [ -n "$programs" ] || { echo "cargo named no test program"; exit 1; }
 

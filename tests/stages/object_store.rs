@@ -1,5 +1,5 @@
 //! Archive and store in an object store: a real S3-compatible server on this machine's loopback,
-//! named by `HARVEST_S3_SERVER` (`tests/cluster/s3.sh` installs one). Skipped without it, but in
+//! named by `HARVEST_S3_SERVER` (`tests/cluster/s3_server.sh` installs one). Skipped without it, but in
 //! CI.
 
 use std::collections::BTreeMap;
@@ -32,8 +32,11 @@ impl Drop for Server {
 impl Server {
     /// With a bucket `flights` of two flights and an empty bucket `store`.
     fn start(local: &Campaign) -> Option<Server> {
-        let Some(program) = std::env::var_os("HARVEST_S3_SERVER") else {
-            skip("no S3-compatible server (HARVEST_S3_SERVER; tests/cluster/s3.sh installs one)");
+        let program = std::env::var_os("HARVEST_S3_SERVER").filter(|program| !program.is_empty());
+        let Some(program) = program else {
+            skip(
+                "no S3-compatible server (HARVEST_S3_SERVER; tests/cluster/s3_server.sh installs one)",
+            );
             return None;
         };
         let root = tempfile::tempdir().unwrap();
