@@ -81,6 +81,17 @@ impl<S: Simd> Mul<f64> for Lanes<S> {
     }
 }
 
+/// Numbers that a function returns for each place. Unlike `std::array::from_fn` it is part of its caller, as its
+/// function must be: where the processor's vectors are not enabled, each operation is a call.
+#[inline(always)]
+pub(crate) fn each<S: Simd, const N: usize>(of: impl Fn(usize) -> Lanes<S>) -> [Lanes<S>; N] {
+    let mut all = [of(0); N];
+    for (place, own) in all.iter_mut().enumerate().skip(1) {
+        *own = of(place);
+    }
+    all
+}
+
 /// Sum of numbers times factors.
 #[inline(always)]
 pub(crate) fn combination<S: Simd, const N: usize>(

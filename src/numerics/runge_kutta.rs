@@ -31,6 +31,7 @@ pub fn weights_s(step_s: f64) -> [f64; STAGES] {
 
 /// State after one step of `step_s` from `x`. `slope(stage, x)` returns the rate at a stage, and
 /// `plus(x, slope, h)` returns x + h slope.
+#[inline(always)]
 pub fn step<X: Clone>(
     x: &X,
     step_s: f64,

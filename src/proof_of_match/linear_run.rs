@@ -12,7 +12,7 @@ use super::aerodynamics::COEFFICIENTS;
 use super::free_run::{Companion, FreeRun, RunEquations, STATES, Simulation, Start};
 use super::load_changes::LoadSlopes;
 use super::outputs::COUNT;
-use crate::numerics::lanes::Lanes;
+use crate::numerics::lanes::{Lanes, each};
 use crate::numerics::runge_kutta::{self, STAGES};
 use crate::numerics::simd::{AlignedBuffer, VECTOR};
 use crate::rigid_body::{
@@ -187,7 +187,10 @@ fn load<S: Simd, const N: usize>(
     width: usize,
     column: usize,
 ) -> [Lanes<S>; N] {
-    from_fn(|row| Lanes::load(simd, rows, row * width + column))
+    each(
+        #[inline(always)]
+        |row| Lanes::load(simd, rows, row * width + column),
+    )
 }
 
 impl StageSlopes {
@@ -267,11 +270,16 @@ impl WithSimd for Advance<'_> {
     fn with_simd<S: Simd>(self, simd: S) {
         for column in (0..self.width).step_by(S::F64_LANES) {
             let state = StateChange(load(simd, self.states, self.width, column));
-            let rate = |stage: usize, at: &StateChange<S>| {
-                let own = load(simd, self.own[stage], self.width, column);
-                self.stages[stage].rate(at, &own).0
-            };
-            let end = runge_kutta::step(&state, self.step_s, rate, StateChange::plus);
+            let end = runge_kutta::step(
+                &state,
+                self.step_s,
+                #[inline(always)]
+                |stage, at| {
+                    let own = load(simd, self.own[stage], self.width, column);
+                    self.stages[stage].rate(at, &own).0
+                },
+                StateChange::plus,
+            );
             for (row, value) in end.normalised(&self.end).0.into_iter().enumerate() {
                 value.store(self.states, row * self.width + column);
             }

@@ -9,7 +9,7 @@ use std::array::from_fn;
 use pulp::Simd;
 
 use super::aerodynamics::{Aerodynamics, COEFFICIENTS, FORCE, Flow, FlowSlopes, MOMENT};
-use crate::numerics::lanes::{Lanes, combination};
+use crate::numerics::lanes::{Lanes, combination, each};
 use crate::rigid_body::{AirChange, BodySlopes, Instant, StateChange};
 use crate::units::DEG;
 
@@ -109,20 +109,29 @@ impl LoadSlopes {
     ) -> LoadsChange<S> {
         let [p, q, r] = state.rates();
         let flow = [air.alpha, air.beta, air.velocity, air.mach, p, q, r];
-        let coefficients: [Lanes<S>; COEFFICIENTS] = from_fn(|i| {
-            let slopes = &self.coefficients[i];
-            let along_flow = combination(&from_fn(|n| slopes[n]), &flow);
-            own[i] + along_flow.plus(slopes[Flow::QBAR], air.relative_qbar)
-        });
+        let coefficients: [Lanes<S>; COEFFICIENTS] = each(
+            #[inline(always)]
+            |i| {
+                let [alpha, beta, velocity, mach, p, q, r, _, qbar] = self.coefficients[i];
+                let along_flow = combination(&[alpha, beta, velocity, mach, p, q, r], &flow);
+                own[i] + along_flow.plus(qbar, air.relative_qbar)
+            },
+        );
         let mut loads = LoadsChange {
-            force: from_fn(|i| {
-                let own = coefficients[FORCE[i].0] * self.force_by_own[i];
-                own.plus(self.force[i], air.relative_qbar)
-            }),
-            moment: from_fn(|i| {
-                let own = coefficients[MOMENT[i]] * self.moment_by_own[i];
-                own.plus(self.moment[i], air.relative_qbar)
-            }),
+            force: each(
+                #[inline(always)]
+                |i| {
+                    let own = coefficients[FORCE[i].0] * self.force_by_own[i];
+                    own.plus(self.force[i], air.relative_qbar)
+                },
+            ),
+            moment: each(
+                #[inline(always)]
+                |i| {
+                    let own = coefficients[MOMENT[i]] * self.moment_by_own[i];
+                    own.plus(self.moment[i], air.relative_qbar)
+                },
+            ),
         };
         if let Some(lag) = &self.lag {
             let rate = body.change(state, &loads.force, &loads.moment);

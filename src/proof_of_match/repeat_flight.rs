@@ -381,11 +381,12 @@ fn at_most_outside(inside: &[f64], allowed: usize) -> f64 {
     }
     let mut outside = vec![0.0; allowed + 1];
     outside[0] = 1.0;
-    for inside in inside {
-        for count in (0..=allowed).rev() {
-            let fewer = if count > 0 { outside[count - 1] } else { 0.0 };
-            outside[count] = inside * outside[count] + (1.0 - inside) * fewer;
+    for (before, inside) in inside.iter().enumerate() {
+        // No more samples are outside than there were.
+        for count in (1..=allowed.min(before + 1)).rev() {
+            outside[count] = inside * outside[count] + (1.0 - inside) * outside[count - 1];
         }
+        outside[0] *= inside;
     }
     outside.iter().sum()
 }

@@ -14,7 +14,7 @@ use super::air_data::AirData;
 use super::body::BodyState;
 use super::loading::Mass;
 use crate::earth::air_gradients;
-use crate::numerics::lanes::{Lanes, combination};
+use crate::numerics::lanes::{Lanes, combination, each};
 
 /// Number of states whose changes change the motion: u v w, p q r, the attitude, and the height.
 pub(crate) const CHANGING: usize = 11;
@@ -31,22 +31,34 @@ impl<S: Simd> StateChange<S> {
     /// Adds `factor` times a rate.
     #[inline(always)]
     pub fn plus(&self, rate: &StateChange<S>, factor: f64) -> StateChange<S> {
-        StateChange(from_fn(|i| self.0[i].plus(factor, rate.0[i])))
+        StateChange(each(
+            #[inline(always)]
+            |i| self.0[i].plus(factor, rate.0[i]),
+        ))
     }
 
     #[inline(always)]
     pub fn velocity(&self) -> Three<S> {
-        from_fn(|i| self.0[i])
+        each(
+            #[inline(always)]
+            |i| self.0[i],
+        )
     }
 
     #[inline(always)]
     pub fn rates(&self) -> Three<S> {
-        from_fn(|i| self.0[3 + i])
+        each(
+            #[inline(always)]
+            |i| self.0[3 + i],
+        )
     }
 
     #[inline(always)]
     pub fn attitude(&self) -> [Lanes<S>; 4] {
-        from_fn(|i| self.0[6 + i])
+        each(
+            #[inline(always)]
+            |i| self.0[6 + i],
+        )
     }
 
     #[inline(always)]
@@ -185,7 +197,10 @@ impl Down {
     #[inline(always)]
     pub fn change<S: Simd>(&self, state: &StateChange<S>) -> Three<S> {
         let attitude = state.attitude();
-        from_fn(|i| combination(&self.by_attitude[i], &attitude))
+        each(
+            #[inline(always)]
+            |i| combination(&self.by_attitude[i], &attitude),
+        )
     }
 }
 
@@ -222,24 +237,33 @@ impl BodySlopes {
     ) -> StateChange<S> {
         let (velocity, rates, attitude) = (state.velocity(), state.rates(), state.attitude());
         let down = self.gravity.change(state);
-        let momentum: Three<S> = from_fn(|i| combination(&self.inertia[i], &rates));
-        let turning: Three<S> = from_fn(|i| {
-            let gyroscopic = cross_change(&self.rates, &rates, &self.momentum, &momentum, i);
-            moment[i] - gyroscopic
-        });
+        let momentum: Three<S> = each(
+            #[inline(always)]
+            |i| combination(&self.inertia[i], &rates),
+        );
+        let turning: Three<S> = each(
+            #[inline(always)]
+            |i| {
+                let gyroscopic = cross_change(&self.rates, &rates, &self.momentum, &momentum, i);
+                moment[i] - gyroscopic
+            },
+        );
         let [i, j, k, w] = self.attitude;
         let [p, q, r] = self.rates;
-        let both = |by_rates: [f64; 3], by_attitude: [f64; 4]| {
-            (combination(&by_rates, &rates) + combination(&by_attitude, &attitude)) * 0.5
-        };
         let climb =
             combination(&self.gravity.direction, &velocity) + combination(&self.velocity, &down);
-        let accelerations: Three<S> = from_fn(|i| {
-            let turned = cross_change(&self.rates, &rates, &self.velocity, &velocity, i);
-            (down[i] * self.gravity_ft_s2).plus(self.per_mass, force[i]) - turned
-        });
+        let accelerations: Three<S> = each(
+            #[inline(always)]
+            |i| {
+                let turned = cross_change(&self.rates, &rates, &self.velocity, &velocity, i);
+                (down[i] * self.gravity_ft_s2).plus(self.per_mass, force[i]) - turned
+            },
+        );
         let [du, dv, dw] = accelerations;
-        let [dp, dq, dr] = from_fn(|i| combination(&self.inverse_inertia[i], &turning));
+        let [dp, dq, dr] = each(
+            #[inline(always)]
+            |i| combination(&self.inverse_inertia[i], &turning),
+        );
         StateChange([
             du,
             dv,
@@ -247,13 +271,24 @@ impl BodySlopes {
             dp,
             dq,
             dr,
-            both([w, -k, j], [0.0, r, -q, p]),
-            both([k, w, -i], [-r, 0.0, p, q]),
-            both([-j, i, w], [q, -p, 0.0, r]),
-            both([-i, -j, -k], [-p, -q, -r, 0.0]),
+            half(&rates, &attitude, [w, -k, j], [0.0, r, -q, p]),
+            half(&rates, &attitude, [k, w, -i], [-r, 0.0, p, q]),
+            half(&rates, &attitude, [-j, i, w], [q, -p, 0.0, r]),
+            half(&rates, &attitude, [-i, -j, -k], [-p, -q, -r, 0.0]),
             climb * -1.0,
         ])
     }
+}
+
+/// Half the sum of the changes of rates and attitude times their factors.
+#[inline(always)]
+fn half<S: Simd>(
+    rates: &Three<S>,
+    attitude: &[Lanes<S>; 4],
+    by_rates: [f64; 3],
+    by_attitude: [f64; 4],
+) -> Lanes<S> {
+    (combination(&by_rates, rates) + combination(&by_attitude, attitude)) * 0.5
 }
 
 /// Component `i` of the change of a cross product a × b, with the changes of both.

@@ -10,7 +10,7 @@ use pulp::Simd;
 use super::changes::{AirChange, Down, StateChange};
 use super::readings::Instant;
 use crate::aircraft::{Aircraft, Flow, Position, Reading};
-use crate::numerics::lanes::{Lanes, combination};
+use crate::numerics::lanes::{Lanes, combination, each};
 use crate::units::{DEG, G0_FT_S2};
 
 /// Changes of the readings, as in [`super::Readings`] without the heading.
@@ -97,7 +97,10 @@ impl ReadingSlopes {
         ReadingsChange {
             alpha_vane_deg: self.alpha_vane.change(air, &rates),
             beta_vane_deg: self.beta_vane.change(air, &rates),
-            rates_deg_s: rates.map(|rate| rate * DEG),
+            rates_deg_s: each(
+                #[inline(always)]
+                |i| rates[i] * DEG,
+            ),
             euler_deg: [bank, pitch],
             an_g: self.an.change(&rates, rate, force),
             ax_g: self.ax.change(&rates, rate, force),
