@@ -1250,3 +1250,32 @@ fn a_place_in_an_object_store_is_an_archive_or_a_store_with_a_cache_and_nothing_
         "{error}"
     );
 }
+
+#[test]
+fn levels_of_flying_qualities_are_ranges_that_widen() {
+    let first =
+        "categories: [A], level_1: { min: 0.28, max: 3.6 }, level_2: { min: 0.16, max: 10 }";
+    for (levels, said) in [
+        (
+            "level_1: { min: 0.28, max: -1 }, level_2: { min: 0.16, max: 10 }",
+            "the `min` 0.28 of level 1 is above its `max` -1",
+        ),
+        (
+            "level_1: { min: 0.28, max: 3.6 }, level_2: { min: 0.5, max: 10 }",
+            "level 2 allows less than level 1: its `min` is 0.5, that of level 1 0.28",
+        ),
+        (
+            "level_1: { min: 0.28, max: 3.6 }, level_2: { min: 0.16, max: 3 }",
+            "level 2 allows less than level 1: its `max` is 3, that of level 1 3.6",
+        ),
+    ] {
+        let copy = Copy::new();
+        let line = copy.spoil(
+            "qualities.yaml",
+            first,
+            &format!("categories: [A], {levels}"),
+        );
+        let place = format!("qualities.yaml:{line}: a limit of `control_anticipation`: ");
+        assert_eq!(copy.error(), place + said);
+    }
+}

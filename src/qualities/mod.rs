@@ -32,7 +32,7 @@ use analysis::Analysis;
 pub use judged_aircraft::JudgedAircraft;
 pub use judged_quantity::judged_quantity;
 pub use linear::{Controls, Differentiation, Flight, LinearModel};
-pub use specification::{Range, Specification};
+pub use specification::{LevelLimit, Range, Specification};
 pub use trim::FlownConditions;
 
 /// States that the feedback of a specification may use.

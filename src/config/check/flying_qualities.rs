@@ -1,9 +1,9 @@
-//! Checks of `qualities.yaml`: names resolve, limits are numbers.
+//! Checks of `qualities.yaml`: names resolve, limits are ranges, each within that of the next level.
 
 use crate::config::checked::Config;
 use crate::config::source::{Files, Source};
 use crate::error::{Result, did_you_mean};
-use crate::qualities::{FEEDBACK_STATES, Specification};
+use crate::qualities::{FEEDBACK_STATES, LevelLimit, Specification};
 
 /// Fewest draws that give a probability to a per cent or two.
 const LEAST_DRAWS: usize = 100;
@@ -42,7 +42,36 @@ pub(super) fn check(config: &Config, files: &Files) -> Result<()> {
         let what = format!("`draws` must lie between {LEAST_DRAWS} and {MOST_DRAWS}, not {draws}");
         return Err(source.error("draws", what));
     }
-    Ok(())
+    let mut limits = specification.requirements.iter().flat_map(|r| &r.limits);
+    limits.try_for_each(|limit| match mistake(limit) {
+        None => Ok(()),
+        Some(what) => {
+            let name = limit.quantity.name();
+            Err(source.error(name, format!("a limit of `{name}`: {what}")))
+        }
+    })
+}
+
+/// Level that allows nothing, or less than a better one, in words.
+fn mistake(limit: &LevelLimit) -> Option<String> {
+    let levels = [(1, limit.level_1), (2, limit.level_2), (3, limit.level_3)];
+    let empty = levels.iter().find_map(|(level, range)| {
+        let (min, max) = range.min.zip(range.max)?;
+        (min > max).then(|| format!("the `min` {min} of level {level} is above its `max` {max}"))
+    });
+    let narrower = || {
+        let pairs = levels.iter().zip(&levels[1..]);
+        pairs.into_iter().find_map(|((better, own), (worse, next))| {
+            let less = |what: &str, own: f64, next: f64| {
+                format!("level {worse} allows less than level {better}: its `{what}` is {next}, that of level {better} {own}")
+            };
+            let by_min = own.min.zip(next.min).filter(|(own, next)| next > own);
+            let by_max = own.max.zip(next.max).filter(|(own, next)| next < own);
+            let by_min = by_min.map(|(own, next)| less("min", own, next));
+            by_min.or_else(|| by_max.map(|(own, next)| less("max", own, next)))
+        })
+    };
+    empty.or_else(narrower)
 }
 
 fn surfaces(specification: &Specification) -> impl Iterator<Item = &String> {
