@@ -10,7 +10,6 @@ use crate::proof_of_match::aerodynamics::Aerodynamics;
 use crate::proof_of_match::derivative_table::DerivativeTable;
 use crate::proof_of_match::free_run::{FreeRun, Simulation, Start};
 use crate::proof_of_match::linear_run::Parameter;
-use crate::proof_of_match::outputs::COUNT;
 use crate::proof_of_match::recording::Recording;
 use crate::proof_of_match::start::{self, PARAMETERS};
 
@@ -58,11 +57,9 @@ fn compare(simulation: &Simulation, buildup: &Buildup) {
     for (parameter, slopes) in parameters.iter().zip(&linear.slopes) {
         let by = deviation(*parameter);
         let [up, down] = [by, -by].map(|by| moved((simulation, &start), buildup, *parameter, by));
-        for output in 0..COUNT {
-            let largest = slopes[output]
-                .iter()
-                .fold(0.0_f64, |most, s| most.max(s.abs()));
-            for (k, slope) in slopes[output].iter().enumerate() {
+        for (output, slopes) in slopes.iter().enumerate() {
+            let largest = slopes.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
+            for (k, slope) in slopes.iter().enumerate() {
                 let difference = up.outputs[k][output] - down.outputs[k][output];
                 // Rounding is 1e-13 of an output of 100.
                 let rounding = 1e-12 * 100.0 / by;
