@@ -275,7 +275,9 @@ impl<'a> AboutTrim<'a> {
     /// Change of the coefficients from the trim.
     #[must_use]
     pub fn change(&mut self, flow: &Flow, recorded: &[f64]) -> [f64; COEFFICIENTS] {
-        self.evaluate(flow, recorded);
+        for (value, factor) in self.values.iter_mut().zip(&self.factors) {
+            *value = factor.value(flow, recorded);
+        }
         let entries = self.table.entries(self.table.place(flow.alpha_deg));
         let mut change = [0.0; COEFFICIENTS];
         for (sum, terms) in change.iter_mut().zip(&self.terms) {
@@ -290,17 +292,11 @@ impl<'a> AboutTrim<'a> {
         change
     }
 
-    /// Values of the factors in a flow.
-    fn evaluate(&mut self, flow: &Flow, recorded: &[f64]) {
-        for (value, factor) in self.values.iter_mut().zip(&self.factors) {
-            *value = factor.value(flow, recorded);
-        }
-    }
-
-    /// Slopes of the coefficients along the flow, and along the derivatives at every angle of attack alike.
+    /// Change of the coefficients from the trim with its slopes along the flow, and along the derivatives at every
+    /// angle of attack alike.
     #[must_use]
-    pub fn slopes(&mut self, flow: &Flow, recorded: &[f64]) -> CoefficientSlopes {
-        self.evaluate(flow, recorded);
+    pub fn change_with_slopes(&mut self, flow: &Flow, recorded: &[f64]) -> CoefficientSlopes {
+        let change = self.change(flow, recorded);
         let entries = self.table.entries(self.table.place(flow.alpha_deg));
         let along = self.factors.iter().map(|f| f.slopes(flow, recorded));
         let along: Vec<FlowSlopes> = along.collect();
@@ -323,15 +319,17 @@ impl<'a> AboutTrim<'a> {
             }
         }
         CoefficientSlopes {
+            change,
             by_flow,
             by_derivative,
         }
     }
 }
 
-/// Slopes of the coefficients at an instant.
+/// Change of the coefficients from the trim, with its slopes, at an instant.
 #[derive(Clone, Debug)]
 pub struct CoefficientSlopes {
+    pub change: [f64; COEFFICIENTS],
     pub by_flow: [FlowSlopes; COEFFICIENTS],
     /// Slope of each derivative's own coefficient along it.
     pub by_derivative: Vec<f64>,

@@ -244,21 +244,19 @@ impl RunEquations<'_> {
         };
         let flow = Flow::new(&instant.air, state.rates.into(), alpha_rate);
         let recorded = self.simulation.recording.signals(point);
-        let coefficients = self.coefficients(&flow, recorded);
-        let slopes = self.aerodynamics.slopes(&flow, recorded);
+        let slopes = self.aerodynamics.change_with_slopes(&flow, recorded);
         let loads = LoadSlopes::new(
             &self.simulation.aerodynamics,
             instant,
-            &coefficients,
+            &self.coefficients(slopes.change),
             slopes.by_flow,
             has_lag,
         );
         (loads, slopes.by_derivative)
     }
 
-    /// Coefficients in a flow.
-    fn coefficients(&mut self, flow: &Flow, recorded: &[f64]) -> [f64; COEFFICIENTS] {
-        let change = self.aerodynamics.change(flow, recorded);
+    /// Coefficients by their change from the trim.
+    fn coefficients(&self, change: [f64; COEFFICIENTS]) -> [f64; COEFFICIENTS] {
         let level = self.start.trim.coefficients;
         std::array::from_fn(|i| level[i] + change[i])
     }
@@ -270,7 +268,8 @@ impl RunEquations<'_> {
         let mut air = AirData::new(&state.velocity, state.position.z);
         air.qbar_psf *= self.start.density_ratio;
         let flow = Flow::new(&air, state.rates.into(), alpha_rate);
-        let coefficients = self.coefficients(&flow, recording.signals(point));
+        let change = self.aerodynamics.change(&flow, recording.signals(point));
+        let coefficients = self.coefficients(change);
         let model = &self.simulation.aerodynamics;
         let (force, moment) = model.loads(&coefficients, air.qbar_psf);
         let thrust = inputs.thrust;

@@ -71,6 +71,8 @@ struct RunSlopes<'a> {
     own: [AlignedBuffer; STAGES],
     /// Slopes of the state: state by state, each parameter.
     states: AlignedBuffer,
+    /// Slopes of the outputs at a sample: output by output, each parameter.
+    outputs: AlignedBuffer,
     /// Number of the parameters, padded to whole vectors.
     width: usize,
     histories: Vec<Histories>,
@@ -111,6 +113,7 @@ impl<'a> RunSlopes<'a> {
             stages: [None; STAGES],
             own: from_fn(|_| AlignedBuffer::zeros(COEFFICIENTS * width)),
             states,
+            outputs: AlignedBuffer::zeros(COUNT * width),
             width,
             histories: vec![[const { Vec::new() }; COUNT]; parameters.len()],
         }
@@ -148,18 +151,17 @@ impl Companion for RunSlopes<'_> {
         let Some(stage) = self.stages[0] else {
             return;
         };
-        let mut outputs = AlignedBuffer::zeros(COUNT * self.width);
         Arch::new().dispatch(Read {
             readings: &ReadingSlopes::new(instant, self.simulation.aircraft),
             stage: &stage,
             own: self.own[0].slice(),
             states: self.states.slice(),
             width: self.width,
-            outputs: outputs.slice_mut(),
+            outputs: self.outputs.slice_mut(),
         });
         for (column, histories) in self.histories.iter_mut().enumerate() {
             for (output, history) in histories.iter_mut().enumerate() {
-                history.push(outputs.slice()[output * self.width + column]);
+                history.push(self.outputs.slice()[output * self.width + column]);
             }
         }
     }

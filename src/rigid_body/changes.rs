@@ -80,8 +80,7 @@ impl<S: Simd> StateChange<S> {
 }
 
 /// Attitude quaternion of a state: i j k w.
-#[must_use]
-pub(crate) fn attitude(state: &BodyState) -> [f64; 4] {
+pub(super) fn attitude(state: &BodyState) -> [f64; 4] {
     state.attitude.coords.into()
 }
 

@@ -59,12 +59,7 @@ impl ReadingSlopes {
     pub fn new(instant: &Instant, aircraft: &Aircraft) -> ReadingSlopes {
         let sensors = &aircraft.sensors;
         let cg = instant.loading.cg();
-        let flow = Flow {
-            alpha: instant.air.alpha,
-            beta: instant.air.beta,
-            velocity: instant.air.velocity_ft_s,
-            rates: instant.relative_rates.into(),
-        };
+        let flow = instant.flow();
         let accelerometer = |position: Position, axis: usize, sign: f64| {
             AccelerometerSlopes::new(instant, position, (axis, sign))
         };

@@ -44,18 +44,24 @@ pub struct Readings {
 }
 
 impl Instant {
+    /// Flow that the vanes meet.
+    #[inline(always)]
+    pub(super) fn flow(&self) -> Flow {
+        Flow {
+            alpha: self.air.alpha,
+            beta: self.air.beta,
+            velocity: self.air.velocity_ft_s,
+            rates: self.relative_rates.into(),
+        }
+    }
+
     /// Readings of an aircraft's sensors.
     #[inline(always)]
     #[must_use]
     pub fn readings(&self, aircraft: &Aircraft) -> Readings {
         let sensors = &aircraft.sensors;
         let cg = self.loading.cg();
-        let flow = Flow {
-            alpha: self.air.alpha,
-            beta: self.air.beta,
-            velocity: self.air.velocity_ft_s,
-            rates: self.relative_rates.into(),
-        };
+        let flow = self.flow();
         let w = self.state.rates;
         let acceleration_g = |position: Position, axis: usize| {
             let arm = Vector3::from(position.arm(cg));
