@@ -159,7 +159,8 @@ impl TunnelRow {
 /// # Errors
 /// [`Error::Config`] naming file, line and column of what cannot be read.
 pub fn events(path: &Path) -> Result<Vec<(usize, Event)>> {
-    written(path, &["flight_id", "class", "start_s", "end_s"])
+    let columns = ["flight_id", "class", "start_s", "end_s"];
+    rows(path, &written(path)?, &columns)
 }
 
 /// Reads the rows of a published CSV. Columns that the row type lacks are ignored.
@@ -168,7 +169,7 @@ pub fn events(path: &Path) -> Result<Vec<(usize, Event)>> {
 /// [`Error::Io`] or [`Error::Config`] naming the file, and line and column of what cannot be read.
 pub fn published<T: DeserializeOwned>(folder: &Path, table: &str) -> Result<Vec<T>> {
     let path = folder.join(format!("{table}.csv"));
-    Ok(rows(&path, &text(&path)?)?
+    Ok(rows(&path, &text(&path)?, &[])?
         .into_iter()
         .map(|(_, row)| row)
         .collect())
@@ -257,34 +258,21 @@ fn other_form(text: &str) -> Option<&'static str> {
     }
 }
 
-/// Reads the rows of a CSV that an analyst wrote and that needs some columns, each with its line number.
+/// Reads a CSV that an analyst wrote.
 ///
 /// # Errors
-/// [`Error::Io`], or [`Error::Config`] naming the file, and line and column of what cannot be read.
-pub(super) fn written<T: DeserializeOwned>(
-    path: &Path,
-    columns: &[&str],
-) -> Result<Vec<(usize, T)>> {
+/// As [`text`], and [`Error::Config`] for one of more rows than any tunnel has.
+pub(super) fn written(path: &Path) -> Result<String> {
     let content = text(path)?;
     if content.bytes().filter(|byte| *byte == b'\n').count() > MOST_ROWS {
         let what = format!("it has more than {MOST_ROWS} lines");
         return Err(Error::config(path, None, what));
     }
-    if let Some(what) = lacking(&content, columns) {
-        return Err(Error::config(path, Some(1), what));
-    }
-    rows(path, &content)
+    Ok(content)
 }
 
-/// Message for a text whose first line lacks a column; `None` where it has all, or is no CSV.
-fn lacking(text: &str, columns: &[&str]) -> Option<String> {
-    if other_form(text).is_some() {
-        return None;
-    }
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes());
-    let header = reader.headers().ok()?;
+/// Message for a header that lacks a column.
+fn lacking(header: &csv::StringRecord, columns: &[&str]) -> Option<String> {
     let column = columns
         .iter()
         .find(|name| !header.iter().any(|own| own == **name))?;
@@ -295,7 +283,15 @@ fn lacking(text: &str, columns: &[&str]) -> Option<String> {
     ))
 }
 
-fn rows<T: DeserializeOwned>(path: &Path, content: &str) -> Result<Vec<(usize, T)>> {
+/// Rows of a CSV that needs some columns, each with its line number.
+///
+/// # Errors
+/// [`Error::Config`] naming the file, and line and column of what cannot be read.
+pub(super) fn rows<T: DeserializeOwned>(
+    path: &Path,
+    content: &str,
+    columns: &[&str],
+) -> Result<Vec<(usize, T)>> {
     if let Some(what) = other_form(content) {
         return Err(Error::config(path, None, what));
     }
@@ -303,6 +299,9 @@ fn rows<T: DeserializeOwned>(path: &Path, content: &str) -> Result<Vec<(usize, T
         .trim(csv::Trim::All)
         .from_reader(content.as_bytes());
     let header = reader.headers().cloned().unwrap_or_default();
+    if let Some(what) = lacking(&header, columns) {
+        return Err(Error::config(path, Some(1), what));
+    }
     let mut rows = Vec::new();
     for record in reader.records() {
         let line = |position: Option<&csv::Position>| {

@@ -52,9 +52,10 @@ const COLUMNS: [&str; 4] = ["derivative", "alpha_deg", "value", "unit"];
 
 /// Rows of a CSV with a header.
 fn of_csv(path: &Path, third: Option<&str>) -> Result<Vec<(usize, TunnelRow)>> {
-    let mut rows: Vec<(usize, TunnelRow)> = files::written(path, &COLUMNS)?;
+    let text = files::written(path)?;
+    let mut rows: Vec<(usize, TunnelRow)> = files::rows(path, &text, &COLUMNS)?;
     let Some(third) = third else { return Ok(rows) };
-    let fields: Vec<(usize, BTreeMap<String, String>)> = files::written(path, &[])?;
+    let fields: Vec<(usize, BTreeMap<String, String>)> = files::rows(path, &text, &[])?;
     for ((line, row), (_, fields)) in rows.iter_mut().zip(fields) {
         let Some(text) = fields.get(third).filter(|text| !text.is_empty()) else {
             continue;
