@@ -52,13 +52,11 @@ fn last_night(config: &Config, nights: &Nights) -> Result<Night> {
 fn complete_night(config: &Config, nights: &Nights, name: &str) -> Result<Night> {
     let night = nights.named(name).filter(Night::is_complete);
     night.ok_or_else(|| {
-        let names = nights.names();
-        let is_named = |own: &&String| own.trim_start_matches('0') == name.trim_start_matches('0');
-        let what = match names.iter().find(is_named) {
-            Some(own) if nights.night(own).is_none() => damaged(own),
+        let what = match nights.full_name(name) {
+            Some(own) if nights.night(&own).is_none() => damaged(&own),
             _ => format!(
                 "there is no complete night `{name}` here; there are {}",
-                names.join(", ")
+                nights.names().join(", ")
             ),
         };
         Error::not_found(&config.reports, what)

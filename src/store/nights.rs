@@ -155,8 +155,15 @@ impl Nights {
     /// Manifest of the night of this name, given with or without leading zeros.
     #[must_use]
     pub fn named(&self, name: &str) -> Option<Night> {
-        self.night(name)
-            .or_else(|| self.night(&format!("{name:0>4}")))
+        spellings(name).iter().find_map(|name| self.night(name))
+    }
+
+    /// Name of the night, damaged or not, of this name, given with or without leading zeros.
+    #[must_use]
+    pub fn full_name(&self, name: &str) -> Option<String> {
+        let names = self.names();
+        let spellings = spellings(name);
+        spellings.into_iter().find(|name| names.contains(name))
     }
 
     /// Folder of a night.
@@ -345,6 +352,11 @@ impl Nights {
                 .to_owned(),
         )
     }
+}
+
+/// Names that a night's name may mean: as written, and with leading zeros.
+fn spellings(name: &str) -> [String; 2] {
+    [name.to_owned(), format!("{name:0>4}")]
 }
 
 fn write_manifest(folder: &Path, night: &Night) -> Result<()> {
