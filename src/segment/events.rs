@@ -47,7 +47,9 @@ pub fn with_events(
     for event in in_order(events, &record.flight_id) {
         let class = class_inside(event, record, classes);
         let own = class.and_then(|class| with_own_samples(event, class, &given, record.step_s));
-        match own.and_then(|class| maneuver_of_event(event, class, record, aircraft, limits)) {
+        let window = (event.start_s, event.end_s);
+        let maneuver = |class| condition::maneuver(record, aircraft, class, window, None, limits);
+        match own.and_then(maneuver) {
             Ok(maneuver) => {
                 rows.push(compare(Some(event), most_overlapping(event, &found)));
                 given.push(maneuver);
@@ -162,21 +164,6 @@ fn class_inside<'c>(
         "the event {} from {start:.1} to {end:.1} s is not inside the record, {first_s:.1} to {last_s:.1} s",
         event.class
     ))
-}
-
-/// The maneuver of an event.
-///
-/// # Errors
-/// The reason why there is none, in words.
-fn maneuver_of_event(
-    event: &Event,
-    class: &Class,
-    record: &Record,
-    aircraft: &Aircraft,
-    limits: &QualityLimits,
-) -> Result<Maneuver, String> {
-    let window = (event.start_s, event.end_s);
-    condition::maneuver(record, aircraft, class, window, None, limits)
 }
 
 fn overlap_s(m: &Maneuver, start_s: f64, end_s: f64) -> f64 {
