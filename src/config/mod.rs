@@ -14,12 +14,12 @@ mod events;
 mod instruments;
 mod load;
 mod moved;
-mod nesting;
 mod places;
 mod questions;
 mod source;
 mod tunnel_tables;
 mod written;
+mod yaml_bounds;
 
 pub use checked::Config;
 pub use cluster::ClusterSettings;

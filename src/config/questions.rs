@@ -2,8 +2,8 @@
 //! it was not sure of.
 
 use super::checked::Config;
-use super::nesting::without_comment;
 use super::source::Files;
+use super::source::without_comment;
 use crate::error::{Error, Result};
 use crate::inspection::draft::{OPEN, UNSURE};
 

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
-use super::nesting;
 use super::written::{AircraftFile, ClassFile, ModelFile};
+use super::yaml_bounds;
 use crate::aero::Buildup;
 use crate::error::{Error, Result, did_you_mean};
 use crate::maneuver::Class;
@@ -37,7 +37,7 @@ impl Source {
     pub fn read(path: PathBuf) -> Result<Source> {
         let text = files::text(&path)?;
         let source = Source { path, text };
-        match nesting::excess(&source.text) {
+        match yaml_bounds::excess(&source.text) {
             Some((line, what)) => Err(Error::config(&source.path, line, what)),
             None => Ok(source),
         }
@@ -112,17 +112,22 @@ impl Source {
     /// The first line from number `first` (from 0) on that holds a word, counted from 1.
     fn line_of(&self, name: &str, first: usize) -> Option<usize> {
         let word = |c: char| c.is_alphanumeric() || c == '_';
-        let holds = |line: &str| {
-            nesting::without_comment(line)
-                .split(|c| !word(c))
-                .any(|w| w == name)
-        };
+        let holds = |line: &str| without_comment(line).split(|c| !word(c)).any(|w| w == name);
         self.text
             .lines()
             .enumerate()
             .skip(first)
             .find(|(_, line)| holds(line))
             .map(|(i, _)| i + 1)
+    }
+}
+
+/// A line without what follows a `#` that begins a comment.
+pub(super) fn without_comment(line: &str) -> &str {
+    if line.trim_start().starts_with('#') {
+        ""
+    } else {
+        line.split(" #").next().unwrap_or_default()
     }
 }
 

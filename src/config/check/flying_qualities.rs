@@ -3,7 +3,7 @@
 use crate::config::checked::Config;
 use crate::config::source::{Files, Source};
 use crate::error::{Result, did_you_mean};
-use crate::qualities::{FEEDBACK_STATES, LevelLimit, Specification};
+use crate::qualities::{FEEDBACK_STATES, LevelLimit, Range, Specification};
 
 /// Fewest draws that give a probability to a per cent or two.
 const LEAST_DRAWS: usize = 100;
@@ -55,23 +55,31 @@ pub(super) fn check(config: &Config, files: &Files) -> Result<()> {
 /// Level that allows nothing, or less than a better one, in words.
 fn mistake(limit: &LevelLimit) -> Option<String> {
     let levels = [(1, limit.level_1), (2, limit.level_2), (3, limit.level_3)];
-    let empty = levels.iter().find_map(|(level, range)| {
-        let (min, max) = range.min.zip(range.max)?;
-        (min > max).then(|| format!("the `min` {min} of level {level} is above its `max` {max}"))
-    });
-    let narrower = || {
-        let pairs = levels.iter().zip(&levels[1..]);
-        pairs.into_iter().find_map(|((better, own), (worse, next))| {
-            let less = |what: &str, own: f64, next: f64| {
-                format!("level {worse} allows less than level {better}: its `{what}` is {next}, that of level {better} {own}")
-            };
-            let by_min = own.min.zip(next.min).filter(|(own, next)| next > own);
-            let by_max = own.max.zip(next.max).filter(|(own, next)| next < own);
-            let by_min = by_min.map(|(own, next)| less("min", own, next));
-            by_min.or_else(|| by_max.map(|(own, next)| less("max", own, next)))
-        })
+    let mut pairs = levels.array_windows();
+    let empty = levels
+        .iter()
+        .find_map(|(level, range)| empty(*level, range));
+    empty.or_else(|| pairs.find_map(|[better, worse]| narrower(better, worse)))
+}
+
+/// Message for a level that allows nothing.
+fn empty(level: usize, range: &Range) -> Option<String> {
+    let (min, max) = range.min.zip(range.max)?;
+    (min > max).then(|| format!("the `min` {min} of level {level} is above its `max` {max}"))
+}
+
+/// Message for a level that allows less than the next better one.
+fn narrower((better, own): &(usize, Range), (worse, next): &(usize, Range)) -> Option<String> {
+    let less = |limit: &str, own: f64, next: f64| {
+        format!(
+            "level {worse} allows less than level {better}: its `{limit}` is {next}, that of level {better} {own}"
+        )
     };
-    empty.or_else(narrower)
+    match (own.min.zip(next.min), own.max.zip(next.max)) {
+        (Some((own, next)), _) if next > own => Some(less("min", own, next)),
+        (_, Some((own, next))) if next < own => Some(less("max", own, next)),
+        _ => None,
+    }
 }
 
 fn surfaces(specification: &Specification) -> impl Iterator<Item = &String> {

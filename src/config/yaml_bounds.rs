@@ -44,15 +44,6 @@ pub fn excess(text: &str) -> Option<(Option<usize>, &'static str)> {
     None
 }
 
-/// A line without what follows a `#` that begins a comment.
-pub fn without_comment(line: &str) -> &str {
-    if line.trim_start().starts_with('#') {
-        ""
-    } else {
-        line.split(" #").next().unwrap_or_default()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
