@@ -36,7 +36,7 @@ pub enum Error {
     /// The object store did not answer, or an object was replaced meanwhile.
     #[error("{}: {what}", place.display())]
     Unavailable { place: PathBuf, what: String },
-    /// A file of the store or of a night is not as it was written.
+    /// A file of the store or of a night differs from what was written.
     #[error("{}: {what}", path.display())]
     Damaged { path: PathBuf, what: String },
     /// An artefact or a published file could not be made.
@@ -80,7 +80,7 @@ impl Error {
         }
     }
 
-    /// True where the same may succeed another time, without a change by the analyst.
+    /// True if a repetition may succeed without a change by the analyst.
     #[must_use]
     pub fn is_transient(&self) -> bool {
         match self {
@@ -143,7 +143,7 @@ words! {
 /// a damaged file has names of megabytes.
 const LONGEST_NAME: usize = 200;
 
-/// Similarity of two names from 0 to 1, whatever their case (Jaro and Winkler).
+/// Similarity of two names from 0 to 1, ignoring case (Jaro and Winkler).
 #[must_use]
 pub fn similarity(a: &str, b: &str) -> f64 {
     if a.len().max(b.len()) > LONGEST_NAME {
@@ -152,8 +152,8 @@ pub fn similarity(a: &str, b: &str) -> f64 {
     strsim::jaro_winkler(&a.to_lowercase(), &b.to_lowercase())
 }
 
-/// A phrase to append to an error: the name among `known` nearest to `given`; empty without a near
-/// one.
+/// A phrase to append to an error: the name among `known` nearest to `given`; empty if none is
+/// similar.
 #[must_use]
 pub fn did_you_mean<'a>(given: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let near = known

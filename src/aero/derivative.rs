@@ -74,7 +74,7 @@ impl Coefficient {
             .unwrap_or(0)
     }
 
-    /// Reference length of a moment, ft; one of a force.
+    /// Reference length by which a moment coefficient is made dimensionless, ft; 1 for a force.
     #[must_use]
     pub fn reference_length(self, aircraft: &Aircraft) -> f64 {
         match self {
@@ -159,8 +159,9 @@ pub struct Derivative {
 }
 
 impl Derivative {
-    /// Coefficient per unit of the derivative times its regressor, at a dynamic pressure in lbf/ft²: one;
-    /// of a vane, whose derivative is a force or moment, one over q̄S and the reference length.
+    /// Factor from a derivative times its regressor to the coefficient, at a dynamic pressure in
+    /// lbf/ft²: 1 for a derivative of a coefficient. A vane's derivative is a force or moment, so
+    /// its factor is 1/(q̄S) or 1/(q̄S × reference length).
     #[must_use]
     pub fn coefficient_factor(&self, aircraft: &Aircraft, qbar: f64) -> f64 {
         if !matches!(self.regressor, Regressor::Vane(_)) {

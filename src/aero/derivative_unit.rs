@@ -66,7 +66,7 @@ enum Numerator {
     Moment,
 }
 
-/// Angle that a derivative is per.
+/// Unit of angle below the line of a derivative's unit.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Angle {
     Degree,
@@ -74,7 +74,7 @@ enum Angle {
 }
 
 impl Angle {
-    /// Factor from a value per this angle to a value per degree.
+    /// Factor from a value per unit of this angle to a value per degree.
     fn per_degree(self) -> f64 {
         match self {
             Angle::Degree => 1.0,

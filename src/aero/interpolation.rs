@@ -20,7 +20,8 @@ pub enum Interpolation {
 /// Interval of `x` among `n` ascending points: the index of its lower point, and the fraction along
 /// it from 0 to 1.
 ///
-/// Beyond the ends it is the end. A single point is an interval without length.
+/// Beyond the ends of the table it is the end point. A single point counts as an interval of no
+/// length.
 pub(super) fn interval_at(n: usize, x_of: impl Fn(usize) -> f64, x: f64) -> (usize, f64) {
     let last = n.saturating_sub(1);
     let (mut low, mut high) = (0, last);

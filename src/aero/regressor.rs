@@ -36,7 +36,7 @@ pub enum Regressor {
     Product(Box<[Regressor; 2]>),
 }
 
-/// Powers of the units that a regressor is in: deg, rad, ft/s.
+/// Exponents of deg, rad and ft/s in the unit of a regressor.
 type Powers = [usize; 3];
 
 impl Regressor {
@@ -64,8 +64,8 @@ impl Regressor {
         }
     }
 
-    /// True where one factor at most is α̇, and it is no magnitude: the motion then follows from the loads
-    /// by a linear equation.
+    /// True if the regressor is at most linear in α̇: no magnitude contains α̇, and no product has
+    /// it in both factors. The motion then follows from the loads by a linear equation.
     fn is_linear_in_alpha_rate(&self) -> bool {
         match self {
             Regressor::Magnitude(of) => !of.has_alpha_rate(),
@@ -77,7 +77,7 @@ impl Regressor {
         }
     }
 
-    /// True where a part is α̇.
+    /// True if any part of the regressor is α̇.
     #[must_use]
     pub fn has_alpha_rate(&self) -> bool {
         self.leaves().contains(&&Regressor::AlphaRate)
@@ -97,12 +97,12 @@ impl Regressor {
         self.leaves().into_iter().filter_map(Regressor::surface)
     }
 
-    /// First of its parts for which a function has a value.
+    /// Value of a function at the first part of the regressor for which it has one.
     pub fn find<T>(&self, of: impl Fn(&Regressor) -> Option<T>) -> Option<T> {
         self.leaves().into_iter().find_map(of)
     }
 
-    /// Value from those of its parts.
+    /// Value of the regressor, from the values of its parts.
     pub fn value(&self, of: &impl Fn(&Regressor) -> f64) -> f64 {
         match self {
             Regressor::Magnitude(of_what) => of_what.value(of).abs(),
@@ -111,7 +111,7 @@ impl Regressor {
         }
     }
 
-    /// Slope along one of its parts, from the values of all.
+    /// Slope of the regressor along one of its parts, from the values of all parts.
     pub fn slope(&self, along: &Regressor, of: &impl Fn(&Regressor) -> f64) -> f64 {
         match self {
             Regressor::Magnitude(inner) => {
@@ -151,7 +151,8 @@ impl Regressor {
         }
     }
 
-    /// Unit of the derivative of a coefficient; `None` where there is none.
+    /// Unit of a derivative along this regressor; `None` for a product that no [`DerivativeUnit`]
+    /// covers.
     #[must_use]
     pub fn unit(&self) -> Option<DerivativeUnit> {
         let mut powers: Powers = [0; 3];

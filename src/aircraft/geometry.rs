@@ -16,8 +16,7 @@ pub struct Aircraft {
     pub span_ft: f64,
     /// Reference chord c̄, of the pitching moment and of q.
     pub chord_ft: f64,
-    /// `I_xe` of one engine; the gyroscopic moment contains the sum of both engines' momenta. Zero
-    /// leaves it out.
+    /// `I_xe` of one engine. The gyroscopic moment is that of both engines; zero omits it.
     #[serde(default)]
     pub engine_inertia_slug_ft2: f64,
     /// Line of the thrust; `None` is the body x axis through the c.g.
@@ -62,8 +61,8 @@ fn default_true() -> bool {
     true
 }
 
-/// A flow vane: its position, and the factor of its reading over the local angle by upwash or
-/// sidewash.
+/// A flow vane: its position, and the factor by which upwash or sidewash multiplies the local
+/// angle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Vane {

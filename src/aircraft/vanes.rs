@@ -130,7 +130,7 @@ impl Flow {
     }
 }
 
-/// Error of an angle, rad, from which one more step of Newton's iteration leaves rounding only.
+/// Error of an angle, rad, below which one more Newton step leaves rounding errors only.
 const CLOSE: f64 = 1e-7;
 
 /// Most steps of Newton's iteration; three are usual.
@@ -242,8 +242,8 @@ impl Sensors {
     }
 
     /// Flow at the c.g. from the readings of the two vanes (`alpha`, `beta` of `read`). Small-angle
-    /// readings are solved; exact ones are almost linear and inverted by Newton's iteration on the tangents
-    /// of what is left of the angles.
+    /// readings are solved directly. Exact readings are inverted by Newton's iteration on the
+    /// tangents of the angles' remaining errors, which are almost linear.
     #[inline(always)]
     #[must_use]
     pub fn flow_at_cg(&self, read: &Flow, cg: Position) -> Flow {

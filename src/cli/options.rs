@@ -25,7 +25,7 @@ pub const TRY_AGAIN: u8 = 75;
 /// Most threads: more than any machine has processors.
 const MOST_THREADS: usize = 4096;
 
-/// Returns `code` if the condition holds, else 0.
+/// Returns `code` if the condition holds, otherwise 0.
 pub fn exit_code(condition: bool, code: u8) -> ExitCode {
     ExitCode::from(if condition { code } else { 0 })
 }
@@ -107,8 +107,8 @@ fn memory(typed: &str) -> Result<f64, String> {
 }
 
 impl Options {
-    /// Pipeline and options as typed, without those of the terminal, for a script that does the
-    /// same.
+    /// Pipeline and options as typed, for a script that repeats the command; options of the
+    /// terminal are left out.
     pub fn typed(&self) -> Vec<String> {
         let path = |path: &Path| path.display().to_string();
         let options = [
@@ -165,7 +165,7 @@ impl Options {
     }
 }
 
-/// Starts so many threads, by default one a core.
+/// Starts this number of threads; by default one per core.
 pub fn start_threads(threads: Option<usize>) -> anyhow::Result<()> {
     if let Some(threads) = threads {
         rayon::ThreadPoolBuilder::new()

@@ -1,5 +1,5 @@
-//! A last line in the log when the system or a user ends a run: SIGTERM, SIGINT. Too large a file is an
-//! error.
+//! Signals of the operating system. When SIGTERM or SIGINT ends a run, the log gets a last line. A
+//! file above the shell's size limit fails as a write error.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -38,8 +38,8 @@ pub fn log_signals(log: &Arc<Log>, work: &Arc<Work>) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Makes a file that would become larger than the shell allows (`ulimit -f`) an error of its write, as
-/// a full disk is, and not the end of the program.
+/// Turns the signal for a file above the shell's size limit (`ulimit -f`) into an error of the
+/// write, like that of a full disk, so that the program does not end there.
 ///
 /// # Errors
 /// The system refuses to report signals.

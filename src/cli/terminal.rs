@@ -1,5 +1,5 @@
-//! Output on the terminal. A closed pipe or a full disk behind it ends no command: its work is done,
-//! and the first failure decides the exit code at the end.
+//! Output on the terminal. A failed write (closed pipe, full disk) does not stop a command; the
+//! first failure decides the exit code at the end.
 
 use std::fmt::Arguments;
 use std::io::{Error, ErrorKind, Write};
@@ -54,8 +54,8 @@ pub fn note(written: Result<(), Error>) {
     }
 }
 
-/// Returns the exit code of a command whose output is complete, and 1 if some of it was lost. A reader
-/// that closed its pipe has what it wants.
+/// Returns the exit code of a command whose output is complete, or 1 if some of it was lost. A pipe
+/// that its reader closed loses nothing.
 pub fn finished(code: ExitCode) -> ExitCode {
     note(std::io::stdout().flush());
     let failure = FAILURE.lock().ok().and_then(|mut failure| failure.take());

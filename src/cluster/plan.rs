@@ -85,8 +85,8 @@ pub struct ShardPlan {
 impl ShardPlan {
     /// Deals work, in its order, to shards of about equal cost.
     ///
-    /// A shard gets neighbours: the maneuvers of a flight share its record. Its cost differs from the
-    /// mean by no more than the dearest item.
+    /// A shard gets neighbouring items, because the maneuvers of a flight share its record. Its
+    /// cost differs from the mean by at most the cost of the most expensive item.
     #[must_use]
     pub fn deal(
         of: Dealt,

@@ -2,8 +2,8 @@
 //! merge.
 //!
 //! Shards have only the store in common. An artefact is named by the fingerprint of everything that
-//! decides it, so a shard that runs twice, even at the same time, makes the same bytes; a shard that
-//! died leaves what it had made. A merge is a run that finds everything made.
+//! decides it. A shard that runs twice, even at the same time, therefore makes the same bytes, and
+//! what a killed shard has made stays valid. A merge is a run that finds all artefacts made.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -132,7 +132,7 @@ pub fn missing_items(
 /// Publishes the work of the shards of a plan of maneuvers.
 ///
 /// # Errors
-/// Something is missing; then with its shards. Else as [`run`].
+/// Missing artefacts, with the shards that lack them; otherwise the errors of [`run`].
 pub fn merge(
     config: &Config,
     plan: &ShardPlan,

@@ -1,8 +1,9 @@
 //! Comparison of a campaign with an earlier one: the trend of each derivative's group with the
-//! earlier trend of that group, z = (now − before) / √(standard error now² + standard error before²).
+//! earlier trend of that group, z = (now − before) / √(standard error now² + standard error
+//! before²).
 //!
-//! Where both campaigns share flights their errors are not independent, and z is smaller than it
-//! should be. So this comparison misses small changes, and those it reports are real.
+//! If both campaigns share flights, their errors are not independent, and z is too small: the
+//! comparison may miss small changes, but reports no false ones.
 
 use std::path::Path;
 

@@ -1,9 +1,9 @@
-//! Judgement of a value of flight by another value of the same derivative.
+//! Comparison of a flight value with another value of the same derivative, and its verdict.
 
 use super::settings::Settings;
 use crate::tables::{ChangeVerdict, TunnelVerdict};
 
-/// Result of comparing a value of flight with another value of the same derivative.
+/// Verdict of comparing a flight value with another value of the same derivative.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Agreement {
     /// There is no other value.
@@ -62,7 +62,7 @@ impl From<ChangeVerdict> for Agreement {
     }
 }
 
-/// Difference between a value of flight and another value, with its verdict.
+/// Difference between a flight value and another value, with its verdict.
 pub(super) struct Judgement {
     pub difference: Option<f64>,
     /// Standard error of the difference.
@@ -73,7 +73,8 @@ pub(super) struct Judgement {
     pub agreement: Agreement,
 }
 
-/// Judges a value with its standard error by another value, whose standard error may be unknown.
+/// Compares a value that has a standard error with another value, whose standard error may be
+/// unknown.
 pub(super) fn judge(
     flight: f64,
     error: f64,

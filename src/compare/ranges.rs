@@ -7,7 +7,7 @@ use crate::aero::WindTunnel;
 use crate::numerics::order_statistics::median;
 use crate::tables::{ChangeRow, ComparisonRow, DisagreementRow, Verdict, VerdictRow};
 
-/// One compared angle of attack, of the tunnel or of an earlier campaign.
+/// Comparison at one angle of attack, with the tunnel or an earlier campaign.
 #[derive(Clone, Copy, Debug)]
 struct ComparedAlpha<'a> {
     derivative: &'a str,
@@ -219,8 +219,8 @@ fn range_in_words(
     }
 }
 
-/// Extent of a disagreement: the median in percent of the other's magnitude, with its extremes where
-/// they are far from it; in the derivative's unit where the other is zero.
+/// Size of a disagreement in words: the median in percent of the other value's magnitude, with the
+/// extremes if they are far from the median; in the derivative's unit if the other value is zero.
 fn extent_in_words(run: &[ComparedAlpha]) -> String {
     let mut shares: Vec<f64> = run
         .iter()

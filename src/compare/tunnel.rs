@@ -78,7 +78,7 @@ fn compare_derivative(
     alphas.into_iter().filter_map(row).collect()
 }
 
-/// Distance of a row from a condition: over Mach number first, then the third variable.
+/// Distance of a row from a condition: by Mach number first, then by the third variable.
 fn distance(row: &PosteriorRow, condition: Option<&Condition>) -> (f64, f64) {
     let apart = |a: Option<f64>, b: Option<f64>| a.zip(b).map_or(0.0, |(a, b)| (a - b).abs());
     (
@@ -157,7 +157,7 @@ pub fn compare_maneuvers(
         .collect()
 }
 
-/// Compares a value of flight and its standard error with a reading of the tunnel.
+/// Compares a flight value and its standard error with a reading of the tunnel.
 fn against_tunnel(
     flight: f64,
     error: f64,

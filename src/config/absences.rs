@@ -1,4 +1,4 @@
-//! Parts of a campaign that a pipeline does without, and what each absence costs.
+//! Optional parts that a pipeline lacks, and the cost of each absence.
 
 use super::checked::Config;
 use crate::aero::{Axis, Output};
@@ -6,7 +6,7 @@ use crate::flight::signal;
 use crate::flight::stand_in::{StandIn, cost};
 
 impl Config {
-    /// One line for each part that the pipeline does without: what stands for it, and the cost.
+    /// One line for each part that the pipeline lacks: its substitute, and the cost.
     #[must_use]
     pub fn absences(&self) -> Vec<String> {
         let mut lines = Vec::new();

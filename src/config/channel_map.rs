@@ -1,4 +1,4 @@
-//! The channel map as checked: columns and formulas as channels.
+//! The channel map: its lines, checked, become channels of columns and of formulas.
 
 use std::collections::{BTreeMap, BTreeSet};
 

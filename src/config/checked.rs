@@ -24,7 +24,8 @@ pub struct Config {
     pub archive: String,
     /// File of the wind-tunnel tables, as the report names it.
     pub wind_tunnel: Option<PathBuf>,
-    /// Number of held derivatives of the classes that are left out without a tunnel.
+    /// Number of derivatives that classes hold, if the pipeline has no tunnel; they are then left
+    /// out.
     pub held_at_nothing: usize,
     /// Folder of the artefacts.
     pub store: PathBuf,
@@ -65,7 +66,7 @@ impl Config {
         self.classes.iter().find(|c| c.name == name)
     }
 
-    /// Name of the wind tunnel's file, or that there is none.
+    /// Name of the wind tunnel's file, or a phrase if there is none.
     #[must_use]
     pub fn tunnel_name(&self) -> String {
         let file = self.wind_tunnel.as_ref();

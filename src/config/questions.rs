@@ -1,5 +1,5 @@
-//! Questions and doubts in the files of a pipeline: values that a draft left open, and comments on what
-//! it was not sure of.
+//! Open questions in the files of a pipeline: values that a draft left open, and comments that mark
+//! a finding as unsure.
 
 use super::checked::Config;
 use super::source::Files;
@@ -48,7 +48,7 @@ pub(super) fn none_open(files: &Files) -> Result<()> {
     Err(Error::config(path, Some(*line), what))
 }
 
-/// Lines whose comments name a doubt of the draft.
+/// Lines whose comments mark a finding of the draft as unsure.
 #[must_use]
 pub fn doubts(config: &Config) -> Vec<Note> {
     let mut doubts = Vec::new();

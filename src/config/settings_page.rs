@@ -1,6 +1,5 @@
-//! The page `docs/settings.md`, made from the declarations of the settings, and the checks that the
-//! declarations are what the parser takes. `make docs` writes
-//! the page anew.
+//! The page `docs/settings.md`, made from the declarations of the settings, and checks that the
+//! parser accepts just these. `make docs` writes the page anew.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -127,7 +126,7 @@ fn yaml(path: &[&str], value: &str) -> String {
     }
 }
 
-/// Names that the parser expects at a path, from its answer to one that it does not know; `None`
+/// Names that the parser accepts at a path, taken from its error about an unknown name; `None`
 /// where it takes a single value or any name.
 fn expected(file: fn(&Source) -> Option<String>, path: &[&str]) -> Option<Vec<String>> {
     let text = yaml(&[path, &["no_such_key"]].concat(), "0");

@@ -43,7 +43,7 @@ impl Source {
         }
     }
 
-    /// The file, where there is one.
+    /// Reads a file that may be absent.
     fn optional(path: PathBuf) -> Result<Option<Source>> {
         let is_file = files::is_file(&path);
         is_file.then(|| Source::read(path)).transpose()
@@ -57,7 +57,7 @@ impl Source {
         }
     }
 
-    /// Its name within a pipeline's folder, and its text.
+    /// Name of the file within a pipeline's folder, and its text.
     pub fn named(&self, folder: &Path) -> (String, String) {
         let name = self
             .path
@@ -78,13 +78,13 @@ impl Source {
         })
     }
 
-    /// An error about a name, at the first line on which it stands as a word of its own.
+    /// An error about a name, at the first line that contains it as a whole word.
     pub fn error(&self, name: &str, what: impl Into<String>) -> Error {
         Error::config(&self.path, self.line_of(name, 0), what)
     }
 
-    /// An error about a name in the section under a key: a word may stand elsewhere in another
-    /// meaning.
+    /// An error about a name in the section under a key; the same word may have another meaning
+    /// elsewhere.
     pub fn error_under(&self, key: &str, name: &str, what: impl Into<String>) -> Error {
         let begins = |line: &str| {
             line.trim_start()
@@ -122,7 +122,7 @@ impl Source {
     }
 }
 
-/// A line without what follows a `#` that begins a comment.
+/// A line without its comment.
 pub(super) fn without_comment(line: &str) -> &str {
     if line.trim_start().starts_with('#') {
         ""
@@ -131,8 +131,8 @@ pub(super) fn without_comment(line: &str) -> &str {
     }
 }
 
-/// Message of the parser without the place, which the error begins with. For an unknown key or word
-/// it ends with the one that was probably meant.
+/// Message of the parser without the place, with which the error begins. For an unknown key or word
+/// it ends with a suggestion.
 fn message(parser: &str) -> String {
     let what = parser
         .rsplit_once(" at line ")
@@ -151,7 +151,7 @@ fn message(parser: &str) -> String {
 }
 
 impl Files {
-    /// All of them, in the order in which they are explained.
+    /// All files, in the order in which they are explained.
     pub fn all(&self) -> impl Iterator<Item = &Source> {
         [&self.pipeline, &self.aircraft, &self.model]
             .into_iter()

@@ -9,8 +9,8 @@ use crate::error::{Error, Result, similarity};
 use crate::store;
 use crate::store::files::TunnelRow;
 
-/// Similarity, from 0 to 1, from which a name counts as a misspelt one of the model: a letter too many or two
-/// exchanged, in names of five letters.
+/// Similarity, from 0 to 1, from which an unknown name counts as a misspelt name of the model. In a
+/// name of five letters one added letter, or two exchanged ones, reach it.
 pub(super) const MISSPELT: f64 = 0.93;
 
 /// Reads the tunnel's tables, in the units of the model's derivatives.
@@ -79,7 +79,7 @@ pub(crate) fn tunnel_rows(
 /// Longest name of a derivative, bytes.
 const LONGEST_NAME: usize = 200;
 
-/// Refuses a row whose name is too long, or whose numbers are none or none that a tunnel can have.
+/// Refuses a row whose name is too long, or whose numbers are not finite or are out of range.
 fn check(row: &TunnelRow) -> std::result::Result<(), String> {
     let name = &row.derivative;
     if name.len() > LONGEST_NAME {
@@ -212,7 +212,8 @@ impl RowsRead {
         ))
     }
 
-    /// Line and message for the first name that the model lacks, while no row has a very similar name of the model.
+    /// Line and message for the first name that the model lacks, if it resembles a name of the
+    /// model that has no rows.
     fn misspelt(&self, buildup: &Buildup) -> Option<(usize, String)> {
         let derivatives = buildup.derivatives.iter().map(|d| &d.name);
         let names = derivatives.chain(buildup.combined.iter().map(|c| &c.name));

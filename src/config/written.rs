@@ -152,7 +152,7 @@ struct CombinedLine {
 }
 
 impl DerivativeLine {
-    /// The derivative, or the name of its line and what is wrong with its regressor.
+    /// The derivative. The error has the name of its line, and the fault of its regressor.
     fn derivative(self) -> Result<Derivative, (String, String)> {
         let regressor = if self.vane {
             Ok(Regressor::Vane(self.regressor))
@@ -171,8 +171,8 @@ impl DerivativeLine {
 }
 
 impl ModelFile {
-    /// Build-up of the file; the name of a derivative and what is wrong with it where its regressor is
-    /// none.
+    /// Build-up of the file. The error has the name of a derivative, and the fault of its
+    /// regressor.
     pub fn buildup(self) -> Result<Buildup, (String, String)> {
         let file = self;
         let combined = |line: CombinedLine| Combined {

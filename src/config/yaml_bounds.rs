@@ -4,14 +4,15 @@
 /// Largest file, bytes: eighty times the longest of the shipped pipelines.
 const LARGEST: usize = 1 << 20;
 
-/// Deepest nesting of a file. Those of a pipeline reach eight levels; the parser takes milliseconds for so many.
+/// Deepest nesting of a file. The shipped pipelines reach eight levels; the parser takes
+/// milliseconds for a thousand.
 const DEEPEST: usize = 1000;
 
 /// Characters that end a line in YAML.
 const BREAKS: [char; 5] = ['\n', '\r', '\u{85}', '\u{2028}', '\u{2029}'];
 
-/// Finds what makes a text no file of a pipeline: its line, counted from 1, and the reason. Brackets count in
-/// comments as well: where a comment begins, only the parser knows.
+/// Finds the first place at which a text exceeds the bounds: its line, counted from 1, and the
+/// reason. Brackets in comments count too, since only the parser can find where a comment begins.
 pub fn excess(text: &str) -> Option<(Option<usize>, &'static str)> {
     if text.len() > LARGEST {
         return Some((None, "it is larger than 1 MB, more than any such file has"));

@@ -1,10 +1,10 @@
 //! Equations of an axis in moving air: its states, and the rates that the aerodynamics feel.
 //!
-//! The first state is the angle that the air makes, gusts included: it is what the vane and the
-//! aerodynamics read. A rotary gust g makes the aerodynamics feel the rate q + g, while the gyro and
-//! the kinematics keep q. The felt rates stand behind the axis's own states. A gust is constant
-//! during a step of the integration, so a felt rate has the acceleration of its own rate; between
-//! steps gusts decay and grow ([`InGusts::decayed`]).
+//! The first state is the flow angle with gusts included, which the vane and the aerodynamics
+//! sense. A rotary gust g makes the aerodynamics feel the rate q + g, while the gyro and the
+//! kinematics keep q. In the state vector the felt rates follow the axis's own states. A gust is
+//! constant during a step of the integration, so a felt rate has the acceleration of its own rate;
+//! between steps gusts decay and grow ([`InGusts::decayed`]).
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -21,9 +21,9 @@ use crate::aircraft::Aircraft;
 
 /// Equations of an axis whose last states are the rates that the aerodynamics feel.
 pub trait InGusts<const NX: usize>: Equations<NX> {
-    /// State that is the angle of the air.
+    /// Index of the state that is the flow angle, gusts included.
     const ANGLE: usize = 0;
-    /// Output that measures it.
+    /// Index of the output that measures the flow angle.
     const VANE: usize = 0;
     /// Pairs of states (rate of the gyro, rate that the aerodynamics feel), one for each rotary gust.
     const FELT_RATES: &'static [(usize, usize)];
@@ -61,7 +61,7 @@ impl InGusts<6> for LateralInGusts {
     const FELT_RATES: &'static [(usize, usize)] = &[(1, 4), (2, 5)];
 }
 
-/// States of an axis out of those with felt rates.
+/// The axis's own states, without the felt rates.
 #[inline(always)]
 fn own<const N: usize, const M: usize>(x: &SVector<f64, M>) -> SVector<f64, N> {
     SVector::from_fn(|i, _| x[i])

@@ -81,8 +81,8 @@ const PITCHING_MOMENT: usize = 1;
 const AXIAL_FORCE: usize = 2;
 
 impl Longitudinal {
-    /// α̇ that a measured motion implies, rad/s: 2.1 with the measured specific forces. A gust's own rate has
-    /// no part in it.
+    /// α̇ that a measured motion implies, rad/s: 2.1 with the measured specific forces. The rate of
+    /// change of a gust is not part of it.
     #[must_use]
     pub fn alpha_rate(aircraft: &Aircraft, motion: &Motion) -> f64 {
         let inputs = Longitudinal::rate_inputs(aircraft, motion);

@@ -89,7 +89,8 @@ pub struct Window {
     /// Windows that differ in few signals share the others.
     points: BTreeMap<String, Arc<Vec<f64>>>,
     sensors: Sensors,
-    /// α and β at the c.g. at every point, rad. Inverting the vanes is the dearest part of a motion.
+    /// α and β at the c.g. at every point, rad. Inverting the vanes is the most expensive part of a
+    /// motion.
     flow: Arc<Vec<[f64; 2]>>,
     pub step_s: f64,
     pub samples: usize,

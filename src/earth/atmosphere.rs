@@ -125,7 +125,7 @@ fn state_at(height_m: f64) -> State {
 }
 
 impl Layer {
-    /// Temperature and pressure so much higher in the layer: dp/dh = −ρ g.
+    /// Temperature and pressure `rise_m` higher in the layer: dp/dh = −ρ g.
     fn climb(&self, temperature: f64, pressure: f64, rise_m: f64) -> (f64, f64) {
         if self.gradient == 0.0 {
             let decay = (-GRAVITY * rise_m / (GAS * temperature)).exp();

@@ -32,7 +32,7 @@ struct AlphaRange {
     lowest: f64,
     /// Length of an interval.
     step: f64,
-    /// Interval of each sample, and its share of it.
+    /// Interval of each sample, and the sample's fractional position in it.
     samples: Vec<(usize, f64)>,
 }
 
@@ -133,7 +133,7 @@ impl AlphaRange {
         samples.map(|place| read(quantity, *place)).collect()
     }
 
-    /// Interval of an angle, and its share of it.
+    /// Interval of an angle, and the angle's fractional position in it.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,

@@ -1,5 +1,5 @@
-//! Doubts about a fit that converged: it explains less than a constant, contradicts equation error,
-//! or needs an error that no instrument has.
+//! Reasons to doubt a fit that converged: it explains less than a constant, contradicts equation
+//! error, or needs an error that no instrument has.
 
 use super::estimated::Estimated;
 use super::second_opinion::Distance;
@@ -17,8 +17,8 @@ use crate::units::{DEG, Unit};
 pub(super) struct Explanation<'a> {
     /// Outputs of the equations; `None` where they diverge.
     pub outputs: Option<&'a [[f64; OUTPUTS]]>,
-    /// True where gusts of the air account for a drift of the attitude: the attitude is the sum of
-    /// the rates, and so are the effects of the gusts.
+    /// True if gusts explain a drift of the attitude: it integrates the rates, and the rotary gusts
+    /// in them.
     pub attitude_drifts: bool,
     pub second_opinion: &'a Regression,
 }
@@ -60,7 +60,7 @@ impl Task<'_> {
         }
     }
 
-    /// Outputs that move and that a constant would fit better.
+    /// Outputs that move and that a constant would fit better than the equations.
     fn unexplained_outputs<const NX: usize, E: Equations<NX>>(
         &self,
         fit: &Fit,
@@ -101,7 +101,7 @@ impl Task<'_> {
         })
     }
 
-    /// Biases beyond what an instrument has, by more than their uncertainty.
+    /// Biases larger than an instrument can have, by more than their uncertainty.
     fn impossible_biases<const NX: usize, E: Equations<NX>>(
         &self,
         case: &Case<NX, E>,
@@ -116,9 +116,10 @@ impl Task<'_> {
         doubts
     }
 
-    /// Initial states as far from the measured ones, by more than their uncertainty: from the first
-    /// sample, which may be an outlier, and from the mean of several, which may move. The first
-    /// outputs are the states as measured.
+    /// Initial states further from the measured ones than an instrument's error, by more than their
+    /// uncertainty. The smaller of two distances counts: from the first sample, which may be an
+    /// outlier, and from the mean of several, during which the aircraft may move. The first outputs
+    /// are the measured states.
     fn impossible_initial_states<const NX: usize, E: Equations<NX>>(
         &self,
         case: &Case<NX, E>,

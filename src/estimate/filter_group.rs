@@ -21,17 +21,18 @@ use crate::output_error::error_effect::{ErrorEffect, SharedError, covariance_of}
 use crate::output_error::sharing::{SharedParameters, add_vector};
 use crate::output_error::{Fit, Outcome, Response};
 
-/// Change by slopes over α, in bounds, up to which they are not held in a second fit.
+/// Change of the estimates by slopes over α, in bounds, up to which the fit is not repeated with
+/// the slopes held.
 const SMALL_CHANGE: f64 = 0.3;
 
-/// Steps to the slopes over α: the effect on the estimates is linear but for products of slopes and
-/// noise.
+/// Largest number of steps towards the slopes over α. Their effect on the estimates is nearly
+/// linear, so few are needed.
 const SLOPE_STEPS: usize = 3;
 
-/// Shares of a step to the slopes that are tried.
+/// Fractions of a step to the slopes, tried in this order.
 const STEP_SHARES: [f64; 3] = [1.0, 0.5, 0.25];
 
-/// Rise of the cost by a step to the slopes that the slopes' prior may outweigh.
+/// Largest rise of the cost by a step to the slopes; the slopes' prior may outweigh it.
 const ALLOWED_RISE: f64 = 1.0;
 
 /// Least output noise as a share of the noise seen in the samples.
@@ -74,7 +75,8 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
         HeldSlopes::constant(self.members.iter().map(|member| &member.slopes))
     }
 
-    /// Filters with the slopes held; `like` are others of the maneuvers.
+    /// Filters with the slopes held; `like` are earlier filters of the same maneuvers, from which
+    /// each begins.
     pub fn filters(&self, held: &HeldSlopes, like: Option<&[Filter<NG, G>]>) -> Vec<Filter<NG, G>> {
         let members = self.members.iter().enumerate();
         let filter = |(i, member): (usize, &GroupMember<'g, 'a, NX, E>)| {
@@ -110,7 +112,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
         }
     }
 
-    /// A fit with what is left of the slopes' effect on it.
+    /// A fit with the effect that the slopes still have on it.
     pub fn slope_fit(
         &self,
         held: HeldSlopes,
@@ -144,8 +146,8 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
         Some(WidePass::joined(&passes, &self.parameters))
     }
 
-    /// Fits the filters again with the slopes held, as long as they move the estimates. A step that
-    /// the likelihood does not bear out is halved; slopes of which no step holds are uncertainty alone.
+    /// Repeats the fit with the slopes held, while they move the estimates. A step that raises the
+    /// cost is halved. If no step succeeds, the effect of the slopes counts as an uncertainty only.
     pub fn with_slopes(&self, start: SlopeFit<NG, G>) -> SlopeFit<NG, G> {
         let mut slope_fit = start;
         for _ in 0..SLOPE_STEPS {
@@ -171,7 +173,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
         slope_fit
     }
 
-    /// Fit with the slopes a share of the way to those found; `None` where its cost rises.
+    /// Fit with the slopes a fraction of the way to those found; `None` if its cost rises.
     fn step_to_slopes(
         &self,
         slope_fit: &SlopeFit<NG, G>,
@@ -345,7 +347,8 @@ fn add(sum: &mut Option<DMatrix<f64>>, part: &DMatrix<f64>) {
     }
 }
 
-/// Fit with the derivatives' slopes held, and the effect of what they are known to be off.
+/// Fit with the derivatives' slopes held, and the effect that the difference from the estimated
+/// slopes would have.
 pub(super) struct SlopeFit<const NG: usize, G: InGusts<NG>> {
     pub held: HeldSlopes,
     filters: Vec<Filter<NG, G>>,

@@ -27,7 +27,7 @@ impl Minimum {
 pub(super) enum NoMinimum {
     /// The state leaves its bounds, or the filter has no finite gain.
     Diverges,
-    /// The iteration ends before a minimum, here.
+    /// The iteration ends at this point, before a minimum.
     NotConverged(Box<Scored>),
     /// The data determine no covariance at the minimum.
     Undetermined(Box<Scored>),

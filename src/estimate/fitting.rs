@@ -30,8 +30,8 @@ impl Task<'_> {
         })
     }
 
-    /// Estimates, without bounds, from the configured starting values, and from the other ones where the iteration
-    /// does not converge.
+    /// Estimates, without bounds, from the configured starting values; if the iteration does not
+    /// converge, from the other kind of starting values.
     pub(super) fn fit<const NX: usize, E: Equations<NX>>(
         &self,
         case: &Case<NX, E>,

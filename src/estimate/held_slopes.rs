@@ -27,7 +27,7 @@ impl HeldSlopes {
         HeldSlopes { names, values }
     }
 
-    /// A share of the way to other values.
+    /// The slopes moved by a fraction of the way to other values.
     pub fn towards(&self, values: &DVector<f64>, share: f64) -> Self {
         let both = self.values.iter().zip(values.iter());
         HeldSlopes {

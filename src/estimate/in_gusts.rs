@@ -24,7 +24,8 @@ use crate::units::DEG;
 /// is the high-frequency part of a gust of some speed.
 const GUST_SCALE_FT: f64 = 1750.0;
 
-/// Size of a rotary gust over the deviation of its rate from which it may stand for the rate.
+/// Ratio of a rotary gust to the standard deviation of its rate, above which the gust may have
+/// taken the place of the rate.
 const MOSTLY: f64 = 0.5;
 
 /// Filter error's result on a maneuver.
@@ -51,11 +52,12 @@ pub(super) struct Filtered {
 
 /// Air of a maneuver by filter error.
 pub(super) enum Air {
-    /// It moves: the estimates are the filter's.
+    /// The air moves: the estimates are those of filter error.
     Moves(Box<Filtered>),
-    /// Noise of the sensors, with a colour of its own, explains the residuals of output error better.
+    /// Coloured noise of the sensors explains the residuals of output error better than moving air.
     IsStill,
-    /// Filter error gives no estimates, and nothing shows that the noise is the sensors'.
+    /// Filter error gives no estimates, and the residuals do not show coloured noise of the
+    /// sensors.
     Unknown(NoMinimum),
 }
 
@@ -105,7 +107,7 @@ impl<'a> Task<'a> {
         }
     }
 
-    /// Adds what the filter found of the air to the row of `fits`.
+    /// Adds the gusts that the filter found to the row of `fits`.
     pub(super) fn add_gusts(&self, filtered: &Filtered, step_s: f64, row: &mut FitRow) {
         [row.initial_cost, row.final_cost] = filtered.output_error_costs;
         row.method = Some(EstimationMethod::FilterError);
@@ -182,9 +184,9 @@ impl Filtered {
     }
 }
 
-/// Iterates from moving air, or from still air where the residuals of output error are white; from the other
-/// start where the first gives no estimates. Both are tried where rotary gusts account for the rates, since
-/// rotary gusts may be mistaken for the effect of the rates themselves.
+/// Iterates from moving air, or from still air if the residuals of output error are white; from the
+/// other start if the first gives no estimates. Both starts are tried if a rotary gust is as large
+/// as its rate: the gust may then be mistaken for the effect of the rate.
 ///
 /// # Errors
 /// Why no start leads to a minimum: the reason of the iteration that ended at the least cost.
@@ -225,8 +227,8 @@ fn reached<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
     least.ok_or_else(|| why().unwrap_or(NoMinimum::Diverges))
 }
 
-/// True where a rotary gust is as large as a good part of the rate that it adds to, in the filter of one
-/// maneuver.
+/// True if, in the filter of one maneuver, a rotary gust exceeds the share [`MOSTLY`] of the rate
+/// to which it adds.
 fn is_mostly_air<const NX: usize, const NG: usize, G: InGusts<NG>>(
     filters: &[Filter<NG, G>],
     found: &Minimum,

@@ -92,8 +92,8 @@ pub fn others(
     maneuvers.iter().enumerate().map(of).collect()
 }
 
-/// Predicts one maneuver from others. `own` is its own estimate. The column `prediction` has any
-/// failure.
+/// Predicts one maneuver from others. `own` is its own estimate. A failure is reported in the
+/// column `prediction`.
 #[must_use]
 pub fn maneuver(
     record: &Record,

@@ -64,8 +64,8 @@ impl<'a> Task<'a> {
         })
     }
 
-    /// Rejects a maneuver with too large a share of marked samples.
-    /// Samples between those of a slow channel do not count: the cost leaves them out.
+    /// Rejects a maneuver with too large a share of flagged samples. Samples interpolated between
+    /// those of a slow channel do not count; the cost leaves them out.
     fn check_marked_share(&self, surfaces: &[&str]) -> Result<(), String> {
         let Maneuver { start_s, end_s, .. } = *self.maneuver;
         let most = self.context.settings.max_marked_share;

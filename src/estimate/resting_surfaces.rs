@@ -1,7 +1,8 @@
-//! Surfaces that rest in a maneuver: it says nothing of their derivatives, which are inactive in it.
+//! Surfaces at rest in a maneuver. The maneuver has no information on their derivatives, which are
+//! inactive in it.
 //!
-//! A class lists what its maneuvers excite. Of a maneuver in which one of its surfaces rests all the
-//! same, the data could not tell the surface's derivatives from the constants.
+//! A class lists the surfaces that its maneuvers excite. If one of them rests nevertheless, its
+//! derivatives are not identifiable: they cannot be separated from the constants.
 
 use std::collections::BTreeSet;
 
@@ -11,8 +12,8 @@ use crate::flight::signal;
 use crate::maneuver::{Class, Status};
 use crate::output_error::identifiability::excitation;
 
-/// Largest excitation of a surface at rest, over the noise from sample to sample: both are the noise of
-/// its transducer, and differ by chance.
+/// Largest ratio of a resting surface's excitation to its noise from sample to sample. Both are the
+/// noise of its transducer, and differ by chance.
 const AT_REST: f64 = 1.5;
 
 /// Largest noise of a transducer, deg rms. Inputs of 2 Hz, recorded at 10 Hz, differ from sample to sample as
@@ -48,7 +49,8 @@ impl Task<'_> {
     }
 }
 
-/// True for samples that differ from their mean as they differ from each other.
+/// True for samples whose scatter about their mean is that from sample to sample, as in white
+/// noise.
 fn is_noise(samples: &[f64]) -> bool {
     let steps = samples.windows(2).map(|pair| (pair[1] - pair[0]).powi(2));
     let count = samples.len().saturating_sub(1).max(1) as f64;

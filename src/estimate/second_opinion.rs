@@ -1,4 +1,4 @@
-//! Equation error beside output error.
+//! Equation error as a second opinion on output error.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -32,8 +32,8 @@ impl Distance {
     /// Distance over the derivatives that both estimate; `None` without any, or without bounds.
     ///
     /// Both estimates use the same data and the same held values, so the covariance of their
-    /// difference is less than the sum of their covariances, which stands here: the distance is
-    /// rather too small.
+    /// difference is less than the sum of their covariances. The sum is used here, so the distance
+    /// is underestimated.
     pub fn of(fit: &Fit, second: &Regression) -> Option<Distance> {
         let corrected = fit.covariance_corrected.as_ref()?;
         let both: Vec<usize> = (0..second.values.len())
@@ -57,7 +57,7 @@ impl Distance {
         (self.square / self.derivatives as f64).sqrt()
     }
 
-    /// Probability of a larger distance if both are right.
+    /// Probability of a larger distance, if both methods are right.
     pub fn probability(&self) -> f64 {
         exceedance(self.square, self.derivatives)
     }

@@ -1,8 +1,9 @@
-//! Noise of the sensors with a colour of its own, which filter error can take for motion of the air.
+//! Coloured noise of the sensors, which filter error can mistake for motion of the air.
 //!
-//! Both explanations of coloured residuals have a likelihood: of moving air that of the filter, of the sensors
-//! that of output error with residuals that are an autoregressive process, output by output. Gusts move
-//! all outputs together, so in moving air the filter explains them better.
+//! Both explanations of coloured residuals have a likelihood. For moving air it is that of the
+//! filter. For sensor noise it is that of output error with residuals that are an autoregressive
+//! process, output by output. Gusts move all outputs together, so in moving air the filter explains
+//! them better.
 
 use super::whiteness::{are_white, white_cost};
 use crate::dynamics::OUTPUTS;
@@ -14,8 +15,8 @@ use crate::output_error::{Fit, Measurements, Outcome};
 /// Raftery 1995).
 const VERY_STRONG: f64 = 5.0;
 
-/// True where coloured noise of the sensors explains what output error leaves better than moving air. A
-/// filter whose innovations are white has explained all.
+/// True if coloured noise of the sensors explains the residuals of output error better than moving
+/// air does. It is never so if the innovations of the filter are white.
 pub(super) fn explains(
     measurements: &Measurements,
     output_error: &Fit,
@@ -31,7 +32,7 @@ pub(super) fn explains(
     still.is_some_and(|still| still + VERY_STRONG < moving)
 }
 
-/// Log-likelihood that noise of a colour gains over white noise, over all outputs.
+/// Gain in log-likelihood of coloured noise over white noise, summed over the outputs.
 fn colour_gain(measurements: &Measurements, computed: &[[f64; OUTPUTS]]) -> f64 {
     let residuals = |o: usize| -> Vec<f64> {
         let both = measurements.values.iter().zip(computed);

@@ -28,7 +28,7 @@ const OF_SENSORS: &str = "; the residuals are coloured noise of the sensors";
 /// Reason why a derivative that the class estimates is inactive in a maneuver.
 const RESTS: &str = "its surface rests";
 
-/// Estimates one maneuver. The outcome has any failure.
+/// Estimates one maneuver. A failure is reported in the outcome.
 #[must_use]
 pub fn maneuver(
     record: &Record,

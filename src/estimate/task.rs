@@ -149,7 +149,7 @@ impl<'a> Task<'a> {
             .map(|o| resolution.get(&o).copied().unwrap_or(1e-6))
     }
 
-    /// Measured outputs; samples that do not count are zero and marked as not used.
+    /// Measured outputs; samples that do not count are zero and flagged as not used.
     pub(super) fn measurements(&self, range: &Range<usize>) -> Result<Measurements, String> {
         let mut series = Vec::with_capacity(OUTPUTS);
         for output in self.class.axis.outputs() {

@@ -5,8 +5,8 @@ use crate::numerics::differences;
 use crate::numerics::order_statistics::median;
 use crate::output_error::{Fit, Measurements, Outcome};
 
-/// Correlation of neighbouring residuals from which the air is taken to move: white residuals of a
-/// short maneuver stay below it.
+/// Correlation of neighbouring residuals above which the air is assumed to move; white residuals of
+/// a short maneuver stay below it.
 const COLOURED: f64 = 0.3;
 
 /// Standard deviation of an output's white noise, from its second differences.

@@ -6,7 +6,7 @@ use crate::aero::Condition;
 use crate::aero::wind_tunnel::each_or_none;
 use crate::tables::PosteriorRow;
 
-/// Share of the information from which a value counts as flight's, percent.
+/// Share of the information from flight above which a value counts as flight's, percent.
 const MOSTLY: f64 = 50.0;
 
 /// Tables of all derivatives and combined sums that have a value anywhere, in the order of the

@@ -47,8 +47,8 @@ pub(super) struct ParameterSlope<const NX: usize> {
     pub system: SystemSlope<NX>,
 }
 
-/// Variances of the outputs as the steady filter has them: an output that counts only in a share of
-/// the samples has as much larger a variance.
+/// Variances of the outputs for the steady filter: that of an output that counts in only a share of
+/// the samples is divided by this share.
 pub(super) fn steady_variances(noise: &Noise, patterns: &[Pattern]) -> [f64; OUTPUTS] {
     let all: usize = patterns.iter().map(|p| p.samples).sum();
     std::array::from_fn(|o| noise.outputs[o].powi(2) / share(o, patterns, all))

@@ -15,7 +15,7 @@ use crate::dynamics::{COEFFICIENTS, Equations};
 use crate::output_error::Case;
 use crate::output_error::surface_noise::{DerivativeValue, NoisySurface};
 
-/// Samples between two at which the effects are taken: the mean needs no more.
+/// Stride of the samples at which the effects are computed: enough for a mean.
 const STRIDE: usize = 16;
 
 /// Effect of the inputs' noise on the states of a filter.

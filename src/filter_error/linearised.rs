@@ -8,7 +8,7 @@ use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
 use crate::numerics::small::product;
 use crate::output_error::Case;
 
-/// Samples between two at which the slopes are taken: the mean needs no more.
+/// Stride of the samples at which the slopes are computed: enough for a mean.
 const STRIDE: usize = 4;
 
 /// Slopes of the rates and outputs along the states, means along the measured motion.

@@ -1,5 +1,5 @@
-//! Filter error: maximum likelihood in moving air (Maine and Iliff 1981; Jategaonkar 2015,
-//! chapter 5).
+//! Filter error: maximum likelihood in moving air (Maine and Iliff 1981; Jategaonkar 2015, chapter
+//! 5).
 //!
 //! Output error charges a gust to the derivatives. Here the air adds noise to the states between
 //! samples, and a filter of steady gain corrects the states by the measurements:
@@ -12,8 +12,8 @@
 //! ```
 //!
 //! f is the step of output error, and T lets the rotary gusts decay. Derivatives, biases, initial
-//! states, process noise and output noise are estimated together; the noise of the measured inputs is
-//! known beforehand. Without process noise and with exact inputs K is zero, and the innovations are the
+//! states, process noise and output noise are estimated together; the noise of the measured inputs
+//! is given. Without process noise and with exact inputs K is zero, and the innovations are the
 //! residuals of output error.
 //!
 //! | file | content |

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::dynamics::{InGusts, OUTPUTS};
 use crate::units::RAD;
 
-/// Rotary gusts of an axis at most.
+/// Largest number of rotary gusts of an axis.
 const MOST_GUSTS: usize = 2;
 
 /// Standard deviations from which the iteration starts: light turbulence.
@@ -25,10 +25,11 @@ const CORNER_SPREAD: f64 = 0.7;
 /// of some ten seconds hardly determines them, and close to one they would leave a combination of
 /// the moments without noise.
 const CORRELATION_SPREAD: f64 = 0.5;
-/// Spread of the logarithm of a rotary gust below the size that belongs to the angle's walk. A
-/// maneuver of some ten seconds may show none by chance, and bounds without it would be too small.
+/// Spread of the logarithm of a rotary gust below the size that the random walk of the angle
+/// implies. A maneuver of some ten seconds may show none by chance, and bounds without it would be
+/// too small.
 const ROTARY_SPREAD: f64 = 0.5;
-/// Standard deviations of severe turbulence (30 ft/s rms at 300 ft/s), beyond which no air is.
+/// Standard deviations of severe turbulence (30 ft/s rms at 300 ft/s), an upper limit for air.
 const SEVERE_ANGLE: f64 = 0.7 * RAD;
 const SEVERE_GUST: f64 = 6.0 * RAD;
 /// Standard deviations below which a gust has no effect on any output.
@@ -69,8 +70,8 @@ pub enum NoiseParameter {
 pub enum Prior {
     /// Normal, with mean and standard deviation.
     Normal(f64, f64),
-    /// Normal of the size whose logarithm the parameter is, about zero, with the logarithm of its
-    /// standard deviation: it holds down what has no effect on any output.
+    /// Prior of a size whose logarithm is the parameter: normal about zero, with this logarithm of
+    /// its standard deviation. It bounds sizes that affect no output.
     Size(f64),
 }
 
@@ -91,7 +92,7 @@ impl Prior {
     }
 }
 
-/// Cost of a rotary gust that is smaller than the angle's walk makes it.
+/// Cost of a rotary gust that is smaller than the random walk of the angle implies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RotaryCost {
     pub cost: f64,
@@ -161,7 +162,7 @@ impl Noise {
         }
     }
 
-    /// Noise of hardly moving air, from which the iteration finds out whether it moves.
+    /// Noise of almost still air, from which the iteration can grow gusts if there are any.
     #[must_use]
     pub fn slight(outputs: [f64; OUTPUTS]) -> Noise {
         Noise {
@@ -209,8 +210,8 @@ impl Noise {
         self.angle <= AT * LEAST_ANGLE && self.gusts.iter().all(|g| *g <= AT * LEAST_GUST)
     }
 
-    /// Returns true for moving air whose rotary gusts belong to the angle's walk. A misfit of the rates
-    /// is charged to rotary gusts without gusts of the angle.
+    /// True for moving air whose rotary gusts are consistent with the random walk of the angle.
+    /// Rotary gusts without gusts of the angle are a misfit of the rates instead.
     #[must_use]
     pub fn is_of_air(&self, gusts: usize, step_s: f64) -> bool {
         let belongs = |gust| self.rotary_excess(gust, step_s) < MOST_EXCESS.ln();
@@ -230,16 +231,17 @@ impl Noise {
         p / (p + r)
     }
 
-    /// Logarithm of a rotary gust over the size that belongs to the angle's walk. The gust is the
-    /// angle's rate, low-passed at the corner ω: white of intensity σ²/Δt becomes σ²ω/(2Δt)
+    /// Logarithm of a rotary gust over the size that the random walk of the angle implies. The gust
+    /// is the angle's rate, low-passed at the corner ω: white of intensity σ²/Δt becomes σ²ω/(2Δt)
     /// (MIL-F-8785C).
     fn rotary_excess(&self, gust: usize, step_s: f64) -> f64 {
         let expected = self.angle * (self.corner / (2.0 * step_s)).sqrt();
         (self.gusts[gust] / expected).ln()
     }
 
-    /// Cost of rotary gusts below the size that belongs to the angle's walk, with its slopes and
-    /// expected curvatures along the parameters that act on it: (parameter, slope along the excess).
+    /// Cost of rotary gusts smaller than the random walk of the angle implies, with its slopes and
+    /// expected curvatures along the parameters that act on it: (parameter, slope along the
+    /// excess).
     #[must_use]
     pub fn rotary_cost(&self, gust: usize, step_s: f64) -> Option<RotaryCost> {
         let excess = self.rotary_excess(gust, step_s);

@@ -29,12 +29,12 @@ settings! {
 /// First damping after a full step fails, and the one at which no step lowers the cost.
 const FIRST_DAMPING: f64 = 1e-4;
 const MOST_DAMPING: f64 = 1e8;
-/// Largest growth of a noise in a step, a factor of 4.5, and largest fall, of 50: noise that is not
-/// there falls to its floor in few steps.
+/// Largest growth of a noise in a step, a factor of 4.5, and largest fall, of 50, so that a noise
+/// that is absent falls to its floor in few steps.
 const LARGEST_GROWTH: f64 = 1.5;
 const LARGEST_FALL: f64 = 4.0;
-/// Decrease of J by a full step below which the noise may still move: it wanders along valleys in
-/// which no estimate changes.
+/// Decrease of J that a full step predicts, below which the iteration may end though the noise
+/// still moves: it drifts along valleys in which no estimate changes.
 const NOISE_TOLERANCE: f64 = 0.1;
 
 /// Steps in a row that lower J by less than the tolerance after which the iteration ends: it follows

@@ -1,8 +1,8 @@
 //! Slopes of the derivatives over α inside a maneuver, and their effect on the estimates.
 //!
-//! A slope is a derivative's change over α in the tunnel's. The slopes have a normal prior about a common
-//! share λ. With information H and gradient g of −J at the fit, f the filter's own parameters and s the
-//! slopes,
+//! A slope is a derivative's change over α, as a share of the tunnel's change. The slopes have a
+//! normal prior about a common share λ. With information H and gradient g of −J at the fit, f the
+//! filter's own parameters and s the slopes,
 //!
 //! ```text
 //! V = H_ss − H_sf H_ff⁻¹ H_fs        m = λ 1        D = λ w 1
@@ -11,16 +11,17 @@
 //! p(data | λ) ∝ |1 + D V D|^(−½) exp(g_s' m − ½ m' V m + ½ (g_s − V m)' P (g_s − V m))
 //! ```
 //!
-//! where the fit held the slopes at s₀, and g_s is the gradient there plus V s₀. The result is the mean
-//! over λ. A maneuver whose derivatives are constant shows it, and is left as it is.
+//! where the fit held the slopes at s₀, and g_s is the gradient there plus V s₀. The result is the
+//! mean over λ. If the data show constant derivatives, the slopes come out near zero and move
+//! nothing.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// Shares λ: from derivatives that are constant to changes half as large again as the tunnel's.
 const SHARES: [f64; 7] = [0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5];
 
-/// Deviation w of a slope in shares: a table that is off by 20 % changes over α by something else than a
-/// table that is scaled.
+/// Standard deviation w of a slope about the common share. A table with errors of 20 % is not only
+/// scaled; it also has another shape over α.
 const SCATTER: f64 = 0.5;
 
 /// Effect of the slopes on the estimates.
@@ -35,7 +36,7 @@ pub struct SlopeEffect {
 }
 
 impl SlopeEffect {
-    /// Takes the change for a deviation of the estimates.
+    /// Turns the change of the estimates into an uncertainty.
     pub fn become_uncertainty(&mut self) {
         self.covariance += &self.change * self.change.transpose();
         self.change.fill(0.0);

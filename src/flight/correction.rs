@@ -65,8 +65,8 @@ impl Correction {
             .collect()
     }
 
-    /// `(y(t + delay) − bias) / (1 + scale)`, the delay in samples. The worst mark of the samples
-    /// that a value depends on is its own.
+    /// `(y(t + delay) − bias) / (1 + scale)`, the delay in samples. A corrected sample gets the
+    /// worst flag of the samples that it depends on.
     fn corrected(&self, old: &Series, delay: f64) -> Series {
         let kernel = InterpolationKernel::at(delay);
         let values: Vec<f64> = (0..old.values.len())
@@ -108,7 +108,7 @@ fn weighted_samples(
         .map(|(sample, weight, _)| (sample, weight))
 }
 
-/// The worst of the marks that a value depends on: a fault outweighs none.
+/// The worst flag of the samples that a value depends on; any fault is worse than no fault.
 fn worst_mark(kernel: &InterpolationKernel, marks: &[Mark], k: usize) -> Mark {
     weighted_samples(kernel, k, marks.len())
         .map(|(sample, _)| marks[sample])

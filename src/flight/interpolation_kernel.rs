@@ -83,8 +83,8 @@ impl InterpolationKernel {
         }
     }
 
-    /// Adds values at sample `k` and the samples after it to the samples that they are interpolated
-    /// from: the transpose of [`Self::interpolate_from`].
+    /// Distributes values at sample `k` and the samples after it over the samples from which they
+    /// are interpolated: the transpose of [`Self::interpolate_from`].
     pub fn share_out(&self, k: usize, values: &[f64], to: &mut [f64]) {
         let first = k.checked_add_signed(self.first);
         let Some(first) = first.filter(|first| first + values.len() + WIDTH <= to.len() + 1) else {

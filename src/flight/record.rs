@@ -30,7 +30,7 @@ pub enum Mark {
 }
 
 impl Mark {
-    /// Mark with this code; an unknown code counts as missing.
+    /// Repair or fault with this code; an unknown code counts as missing.
     #[must_use]
     pub fn from_u8(code: u8) -> Mark {
         match code {
@@ -44,8 +44,8 @@ impl Mark {
         }
     }
 
-    /// `true` where the sample was repaired or is missing. The samples between two values of a slow
-    /// channel and assumed ones are no measurements, but they are no faults.
+    /// `true` if the sample was repaired or is missing. A sample between two values of a slow
+    /// channel, or an assumed one, is no measurement and no fault.
     #[must_use]
     pub fn is_fault(self) -> bool {
         !matches!(self, Mark::Measured | Mark::Between | Mark::Assumed)
@@ -67,7 +67,7 @@ impl Series {
         Series { values, marks }
     }
 
-    /// `true` where no sample is from the recorder.
+    /// `true` if no sample comes from the recorder.
     #[must_use]
     pub fn is_assumed(&self) -> bool {
         self.marks.first() == Some(&Mark::Assumed)

@@ -40,8 +40,8 @@ pub const IXZ: &str = "ixz_slug_ft2";
 /// Required signals that are greater than zero in flight.
 pub const POSITIVE: &[&str] = &[VELOCITY, QBAR, MASS, IX, IY, IZ];
 
-/// `true` for a signal whose fault refuses a flight. The other required signals are left out, and a
-/// stand-in takes their place at little cost.
+/// `true` for a signal whose fault refuses a flight. Any other faulty signal is left out, and a
+/// stand-in replaces it at little cost.
 #[must_use]
 pub fn is_indispensable(signal: &str) -> bool {
     REQUIRED.contains(&signal) && ![MACH, RPM_LEFT, RPM_RIGHT].contains(&signal)

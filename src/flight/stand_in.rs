@@ -1,4 +1,4 @@
-//! Stand-ins: what takes the place of a signal that a flight does not record.
+//! Stand-ins: values in place of a signal that a flight does not record.
 //!
 //! The equations of motion read every signal of [`signal::REQUIRED`]. Few of them decide the
 //! derivatives of an axis; the others can be assumed or computed, at a cost that is stated.
@@ -29,15 +29,15 @@ pub enum StandIn {
 }
 
 /// Signals that only the lateral derivatives need. Without one of them the longitudinal equations
-/// take straight flight with level wings.
+/// assume straight flight with level wings.
 pub const LATERAL: [&str; 5] = [s::BETA_VANE, s::P, s::R, s::PHI, s::AY];
 
 /// Signals that only the longitudinal derivatives need. α is not among them: the lateral equations
-/// need it, if only as a constant.
+/// need it, at least as a constant.
 pub const LONGITUDINAL: [&str; 4] = [s::Q, s::THETA, s::AN, s::AX];
 
 impl StandIn {
-    /// Stand-in of a signal, where there is one. `has` is `true` for a signal that is recorded or
+    /// Stand-in of a signal, if it can have one. `has` is `true` for a signal that is recorded or
     /// given as a constant.
     #[must_use]
     pub fn of(signal: &str, has: impl Fn(&str) -> bool) -> Option<StandIn> {
@@ -156,7 +156,7 @@ const FIRST: [&str; 2] = [s::VELOCITY, s::ALTITUDE];
 /// `has` is `true` for a signal that is recorded or given as a constant.
 ///
 /// # Errors
-/// The first required signal that nothing stands for.
+/// The first required signal that can have no stand-in.
 pub fn stand_ins(has: impl Fn(&str) -> bool) -> Result<Vec<(String, StandIn)>, &'static str> {
     let others = s::REQUIRED.iter().filter(|name| !FIRST.contains(name));
     let lacking = FIRST.iter().chain(others).filter(|name| !has(name));
@@ -200,7 +200,7 @@ mod tests {
     use crate::flight::Mark;
     use approx::assert_relative_eq;
 
-    /// Signals of a recorder that has all of the required ones but some.
+    /// Test for the signals of a recorder that has all required ones except some.
     fn all_but<'a>(missing: &'a [&'a str]) -> impl Fn(&str) -> bool + 'a {
         move |signal| s::REQUIRED.contains(&signal) && !missing.contains(&signal)
     }

@@ -44,8 +44,8 @@ pub fn reach_deg<'a>(candidates: impl Iterator<Item = &'a Candidate>) -> (f64, f
     })
 }
 
-/// Test points with the flight whose altitude and mass they have: the candidates as written, or those
-/// of all flights.
+/// Test points with the flight that gives their altitude and mass: the candidates as written, or
+/// those of all flights.
 fn test_points(cards: &Cards) -> Vec<(&FlightCard, &TestPoint)> {
     let first = cards.flights.values().next();
     if cards.next.candidates.is_empty() {

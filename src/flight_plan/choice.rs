@@ -1,17 +1,19 @@
-//! Choice of the cards of a flight: what they teach against the minutes they take.
+//! Choice of the cards of a flight: the information that they bring, against the minutes that they
+//! take.
 //!
-//! The state of knowledge is one Gaussian a coefficient. A card observes some of its rows with noise;
-//! its effect on the covariance does not depend on what it will read. An aim may have a part in several
-//! coefficients, which are independent: its variance v is the sum of its parts'. With w the standard
-//! deviation that is wanted of it, flying a set of cards is worth
+//! The derivatives of each coefficient have a Gaussian distribution. A card observes some of its
+//! rows with noise; the effect on the covariance does not depend on the values observed. An aim may
+//! have a part in several coefficients, which are independent: its variance v is the sum over the
+//! parts. With w the wanted standard deviation, flying a set of cards is worth
 //!
 //! Σ weight · ½ (ln max(v before, w²) − ln max(v after, w²))
 //!
-//! in nats: what goes beyond a wanted bound is worth nothing.
+//! in nats: a reduction below the wanted deviation is worth nothing.
 //!
-//! Two greedy sets, by worth and by worth per minute, are each improved by exchange: a card is taken
-//! out and the minutes are filled again, as long as the set gains by it. A greedy set alone falls short
-//! of the best one where cards complete each other or the minutes do not come out even.
+//! Two greedy sets, by worth and by worth per minute, are each improved by exchange: a card is
+//! taken out and the minutes are filled again, as long as the set gains by it. A greedy set alone
+//! is worse than the best one if cards complement each other, or if the minutes do not divide
+//! evenly.
 
 use nalgebra::{Cholesky, DMatrix, Dyn};
 
@@ -22,38 +24,38 @@ use crate::numerics::triangular::solve_lower;
 /// Worth below which a card adds nothing, nats.
 const LEAST_WORTH: f64 = 1e-6;
 
-/// Share of its worth by which an exchange must improve a set: smaller ones take time and change no
-/// decision.
+/// Least improvement of a set by an exchange, as a share of its worth: smaller ones take time and
+/// change no decision.
 const LEAST_IMPROVEMENT: f64 = 1e-4;
 
 /// Most rounds of exchanges: the search then ends with the set it has.
 const MOST_ROUNDS: usize = 20;
 
-/// Quantity of which a standard deviation is wanted.
+/// Quantity whose standard deviation is to be lowered.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Aim {
     pub parts: Vec<AimPart>,
     pub weight: f64,
-    /// Wanted standard deviation; zero where each reduction counts.
+    /// Wanted standard deviation; zero if every reduction counts.
     pub wanted: f64,
-    /// Place of the quantity among all that are asked for.
+    /// Index of the quantity among all that are asked for.
     pub point: usize,
 }
 
 /// Part of an aim in one coefficient.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AimPart {
-    /// Place of the coefficient.
+    /// Index of the coefficient.
     pub coefficient: usize,
     /// Row of the coefficient's covariance.
     pub row: usize,
 }
 
-/// Knowledge of one coefficient, with what the cards observe of it.
+/// Covariance of one coefficient's derivatives, with the cards' observations.
 #[derive(Clone, Debug)]
 pub struct CoefficientKnowledge {
     pub covariance: DMatrix<f64>,
-    /// In the order of the cards; `None` for a card that observes nothing of it.
+    /// In the order of the cards; `None` for a card that observes nothing of the coefficient.
     pub cards: Vec<Option<PlannedRows>>,
 }
 
@@ -73,7 +75,7 @@ pub struct Price {
     pub alpha_deg: f64,
 }
 
-/// Flight time and what it is spent on.
+/// Flight time, and the rates at which it is spent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Budget {
     pub minutes: f64,
@@ -104,14 +106,14 @@ pub struct CardChoice {
     pub budget: Budget,
 }
 
-/// Order in which a set is filled.
+/// Criterion by which a set is filled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Preference {
     Worth,
     WorthPerMinute,
 }
 
-/// A set of cards, and the knowledge after flying it.
+/// A set of cards, and the covariances after flying it.
 #[derive(Clone, Debug)]
 pub struct CardSet<'a> {
     choice: &'a CardChoice,
@@ -140,7 +142,7 @@ impl CardChoice {
 }
 
 impl<'a> CardSet<'a> {
-    /// No card.
+    /// Set without cards.
     #[must_use]
     pub fn nothing(choice: &'a CardChoice) -> CardSet<'a> {
         let coefficients = choice.coefficients.iter();
@@ -151,7 +153,7 @@ impl<'a> CardSet<'a> {
         }
     }
 
-    /// Each card so many times.
+    /// Set in which each card is flown this number of times.
     #[must_use]
     pub fn times(choice: &'a CardChoice, times: &[usize]) -> CardSet<'a> {
         let mut set = CardSet::nothing(choice);
@@ -176,7 +178,7 @@ impl<'a> CardSet<'a> {
         self.times[card] += 1;
     }
 
-    /// The set without a card that it has, flown once less.
+    /// The set with one of its cards flown once less.
     #[must_use]
     pub fn without(&self, card: usize) -> CardSet<'a> {
         let mut set = self.clone();
@@ -234,13 +236,14 @@ impl<'a> CardSet<'a> {
         variance(&aim.parts, |coefficient| &self.covariances[coefficient])
     }
 
-    /// Standard deviation of an aim.
+    /// Standard deviation of an aim after the set is flown.
     #[must_use]
     pub fn deviation(&self, aim: &Aim) -> f64 {
         self.variance(aim).max(0.0).sqrt()
     }
 
-    /// Minutes of the set: its cards, and the way from the lowest angle of attack to the highest.
+    /// Minutes of the set: its cards, and the change from the lowest angle of attack to the
+    /// highest.
     #[must_use]
     pub fn minutes(&self) -> f64 {
         self.minutes_with(None)
@@ -316,7 +319,7 @@ impl<'a> CardSet<'a> {
 }
 
 impl Aim {
-    /// Worth of a reduction of the variance, nats.
+    /// Worth of a reduction of the variance from `before` to `after`, nats.
     #[must_use]
     pub fn worth(&self, before: f64, after: f64) -> f64 {
         let counted = |variance: f64| variance.max(self.wanted * self.wanted);
@@ -329,8 +332,8 @@ impl Aim {
     }
 }
 
-/// Rows of a card with the covariance of what it will read; `None` where it reads nothing of the
-/// coefficient.
+/// Rows of a card with the covariance of their observations; `None` if the card observes nothing of
+/// the coefficient.
 fn predicted<'s>(
     coefficient: &'s CoefficientKnowledge,
     covariance: &DMatrix<f64>,

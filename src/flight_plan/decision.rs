@@ -1,20 +1,20 @@
 //! Decision that a flight is to bring: between which limits a quantity lies.
 //!
-//! The quantity is x = g + n. g is a linear combination of the derivatives, normal with mean m and
-//! standard deviation σ by tonight's posterior; n, independent with standard deviation ν, is what no
-//! flight lowers. It is decided when x lies in one of the intervals between the limits with a stated
-//! probability p.
+//! The quantity is x = g + n. g is a linear combination of the derivatives; by tonight's posterior
+//! it is normal with mean m and standard deviation σ. n is independent, with standard deviation ν,
+//! which no flight lowers. The quantity is decided once x lies between two neighbouring limits with
+//! a stated probability p.
 //!
-//! A flight after which g has the standard deviation σ′ moves the mean to m′. What is expected of the
-//! posterior is the prior, so m′ is normal with mean m and variance τ² = σ² − σ′². With
-//! s² = σ′² + ν² the interval from l to u is decided where
+//! A flight that lowers the standard deviation of g to σ′ moves its mean to m′. Before the flight
+//! m′ is normal with mean m and variance τ² = σ² − σ′². With s² = σ′² + ν² the interval from l to u
+//! is decided if
 //!
 //! Φ((u − m′)/s) − Φ((l − m′)/s) ≥ p.
 //!
-//! The left side falls with the distance of m′ from the interval's middle, so this is an interval from a
-//! to b, and the flight decides with the probability Σ Φ((b − m)/τ) − Φ((a − m)/τ) over the intervals,
-//! of which, with p over a half, no two overlap. With one limit at the distance d of the mean, and
-//! without n, it is Φ((d − zσ′)/τ) + Φ(−(d + zσ′)/τ), where Φ(z) = p.
+//! The left side falls with the distance of m′ from the interval's middle, so this holds for m′
+//! from a to b. The flight decides with the probability Σ Φ((b − m)/τ) − Φ((a − m)/τ) over the
+//! intervals, which do not overlap for p over a half. With one limit at the distance d of the mean,
+//! and without n, it is Φ((d − zσ′)/τ) + Φ(−(d + zσ′)/τ), where Φ(z) = p.
 
 use crate::numerics::normal;
 
@@ -28,17 +28,17 @@ pub struct Decision {
     pub mean: f64,
     /// Ascending limits.
     pub limits: Vec<f64>,
-    /// Standard deviation that no flight lowers.
+    /// Standard deviation ν, which no flight lowers.
     pub rest: f64,
-    /// Probability that decides, over a half.
+    /// Probability p that decides, over a half.
     pub share: f64,
-    /// `true` where the limits are about the mean and follow it.
+    /// `true` if the limits lie about the mean and move with it.
     pub follows_mean: bool,
 }
 
 impl Decision {
-    /// The most probable interval with a standard deviation of the derivatives' part, and its
-    /// probability.
+    /// The most probable interval, and its probability, for this standard deviation of the
+    /// derivatives' part.
     #[must_use]
     pub fn most_probable(&self, deviation: f64) -> ((f64, f64), f64) {
         let spread = deviation.hypot(self.rest);
@@ -56,7 +56,8 @@ impl Decision {
         self.most_probable(deviation).1 >= self.share
     }
 
-    /// Probability that it is decided after a flight that changes the standard deviation.
+    /// Probability that a flight decides the quantity by changing the standard deviation from
+    /// `before` to `after`.
     #[must_use]
     pub fn decided(&self, before: f64, after: f64) -> f64 {
         let spread = after.hypot(self.rest);
@@ -73,7 +74,7 @@ impl Decision {
         probability.sum::<f64>().clamp(0.0, 1.0)
     }
 
-    /// `true` where it is not decided, and perfect knowledge of the derivatives may decide it.
+    /// `true` if the quantity is not decided yet, and exact derivatives might decide it.
     #[must_use]
     pub fn is_open(&self, before: f64) -> bool {
         !self.is_decided(before) && self.decided(before, 0.0) > 0.0
@@ -92,7 +93,7 @@ impl Decision {
         lows.zip(limits.chain([f64::INFINITY]))
     }
 
-    /// Means with which an interval is decided; `None` where it is too narrow for the spread.
+    /// Range of means for which an interval is decided; `None` if it is too narrow for the spread.
     fn deciding(&self, (low, high): (f64, f64), spread: f64) -> Option<(f64, f64)> {
         let distance = normal::quantile(self.share) * spread;
         match (low.is_finite(), high.is_finite()) {
@@ -111,8 +112,8 @@ impl Decision {
     }
 }
 
-/// Largest number from zero up to a limit for which a condition holds that fails beyond it; zero where it holds
-/// nowhere.
+/// Largest number from zero to a limit that satisfies a condition, which must fail at every larger
+/// number; zero if no number does.
 fn largest_up_to(limit: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (0.0, limit);
     for _ in 0..HALVINGS {

@@ -95,7 +95,7 @@ pub fn colour(covariance: &Covariance) -> Option<f64> {
     }))
 }
 
-/// Covariance whose noise, without the errors that maneuvers share, is so many times as large.
+/// Covariance with its noise multiplied by a factor; errors that maneuvers share stay as they are.
 #[must_use]
 pub fn with_noise(covariance: &Covariance, factor: f64) -> Covariance {
     let n = covariance.names.len();
@@ -112,8 +112,8 @@ pub fn with_noise(covariance: &Covariance, factor: f64) -> Covariance {
     }
 }
 
-/// Factor by which the campaign's maneuvers of each class are noisier than simulated ones: the ratio
-/// of their colours. One for a class without either.
+/// Factor by which the campaign's maneuvers of each class are noisier than simulated ones: the
+/// ratio of their colours. It is one for a class that lacks either colour.
 #[must_use]
 pub fn noise_factors<'a>(
     history: &CampaignHistory,

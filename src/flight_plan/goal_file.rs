@@ -9,10 +9,10 @@ use crate::error::{Result, did_you_mean};
 use crate::model::Model;
 use crate::tables::{Airframe, FlyingQuality, ModelSource};
 
-/// Reads the goals; without a file each quantity of the posterior is one.
+/// Reads the goals. Without a file every quantity of the posterior is a goal.
 ///
 /// # Errors
-/// A mistake in the file, with the place in it.
+/// A mistake in the file, with its place.
 pub fn read(file: Option<&Path>, config: &Config, model: &Model) -> Result<Vec<Goal>> {
     let Some(file) = file else {
         return Ok(model.quantities().map(Goal::of).collect());

@@ -27,17 +27,17 @@ pub struct GoalPoint {
     pub target: Target,
 }
 
-/// End that a goal point is to reach.
+/// Criterion that a goal point is to meet.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Target {
-    /// Wanted standard deviation; each reduction counts without.
+    /// Wanted standard deviation; if it is `None`, every reduction counts.
     Bound(Option<f64>),
     Decision(Decision),
 }
 
 impl Target {
-    /// Wanted standard deviation from the one before the flight; zero where each reduction counts, as
-    /// large as the one before where none does.
+    /// Wanted standard deviation, given the one before the flight: zero if every reduction counts,
+    /// and the present one if no reduction does.
     #[must_use]
     pub fn wanted(&self, before: f64) -> f64 {
         match self {
@@ -51,7 +51,8 @@ impl Target {
 /// Unit of a match.
 const TOLERANCE: &str = "tolerance";
 
-/// Matches to be decided by place among the goals: their simulator, and what decides each maneuver.
+/// Matches to be decided, by the index of their goal: the simulator, and what decides each
+/// maneuver.
 pub type Matches = BTreeMap<usize, (ModelSource, Vec<DecisiveDifference>)>;
 
 /// Sources of goals.
@@ -66,9 +67,9 @@ pub struct GoalBasis<'a> {
 }
 
 impl GoalBasis<'_> {
-    /// Goals at each of their angles of attack. The weight of a goal is shared by its angles, so that
-    /// the worth of a plan is the goals' weighted mean. `condition` is that in which the cards are
-    /// flown at an angle of attack.
+    /// Goals at each of their angles of attack. The weight of a goal is divided among its angles,
+    /// so that the worth of a plan is the goals' weighted mean. `condition` returns the flight
+    /// condition in which the cards are flown at an angle of attack.
     #[must_use]
     pub fn points(
         &self,

@@ -1,4 +1,4 @@
-//! Goals as written in YAML: derivatives with the bound that is wanted of them, levels and matches to be
+//! Goals as written in YAML: derivatives with their wanted bounds, and levels and matches to be
 //! decided.
 
 use serde::{Deserialize, Serialize};
@@ -87,7 +87,7 @@ impl Goal {
         name.or(self.class.as_deref()).unwrap_or("goals")
     }
 
-    /// Subject of the goal; `None` unless it has one alone.
+    /// Subject of the goal; `None` if it has none or more than one.
     #[must_use]
     pub fn subject(&self) -> Option<GoalSubject<'_>> {
         match (&self.derivative, self.quantity, &self.class) {
@@ -101,7 +101,7 @@ impl Goal {
         }
     }
 
-    /// Probability that decides.
+    /// Probability from which the goal counts as decided.
     #[must_use]
     pub fn deciding_share(&self) -> f64 {
         self.decided.unwrap_or(DECIDED)

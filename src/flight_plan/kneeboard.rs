@@ -26,7 +26,7 @@ struct Page<'a> {
     aircraft: &'a str,
     minutes: String,
     flown_minutes: String,
-    /// Percentage by which the goals' deviations fall, in their weighted mean.
+    /// Percentage by which the goals' standard deviations fall, in their weighted mean.
     fall_pct: String,
     cards: Vec<CardLine>,
     goals: Vec<GoalLine>,
@@ -54,7 +54,7 @@ struct CardLine {
     teaches: Vec<Taught>,
 }
 
-/// Goal to which a card adds.
+/// Goal that a card helps to reach.
 #[derive(Debug, Serialize)]
 struct Taught {
     symbol: String,

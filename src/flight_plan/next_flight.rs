@@ -35,7 +35,7 @@ const PRINTED_PAGE: &str = "kneeboard.pdf";
 pub struct Request<'a> {
     /// Test cards, YAML.
     pub cards: &'a Path,
-    /// Goals, YAML; everything without.
+    /// Goals, YAML; without them every quantity of the posterior is one.
     pub goals: Option<&'a Path>,
     /// Flight time.
     pub minutes: f64,

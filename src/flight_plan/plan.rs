@@ -38,7 +38,7 @@ pub struct Rehearsal {
     pub result: Result<Rehearsed, String>,
 }
 
-/// A candidate that is not refused.
+/// A candidate that is not refused, with its index.
 #[derive(Clone, Copy)]
 struct KeptCard<'a> {
     candidate: &'a Candidate,
@@ -167,7 +167,7 @@ fn outlooks(state: &CampaignState, kept: &[KeptCard], points: &[GoalPoint]) -> V
     )
 }
 
-/// Aims of the goals: each has a part in every coefficient whose outlook has a row of it.
+/// Aims of the goals: each has a part in every coefficient that has a row for it.
 fn aims(outlooks: &[Outlook], points: &[GoalPoint]) -> Vec<Aim> {
     let mut parts: Vec<Vec<AimPart>> = vec![vec![]; points.len()];
     for (coefficient, outlook) in outlooks.iter().enumerate() {
@@ -191,8 +191,8 @@ fn aims(outlooks: &[Outlook], points: &[GoalPoint]) -> Vec<Aim> {
         .collect()
 }
 
-/// Knowledge of each coefficient. Experience with a card's class tells which share of its information is
-/// expected: the noise of its rows is divided by that share.
+/// Covariance of each coefficient with the observations of the cards. By experience only a share of
+/// a class's maneuvers is usable, so the noise of its rows is divided by this share.
 fn knowledge(
     state: &CampaignState,
     kept: &[KeptCard],

@@ -1,6 +1,6 @@
-//! Rehearsal of a card: it is flown by the posterior's aircraft, recorded with the campaign's noise, and
-//! estimated as a flown maneuver is. Its covariance, with the nuisances of the maneuver in it, is what
-//! the card will teach.
+//! Rehearsal of a card: it is flown by the posterior's aircraft, recorded with the campaign's
+//! noise, and estimated as a flown maneuver is. The covariance of that estimate, nuisance
+//! parameters included, predicts the information of the card.
 
 use std::collections::BTreeMap;
 
@@ -69,8 +69,9 @@ impl RehearsalBasis<'_> {
     }
 }
 
-/// Instruments with the noise that the campaign's channels have, and no other errors: the uncertainty
-/// of calibration is part of each estimate. A channel without measured noise has that of the cards.
+/// Instruments with the noise that the campaign's channels have, and no other errors, since each
+/// estimate contains the uncertainty of calibration. A channel without measured noise has the noise
+/// of the cards.
 #[must_use]
 pub fn instruments(of_cards: &Instruments, channels: &[ChannelRow]) -> Instruments {
     let of_cards = of_cards.0.iter();

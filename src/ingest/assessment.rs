@@ -57,7 +57,7 @@ type RecordReader<'a> = dyn Fn(&BTreeSet<String>, Range<usize>) -> Option<Record
 /// range of samples.
 ///
 /// # Errors
-/// A problem that refuses the stretch: a required channel without any number, or one that the
+/// A problem that refuses the stretch: a required channel without any number, or a channel that the
 /// relations prove wrong.
 pub fn assess(
     stretch: &Stretch,
@@ -192,7 +192,7 @@ impl<'a> Recording<'a> {
     }
 }
 
-/// Refusal of a required signal that nothing stands for, at its empty channel where it has one.
+/// Refusal of a required signal that can have no stand-in, at its empty channel if it has one.
 fn refused_signal(signal: &str, empty: Vec<(&str, Refusal)>) -> Refusal {
     let own = empty.into_iter().find(|(name, _)| *name == signal);
     own.map_or_else(|| missing_signal(signal), |(_, refusal)| refusal)
@@ -224,9 +224,9 @@ impl Examination<'_> {
 
     /// Reconciles the relations between channels with the errors of the instruments.
     ///
-    /// With a wrong sign or unit, the errors of the other instruments are estimated with that
-    /// channel corrected, and the record is left as it is. A relation that no sign and no unit
-    /// explains may fail because of a delay: if it holds once the delays are removed, the delay
+    /// If a channel has a wrong sign or unit, the errors of the other instruments are estimated
+    /// with the channel corrected; the record is left as it is. If no sign and no unit explains a
+    /// failed relation, a delay may: if the relation holds once the delays are removed, the delay
     /// is the fault.
     fn reconcile(&self, blocks: &BlockMeans) -> (RelationResult, Findings) {
         let relations = self.check(blocks);
@@ -260,8 +260,8 @@ impl Examination<'_> {
         (relations, Findings::default())
     }
 
-    /// Finds signals that no aircraft has. The mass is checked where no relation finds a fault in the
-    /// other signals of the lift.
+    /// Finds signals with values that no aircraft has. The mass is checked only if no relation
+    /// finds a fault in the other signals of the lift.
     fn impossible(&self, blocks: &BlockMeans, faulty: &[FaultyChannel]) -> Vec<ImpossibleSignal> {
         const LIFT: [&str; 4] = [
             signal::AN,
@@ -289,8 +289,8 @@ impl Examination<'_> {
             .collect()
     }
 
-    /// Checks the kinematic relations and isolates the faulty channels. A wrong time fails relations of
-    /// every channel, so then no channel is named.
+    /// Checks the kinematic relations and isolates the faulty channels. A wrong time fails the
+    /// relations of every channel; no channel is then named.
     fn check(&self, blocks: &BlockMeans) -> RelationResult {
         let Context {
             channels,
@@ -378,7 +378,7 @@ struct RelationResult {
     /// Signals that a relation confirms.
     confirmed: Vec<&'static str>,
     report: Option<FaultReport>,
-    /// Signals that no aircraft has, where they do not refuse the flight.
+    /// Signals with values that no aircraft has, unless they refuse the flight.
     impossible: Vec<ImpossibleSignal>,
 }
 
@@ -423,8 +423,8 @@ fn relation_problem(
     refusal.into_problem(flight_id)
 }
 
-/// Faulty channels that a flight can do without, each with its stand-in; none where the report refuses the
-/// stretch.
+/// Faulty channels that a flight can do without, each with its stand-in; empty if the report
+/// refuses the stretch.
 fn left_out(report: &FaultReport, faulty: &[FaultyChannel]) -> Vec<(String, StandIn)> {
     if report.required {
         return Vec::new();

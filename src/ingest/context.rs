@@ -35,7 +35,7 @@ impl Context<'_> {
     /// Stand-ins of the required signals that neither `recorded` nor a constant gives.
     ///
     /// # Errors
-    /// The first signal that nothing stands for.
+    /// The first signal that can have no stand-in.
     pub(super) fn stand_ins(
         &self,
         recorded: impl Fn(&str) -> bool,

@@ -22,7 +22,7 @@ impl Refusal {
         }
     }
 
-    /// This refusal with the stand-in of the signal that is left out, and what its absence costs.
+    /// This refusal with the stand-in of the signal that is left out, and the cost of its absence.
     #[must_use]
     pub fn with_stand_in(self, signal: &str, stand_ins: &[(String, StandIn)]) -> Refusal {
         let stand_in = stand_ins.iter().find(|(name, _)| name == signal);

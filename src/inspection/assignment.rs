@@ -10,30 +10,31 @@ use super::grid::Grid;
 use super::quantity::Quantity;
 use super::signs::{Reversal, SignCosts};
 
-/// Cost of a column whose name does not mean the quantity, over one whose name does.
+/// Cost of a column whose name does not suggest the quantity, relative to one whose name does.
 const NAME_COST: f64 = 2.0;
-/// Cost of an unusual sign: signs are reversed more seldom than the motion misleads.
+/// Cost of an unusual sign: reversed signs are rarer than misleading motion.
 const SIGN_COST: f64 = 0.2;
 /// Cost of each place of a unit in the list of usual ones.
 const UNIT_COST: f64 = 0.05;
-/// Least gain of a change: rounding gains nothing.
+/// Least gain that counts as an improvement: more than rounding.
 const LEAST_GAIN: f64 = 1e-9;
 /// Misfit up to which an equation holds. Wind, lever arms and slow channels leave a few hundredths.
 pub const HOLDS: f64 = 0.1;
-/// Misfit up to which a column whose name means nothing is taken.
+/// Largest misfit at which a column without a telling name is assigned.
 const NAMELESS_FIT: f64 = 0.02;
-/// Factor by which every other nameless column must fit worse.
+/// Factor by which every other column without a telling name must fit worse.
 const NAMELESS_LEAD: f64 = 10.0;
-/// Most combinations of nameless columns that are tried for one equation.
+/// Largest number of combinations of such columns that are tried for one equation.
 const MOST_TRIALS: usize = 4_000;
-/// Misfit up to which a column counts as the integral of another: bank couples the attitudes.
+/// Largest misfit at which a column counts as the integral of another; it is large because bank
+/// couples the attitudes.
 const INTEGRAL_FIT: f64 = 0.3;
-/// Most such pairs.
+/// Largest number of such pairs.
 const MOST_INTEGRALS: usize = 5;
-/// Cost by which every other order of attitudes and rates must be worse.
+/// Cost by which every other order of attitudes and rates must be worse than the best.
 const ROTATION_LEAD: f64 = 2.0;
-/// Units from which descent starts, instead of the most usual ones: the misfits have valleys where all
-/// angles are in the wrong unit together.
+/// Units from which descent starts in place of the most usual ones: the cost has local minima with
+/// all angles in the wrong unit.
 const STARTS: [&[&str]; 4] = [&[], &["rad"], &["rad/s"], &["rad", "rad/s"]];
 /// Units that all angles or rates of a recorder may have together.
 const KINDS: [&[&str]; 6] = [
@@ -81,8 +82,9 @@ pub struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Best assignment that descent finds: from the best names with the usual units, and with angles or
-    /// rates in the other unit. Then columns whose names mean nothing, where only one of them fits.
+    /// Best assignment that descent finds, from the best names with the usual units, and with
+    /// angles or rates in the other unit. Columns without a telling name are added afterwards, if
+    /// only one of them fits.
     #[must_use]
     pub fn best(&self) -> Assignment {
         let mut assignment = self.best_start();
@@ -96,8 +98,8 @@ impl Search<'_> {
         }
     }
 
-    /// Best of the assignments to which descent leads from each start without turning several signs at
-    /// once, which takes the longest.
+    /// Best assignment of the descents from all starts. Reversing several signs at once, which
+    /// takes longest, is left out.
     fn best_start(&self) -> Assignment {
         let starts = STARTS.iter().map(|units| self.by_name(units));
         let mut starts: Vec<Assignment> = starts.collect();
@@ -130,7 +132,8 @@ impl Search<'_> {
         }
     }
 
-    /// Adds the nameless columns that make an equation hold, where no others do; `true` if there are any.
+    /// Adds columns without a telling name that make an equation hold, if no others do; `true` if
+    /// any were added.
     fn complete(&self, assignment: &mut Assignment) -> bool {
         for equation in Equation::ALL {
             let needed = equation.quantities().0.iter().copied();
@@ -163,7 +166,7 @@ impl Search<'_> {
         false
     }
 
-    /// Assignments with each choice of one more quantity; none where there are too many.
+    /// Assignments with each choice of one more quantity; empty if there are too many.
     fn extended(&self, assignments: &[Assignment], quantity: Quantity) -> Vec<Assignment> {
         let mut extended = Vec::new();
         for assignment in assignments {
@@ -177,8 +180,8 @@ impl Search<'_> {
         extended
     }
 
-    /// Adds attitudes and rates whose names mean nothing: pairs in which one column is the integral of
-    /// the other, in the order in which the equations of all three attitudes hold best.
+    /// Adds attitudes and rates whose names tell nothing: pairs in which one column is the integral
+    /// of the other, in the order in which the equations of all three attitudes hold best.
     fn seed_rotation(&self, assignment: &mut Assignment) {
         let pairs = [
             (Quantity::Theta, Quantity::Q),
@@ -280,7 +283,7 @@ impl Search<'_> {
             .sum()
     }
 
-    /// `true` where every equation whose quantities are there holds.
+    /// `true` if every equation holds whose quantities are all assigned.
     fn all_hold(&self, assignment: &Assignment) -> bool {
         let mut misfits = Equation::ALL
             .into_iter()
@@ -385,8 +388,9 @@ impl Search<'_> {
         changed
     }
 
-    /// Gives all angles or rates of one axis or of both the same unit; `true` where that improved. One by
-    /// one they do not leave the valley in which all are in the wrong unit.
+    /// Gives all angles or rates of one axis or of both the same unit; `true` if that improved the
+    /// cost. Changing one at a time cannot leave the local minimum in which all are in the wrong
+    /// unit.
     fn improve_units(&self, assignment: &mut Assignment) -> bool {
         let before = self.cost(assignment, &Quantity::ALL);
         let trials = KINDS.iter().flat_map(|units| {
@@ -483,8 +487,9 @@ impl Search<'_> {
         })
     }
 
-    /// Reverses the set of quantities that lowers the cost most; `true` where one does. Of sets that fit alike the
-    /// one with the fewest unusual signs is best: no equation tells a flight from its mirror image.
+    /// Reverses the set of quantities that lowers the cost most; `true` if one does. Among sets
+    /// that fit alike, the one with the fewest unusual signs is best: no equation distinguishes a
+    /// flight from its mirror image.
     fn improve_signs(&self, assignment: &mut Assignment) -> bool {
         let signs = self.signs(assignment);
         let unusual = |reversal: Reversal| {

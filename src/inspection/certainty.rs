@@ -1,23 +1,25 @@
-//! Certainty of an assignment: what else the recording would allow.
+//! Certainty of an assignment: whether the recording allows another one as well.
 
 use super::assignment::{Assignment, HOLDS, Search, with};
 use super::equations::Equation;
 use super::quantity::Quantity;
 use super::signs::{Reversal, SignCosts};
 
-/// Misfit from which an equation contradicts the columns in it: one of them is wrong.
+/// Misfit above which an equation contradicts its columns: one of them is wrong.
 const CONTRADICTS: f64 = 0.3;
-/// Least cost of every other unit and sign: the misfits grow by this factor's logarithm, together.
+/// Least cost of every other unit and sign, relative to the chosen ones: the logarithm of the
+/// misfits' common growth.
 const LEAST_MARGIN: f64 = 0.4;
-/// Usual signs that must outnumber reversed ones among the lateral quantities, whose common sign no
-/// equation tells.
+/// Excess of usual over reversed signs that is required among the lateral quantities, since no
+/// equation determines their common sign.
 const MAJORITY: usize = 2;
 
 /// Certainty of one quantity's column, unit and sign.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
     pub is_sure: bool,
-    /// Cost of the best alternative over the choice: the logarithm of the growth of the misfits.
+    /// Cost of the best alternative, relative to the choice: the logarithm of the growth of the
+    /// misfits.
     pub margin: f64,
     /// Reason, for the analyst.
     pub evidence: String,
@@ -76,8 +78,9 @@ pub fn verdict(
     }
 }
 
-/// The fewest quantities, one of them this one, that fit nearly as well when they are all reversed. Of a set and
-/// its mirror image, in which the other lateral quantities are reversed, the one with fewer lateral quantities counts.
+/// The smallest set of quantities, this one included, that fits nearly as well with all of them
+/// reversed. Of a set and its mirror image, in which the other lateral quantities are reversed, the
+/// one with fewer lateral quantities is returned.
 fn rival(signs: &SignCosts, quantity: Quantity) -> Option<Vec<Quantity>> {
     let mirror = signs.mirror_image();
     let is_smaller = |reversal: &Reversal| {

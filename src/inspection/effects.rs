@@ -1,9 +1,9 @@
-//! Effects of inputs on the angular accelerations, by least squares: they tell the signs of surfaces and
-//! pilot controls, and the axis on which a surface acts.
+//! Effects of inputs on the angular accelerations, by least squares. They determine the signs of
+//! surfaces and pilot controls, and the axis on which a surface acts.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Angular accelerations and what they are regressed on, over samples without gaps.
+/// Angular accelerations and their regressors, over samples without gaps.
 #[derive(Clone, Debug)]
 pub struct Regression<'a> {
     /// Angular acceleration of each sample.
@@ -19,8 +19,8 @@ pub struct Effect {
     pub significance: f64,
 }
 
-/// Least share of a regressor that the ones before it leave unexplained. Below it the regressor is
-/// another one's copy or mirror image, such as the second of two ailerons.
+/// Least share of a regressor that earlier regressors leave unexplained. With less it is a copy or
+/// mirror image of another, such as the second of two ailerons.
 const OWN_SHARE: f64 = 1e-4;
 
 /// Columns of a matrix that are no linear combination of those before them.
@@ -41,8 +41,8 @@ fn independent(x: &DMatrix<f64>) -> Vec<usize> {
     kept
 }
 
-/// Effects of all regressors; `None` where there are too few samples. A regressor that others explain
-/// has none.
+/// Effects of all regressors; `None` with too few samples. A regressor that others explain has no
+/// effect of its own.
 #[must_use]
 pub fn effects(regression: &Regression) -> Option<Vec<Effect>> {
     let columns = regression.regressors.len() + 1;

@@ -1,9 +1,8 @@
-//! Equations of motion over short intervals, as tests of which column is which quantity, in which unit
-//! and of which sign.
+//! Equations of motion over short intervals, which test the quantity, unit and sign of each column.
 //!
 //! Each equation compares the change of one quantity with the integral of others, in rad, ft, s and
-//! slug. Accelerations are those of an instrument: normal positive up, axial forward, lateral right.
-//! The distances of instruments from the centre of gravity are neglected.
+//! slug. Accelerations are those of an instrument: normal positive up, axial forward, lateral
+//! right. The distances of instruments from the centre of gravity are neglected.
 
 use super::quantity::Quantity;
 use crate::earth::air;
@@ -63,8 +62,8 @@ impl Equation {
         }
     }
 
-    /// Quantities without which the equation says nothing, and those that count as zero where they are
-    /// not recorded.
+    /// Quantities that the equation requires, and those that count as zero if they are not
+    /// recorded.
     #[must_use]
     pub fn quantities(self) -> (&'static [Quantity], &'static [Quantity]) {
         use Quantity::{
@@ -90,7 +89,8 @@ impl Equation {
         needed.contains(&quantity) || others.contains(&quantity)
     }
 
-    /// Length of an interval, s. Altitude is recorded coarsely, so its changes are taken over longer.
+    /// Length of an interval, s. Altitude is recorded coarsely, so its changes are taken over
+    /// longer intervals.
     #[must_use]
     pub fn interval_s(self) -> f64 {
         match self {
@@ -222,9 +222,9 @@ pub struct Misfit {
 
 /// Share of intervals with the largest residuals that are left out: spikes and dropouts.
 const OUTLIERS: f64 = 0.02;
-/// Least misfit that counts: lever arms, errors of instruments, and wind leave as much.
+/// Least misfit that counts: lever arms, instrument errors and wind leave this amount.
 const LEAST_RATIO: f64 = 1e-4;
-/// Fewer intervals decide nothing.
+/// Least number of intervals that decide.
 const FEWEST_INTERVALS: usize = 5;
 
 /// Misfit of an equation over all stretches of a uniform step; `None` where a needed quantity is

@@ -1,4 +1,4 @@
-//! Findings of an inspection: each column with its signal, unit and sign, and how sure they are.
+//! Findings of an inspection: each column with its signal, unit and sign, and their certainty.
 
 use std::collections::BTreeSet;
 
@@ -14,7 +14,8 @@ use super::vocabulary::meanings;
 use crate::flight::signal;
 use crate::units::{self, Unit};
 
-/// Samples on which the search runs, and those on which its result is judged: the liveliest minutes.
+/// Samples on which the search runs, and those on which its result is judged: the minutes with the
+/// most motion.
 const SEARCH_SAMPLES: usize = 1_500;
 const JUDGED_SAMPLES: usize = 6_000;
 
@@ -25,7 +26,7 @@ pub enum Role {
     Motion,
     /// Surface or pilot control.
     Input(InputColumn),
-    /// Zero and one alone.
+    /// Column with no values but zero and one.
     Flag,
     /// Mass, inertias, centre of gravity, engines.
     Constant,
@@ -263,8 +264,8 @@ impl Findings<'_> {
         }
     }
 
-    /// Doubts the moments of inertia where that about z is not the largest, as it is of every aircraft: recorders differ in
-    /// the order of the axes.
+    /// Marks the moments of inertia as unsure unless that about z is the largest, as in every
+    /// aircraft: recorders differ in the order of the axes.
     fn doubt_inertias(&mut self) {
         let largest = |signal: &str| {
             let own = self.channels.iter().find(|c| c.signal == signal)?;
@@ -386,7 +387,7 @@ fn constant_channel(facts: &ColumnFacts, name: &str) -> Channel {
     }
 }
 
-/// A verdict, unsure where the file states a unit that harvest does not have.
+/// A verdict, marked as unsure if the file states a unit that harvest does not have.
 fn unless_unknown_unit(facts: &ColumnFacts, is_sure: bool, evidence: String) -> (bool, String) {
     match &facts.unknown_unit {
         Some(unit) => (
@@ -400,8 +401,8 @@ fn unless_unknown_unit(facts: &ColumnFacts, is_sure: bool, evidence: String) -> 
 /// Range beyond which an angle is in degrees: no surface turns as far in radians.
 const LARGEST_RAD: f64 = 1.6;
 
-/// Unit of an input, and whether it is stated. Angles of surfaces that nothing states follow from the
-/// range; controls are numbers.
+/// Unit of an input, and `true` if the file or the name states it. The unit of other angles follows
+/// from their range; controls are numbers.
 fn input_unit(facts: &ColumnFacts, input: &InputColumn) -> (Unit, bool) {
     let number = Unit::of_signal("");
     if let Some(unit) = facts.unit {
@@ -423,7 +424,7 @@ fn input_unit(facts: &ColumnFacts, input: &InputColumn) -> (Unit, bool) {
     }
 }
 
-/// End of the names of signals that are kept in a unit's quantity.
+/// Suffix of the names of signals in the quantity of a unit.
 fn suffix(unit: Unit) -> &'static str {
     if unit.name == "in" {
         return unit.suffix.unwrap_or_default();

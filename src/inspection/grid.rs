@@ -1,5 +1,5 @@
-//! Recordings on one uniform step: the median of each block of samples, so that spikes and single lost
-//! frames are gone, of the liveliest parts alone.
+//! Recordings on one uniform step: medians over blocks of samples, which remove spikes and single
+//! lost frames, of the parts with the most motion.
 
 use std::collections::BTreeMap;
 use std::ops::Range;

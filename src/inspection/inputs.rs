@@ -11,8 +11,8 @@ use super::vocabulary::{Input, input, is_derived, meanings};
 use crate::numerics::order_statistics::quantile;
 use crate::units;
 
-/// Significance from which an effect tells a sign. Residuals are coloured, so that standard errors are
-/// some times too small.
+/// Least significance of an effect that determines a sign. Residuals are coloured, so the standard
+/// errors are several times too small.
 const TELLS_SIGN: f64 = 12.0;
 /// Range of a surface that moves, deg.
 const MOVES_DEG: f64 = 0.5;
@@ -34,13 +34,13 @@ pub struct InputColumn {
     pub kind: Input,
     pub acts: Acts,
     pub sign: f64,
-    /// `true` where the motion tells the sign.
+    /// `true` if the motion determines the sign.
     pub is_sure: bool,
     pub evidence: String,
 }
 
-/// Signs and axes of the inputs that names tell: the signs from the `liveliest` parts, the axes of other
-/// surfaces from all of the recordings, since a flap may move in few maneuvers.
+/// Inputs that names tell, with their signs and axes. Signs come from the `liveliest` parts. Axes
+/// of other surfaces come from all of the recordings, since a flap may move in few maneuvers.
 #[must_use]
 pub fn inputs(
     (liveliest, all): (&Grid, &Grid),
@@ -67,8 +67,8 @@ pub fn inputs(
     found
 }
 
-/// Surfaces whose names mean nothing: on each axis without a named one, the angle that the angular acceleration
-/// follows most clearly.
+/// Surfaces whose names tell nothing: on each axis without a named surface, the angle that the
+/// angular acceleration follows most clearly.
 fn unnamed(
     grid: &Grid,
     assignment: &Assignment,
@@ -137,7 +137,7 @@ pub fn kind_of(facts: &ColumnFacts) -> Option<Input> {
 /// Effects of some inputs on the three angular accelerations.
 struct Responses<'a> {
     inputs: &'a [(&'a ColumnFacts, Input)],
-    /// Effects of each input on pitch, roll and yaw; empty where nothing is told apart.
+    /// Effects of each input on pitch, roll and yaw; empty if the inputs cannot be separated.
     effects: [Vec<Effect>; 3],
 }
 
@@ -330,9 +330,11 @@ fn slopes(grid: &Grid, values: &[f64], steps: usize) -> Vec<f64> {
     slopes
 }
 
-/// Share of the samples beyond an input's range, and of the changes beyond its quickest one.
+/// Share of the samples beyond an input's range, and of the changes beyond its quickest one, that
+/// are ignored.
 const RARELY: f64 = 0.002;
-/// Longest time beyond them, s: in hours of recording a single maneuver moves its surfaces for longer.
+/// Longest time that is ignored as rare, s: in hours of recording a single maneuver moves its
+/// surfaces for longer.
 const RARELY_S: f64 = 0.5;
 
 /// Share of the samples of a grid that are rare.
@@ -357,7 +359,8 @@ pub fn moves(grid: &Grid, facts: &ColumnFacts, kind: Input) -> bool {
     range.is_some_and(|(high, low)| high - low > least)
 }
 
-/// Size of a step over the quickest change: the smallest of several inputs counts as well.
+/// Size of a step relative to the quickest change, so that the smallest of several inputs counts as
+/// well.
 const STEP_SHARE: f64 = 0.2;
 /// Steps of the grid in which a step happens.
 const STEP_TIME: usize = 3;

@@ -9,7 +9,7 @@ use super::words::Spelling;
 use crate::numerics::order_statistics::quantile;
 use crate::units::Unit;
 
-/// Shares of a column's values that lie below and above its range: spikes do not count.
+/// Shares of a column's values that are ignored at each end of its range, as spikes.
 const ENDS: f64 = 0.01;
 
 /// Facts about one column.
@@ -26,7 +26,7 @@ pub struct ColumnFacts {
 }
 
 impl ColumnFacts {
-    /// `true` where the column has one value alone.
+    /// `true` if the column has a single value.
     #[must_use]
     pub fn is_constant(&self) -> bool {
         self.range
@@ -135,7 +135,8 @@ fn candidate(quantity: Quantity, facts: &ColumnFacts, weight: f64) -> Option<Can
     })
 }
 
-/// Signs with which a range is one that an aircraft's quantity can have, in rad, ft, s and slug; the usual sign first.
+/// Signs for which an aircraft's quantity can have this range, in rad, ft, s and slug; the usual
+/// sign first.
 fn plausible_signs(quantity: Quantity, low: f64, high: f64) -> Vec<f64> {
     let (least, most) = limits(quantity);
     let signs: &[f64] = if quantity.is_signed() {

@@ -43,7 +43,7 @@ impl Quantity {
         Quantity::Qbar,
     ];
 
-    /// Quantities whose sign turns over in the mirror image of a flight.
+    /// Quantities whose sign is reversed in the mirror image of a flight.
     pub const LATERAL: [Quantity; 6] = [
         Quantity::Beta,
         Quantity::P,
@@ -53,7 +53,7 @@ impl Quantity {
         Quantity::Ay,
     ];
 
-    /// Quantities of the same kind about or along the three axes, this one among them.
+    /// Quantities of the same kind about or along the three axes, this one included.
     #[must_use]
     pub fn akin(self) -> &'static [Quantity] {
         match self {

@@ -1,9 +1,9 @@
 //! Patterns of signs: the cost of an assignment with any set of its quantities reversed.
 //!
-//! Equations of motion have symmetries. In the mirror image of a flight all lateral signs are reversed; without
-//! gravity in an equation, pitch, climb and yaw may be reversed together. Such sets have up to all
-//! quantities, so all sets are tried: an equation contains few quantities, and its misfit is computed once for
-//! each reversal of those.
+//! Equations of motion have symmetries. In the mirror image of a flight all lateral signs are
+//! reversed. In an equation without gravity, pitch, climb and yaw may be reversed together. Such a
+//! set may contain any number of quantities, so all sets are tried. This is cheap: an equation
+//! contains few quantities, and its misfit is computed once for each reversal of them.
 
 use super::equations::Equation;
 use super::quantity::Quantity;
@@ -69,12 +69,12 @@ impl SignCosts {
         }
     }
 
-    /// All reversals; the first is none.
+    /// All reversals. The first reverses nothing.
     pub fn reversals(&self) -> impl Iterator<Item = Reversal> + use<> {
         0..1 << self.quantities.len()
     }
 
-    /// Physical cost of a reversal over that of the assignment as it is.
+    /// Physical cost of a reversal, relative to that of the assignment without reversals.
     #[must_use]
     pub fn growth(&self, reversal: Reversal) -> f64 {
         let costs = self.equations.iter();

@@ -1,4 +1,4 @@
-//! Vocabulary of recorders: what names of columns usually mean.
+//! Vocabulary of recorders: the usual meanings of column names.
 
 use super::words::Spelling;
 use crate::flight::signal;
@@ -13,11 +13,11 @@ struct Entry {
     signal: &'static str,
     /// Whole names, without signs and units.
     names: &'static [&'static str],
-    /// Words that together mean the signal, wherever they stand in a name.
+    /// Words that together denote the signal, at any place in a name.
     words: &'static [&'static [&'static str]],
 }
 
-/// Words of columns that are no measurement of what the rest of the name says.
+/// Words of columns that are not a measurement of the quantity in the rest of the name.
 const DERIVED: &[&str] = &[
     "cmd",
     "command",
@@ -251,7 +251,7 @@ pub enum Input {
     Aileron,
     /// Yaw surface: positive trailing edge left, nose left.
     Rudder,
-    /// Flap, slat, spoiler, canard, vane: no sign follows from the motion.
+    /// Flap, slat, spoiler, canard, vane: the motion does not determine a sign.
     OtherSurface,
     /// Longitudinal stick or column: positive aft, nose up.
     PitchStick,

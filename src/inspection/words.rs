@@ -83,7 +83,7 @@ const ENDINGS: &[(&[&str], &str)] = &[
     (&["ns"], "ns"),
 ];
 
-/// A name without the unit that it ends with, and that unit.
+/// A name without the unit at its end, and that unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spelling {
     /// Words without the unit.

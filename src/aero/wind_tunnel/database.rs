@@ -1,4 +1,4 @@
-//! The database: tables by derivative, and what they hold.
+//! The database: tables by derivative, with their breakpoints, sources and typical sizes.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +16,7 @@ pub struct WindTunnel {
     pub(super) settings: Settings,
 }
 
-/// Name of a derivative as databases are searched for it: without underscores.
+/// Key of a derivative's table: its name without underscores.
 #[must_use]
 pub fn key(derivative: &str) -> String {
     derivative.replace('_', "")
@@ -63,8 +63,8 @@ impl WindTunnel {
         table.insert(at, entry);
     }
 
-    /// Takes another database's table of a derivative in place of its own; where the other has none, its
-    /// own stays.
+    /// Replaces the table of a derivative by another database's; keeps its own if the other has
+    /// none.
     pub fn take_table(&mut self, derivative: &str, other: &WindTunnel) {
         let key = key(derivative);
         if let Some(table) = other.tables.get(&key) {
@@ -72,7 +72,7 @@ impl WindTunnel {
         }
     }
 
-    /// Entries of a derivative; none without a table.
+    /// Entries of a derivative's table; empty without a table.
     pub(super) fn table(&self, derivative: &str) -> &[Entry] {
         self.tables
             .get(&key(derivative))

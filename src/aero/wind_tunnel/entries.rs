@@ -54,7 +54,7 @@ pub(super) struct Entry {
 }
 
 impl Entry {
-    /// Key of the order of a table: third variable, Mach, α.
+    /// Sort key within a table: third variable, Mach, α.
     pub fn place(&self) -> (f64, f64, f64) {
         (
             self.third.unwrap_or(0.0),

@@ -18,7 +18,8 @@ pub struct ExtrapolatedReading {
 }
 
 impl WindTunnel {
-    /// Third variable of a reading: that of the condition, or that of the settings.
+    /// Third variable at which the tables are read: the condition's, or else the value in the
+    /// settings.
     pub(super) fn third_at(&self, condition: &Condition) -> f64 {
         condition
             .third

@@ -56,7 +56,8 @@ fn thrust_line(line: ThrustLine, source: &Source) -> Result<()> {
     Ok(())
 }
 
-/// Checks the channel map and the constants: units fit, each signal has one source, none that is required lacks.
+/// Checks the channel map and the constants: units fit, each signal has one source, no required
+/// signal is missing.
 pub(super) fn channels(config: &Config, source: &Source) -> Result<()> {
     let mut signals: Vec<&str> = config.constants.keys().map(String::as_str).collect();
     for (column, channel) in &config.channels {

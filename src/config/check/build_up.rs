@@ -1,4 +1,4 @@
-//! Checks of `model.yaml`: names stand once and resolve, the kernel has room for the products.
+//! Checks of `model.yaml`: names are unique and resolve, and the kernel has room for the products.
 
 use super::names::known_signal;
 use crate::aero::{Axis, Regressor};
@@ -39,7 +39,7 @@ pub(super) fn buildup(config: &Config, source: &Source) -> Result<()> {
     Ok(())
 }
 
-/// Checks that the kernel has room for the products in which states are.
+/// Checks that the kernel has room for the products that contain states.
 fn few_products(config: &Config, source: &Source) -> Result<()> {
     for axis in [Axis::Longitudinal, Axis::Lateral] {
         let mut products: Vec<&Regressor> = Vec::new();

@@ -71,8 +71,8 @@ fn not_estimable(name: &str, config: &Config) -> Option<String> {
     })
 }
 
-/// Reason for which a derivative or bias cannot be held: a bias has no value beforehand, nor has a derivative
-/// that the tunnel lacks.
+/// Reason for which a derivative or bias cannot be held: a bias has no prior value, and the tunnel
+/// may lack the derivative.
 fn not_held(name: &str, class: &Class, config: &Config) -> Option<String> {
     let mut biases = config.buildup.biases_of(class.axis);
     if biases.any(|bias| bias.name == name) {

@@ -52,7 +52,7 @@ pub(super) fn check(config: &Config, files: &Files) -> Result<()> {
     })
 }
 
-/// Level that allows nothing, or less than a better one, in words.
+/// Describes the first level that allows nothing, or less than a better level.
 fn mistake(limit: &LevelLimit) -> Option<String> {
     let levels = [(1, limit.level_1), (2, limit.level_2), (3, limit.level_3)];
     let mut pairs = levels.array_windows();

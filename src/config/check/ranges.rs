@@ -1,5 +1,5 @@
-//! Ranges of the numbers of a configuration, as they are written: finite, and no size that a campaign
-//! cannot have.
+//! Allowed ranges of the numbers in a configuration. A number is checked as it is written: it must
+//! be finite and of a size that a campaign can have.
 
 use serde_yaml::Value;
 

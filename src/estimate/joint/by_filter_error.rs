@@ -27,8 +27,8 @@ pub struct OwnEstimate<'m, 'a, const NX: usize, E: Equations<NX>> {
 }
 
 impl<'m, 'a, const NX: usize, E: Equations<NX>> OwnEstimate<'m, 'a, NX, E> {
-    /// Estimates a maneuver alone. One that does not determine its derivatives, or flew in still air,
-    /// takes part from those of output error.
+    /// Estimates a maneuver alone. A maneuver that does not determine its derivatives, or was flown
+    /// in still air, takes part with its estimates by output error.
     pub fn new<const NG: usize, G: InGusts<NG>>(
         member: &'m Member<'a, NX, E>,
     ) -> Result<Self, String> {
@@ -122,9 +122,9 @@ struct JointAir {
 }
 
 impl JointAir {
-    /// Adds what the filters found of the air to the row of `fits`: the root mean square of the
-    /// maneuvers' gusts, and the largest correlation of innovations. Costs of output error there are
-    /// none.
+    /// Adds the gusts that the filters found to the row of `fits`: the root mean square of the
+    /// maneuvers' gusts, and the largest correlation of innovations. The row has no cost of output
+    /// error.
     fn add<const NX: usize, E: Equations<NX>>(&self, own: &[OwnEstimate<NX, E>], row: &mut FitRow) {
         let air = own.iter().zip(&self.noise).map(|(o, noise)| {
             let (task, case) = (&o.member.task, &o.member.prepared.case);

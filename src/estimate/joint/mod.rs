@@ -41,8 +41,8 @@ pub struct Joined {
 
 /// Estimates maneuvers of one class together.
 ///
-/// The outcome has any failure. A maneuver that fails alone is left out, and the reason names it;
-/// so are those that are `doubtful`, each with its reason.
+/// A failure is reported in the outcome. Maneuvers that fail alone or are `doubtful` are left out;
+/// the reason names them.
 #[must_use]
 pub fn estimate(
     joint_id: &str,
@@ -77,13 +77,13 @@ struct Request<'r> {
 /// Maneuvers that are left out, each with the reason.
 type LeftOut<'r> = Vec<(&'r Maneuver, String)>;
 
-/// A maneuver that takes part, with its cost alone.
+/// A maneuver that takes part, with the cost of its fit alone.
 type TakingPart<'r> = (&'r Maneuver, Option<f64>);
 
 impl<'r> Request<'r> {
-    /// Estimates by filter error where a maneuver needs it, and by output error otherwise, where the
-    /// sensors' noise explains all maneuvers, or where filter error does not converge and all residuals
-    /// of output error are white.
+    /// Estimates by filter error if a maneuver needs it. Estimates by output error otherwise, and
+    /// also if the sensors' noise explains all maneuvers, or if filter error does not converge and
+    /// all residuals of output error are white.
     fn estimate<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
         &self,
         doubtful: &[(&'r Maneuver, String)],

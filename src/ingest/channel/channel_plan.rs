@@ -30,7 +30,7 @@ pub struct ChannelPlan<'a> {
 /// that cannot be read.
 ///
 /// # Errors
-/// A problem that refuses the flight: a unit in a file that is not the channel map's, a required
+/// A problem that refuses the flight: a unit in a file other than the channel map's, a required
 /// channel that is in no file, a signal with two channels, or a required signal without a source.
 pub fn plan_channels<'a>(
     source: &(impl ColumnSource + ?Sized),
@@ -96,7 +96,8 @@ fn plan<'a>(
     Ok((plans.into_values().collect(), problems))
 }
 
-/// Checks that every unit that a file states for the columns of a channel is the channel map's.
+/// Checks that the units that files state for the columns of a channel are those of the channel
+/// map.
 fn stated_units(
     source: &(impl ColumnSource + ?Sized),
     name: &str,
@@ -141,7 +142,7 @@ fn is_in_files(source: &(impl ColumnSource + ?Sized), name: &str) -> bool {
     (0..source.files()).any(|file| source.has(file, name))
 }
 
-/// Refusal of a channel that is in no file. Of a formula it names the columns that no file has.
+/// Refusal of a channel that is in no file. For a formula it names the columns that no file has.
 fn not_in_files(source: &(impl ColumnSource + ?Sized), name: &str, channel: &Channel) -> Refusal {
     let signal = &channel.signal;
     let reason = match &channel.formula {
@@ -221,7 +222,7 @@ pub fn stuck_channel(name: &str, statistics: &ChannelStatistics, clock: &Clock) 
     Some(Refusal::of_channel(name, reason))
 }
 
-/// Refusal of the samples of a channel that are beyond any measurement; `None` where none is.
+/// Refusal of the samples of a channel whose size exceeds any measurement; `None` without any.
 #[must_use]
 pub fn values_beyond(
     name: &str,
@@ -247,7 +248,7 @@ fn duplicate_signal(name: &str, channel: &Channel) -> Refusal {
     Refusal::of_channel(name, reason)
 }
 
-/// Refusal of a required signal that no channel and no constant gives, and that nothing stands for.
+/// Refusal of a required signal that has no channel, no constant and no stand-in.
 pub fn missing_signal(signal: &str) -> Refusal {
     Refusal {
         place: format!("signal `{signal}`"),

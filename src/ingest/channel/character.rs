@@ -1,9 +1,9 @@
 //! Character of a channel over a spell of samples: its update rate, noise and quantisation, and the
-//! length from which standing still means that it is stuck.
+//! length of an unchanged run from which the channel counts as stuck.
 //!
 //! A spell is a fixed number of samples, so the character of a channel does not depend on the
-//! pieces in which a flight is read. Where a spell does not decide, the channel is as it was in the
-//! spell before.
+//! pieces in which a flight is read. If a spell does not decide, the character of the previous
+//! spell stays.
 
 use super::quantisation::quantisation;
 use super::repeats::{StuckRun, stuck_run};

@@ -8,12 +8,12 @@ use crate::ingest::column_source::ColumnSource;
 use crate::ingest::refusal::Refusal;
 use crate::numerics::sample_count::nearest;
 
-/// Gap between two runs, in rows, from which they are read one after the other; the rows of a
-/// smaller gap are read and dropped. A column's page holds some ten thousand rows.
+/// Gap between two runs, in rows, above which they are read separately; the rows of a smaller gap
+/// are read and dropped. A column's page holds some ten thousand rows.
 const SEPARATE_ROWS: usize = 1 << 16;
 
-/// Samples of another clock that are read beyond either end of a range, besides those of one step:
-/// one for the neighbour on the interpolation line, one for rounding.
+/// Samples of another clock that are read beyond each end of a range, besides those of one step:
+/// one for the neighbour in the interpolation, one for rounding.
 const BEYOND_ENDS: f64 = 2.0;
 
 /// One column of a flight's files.
@@ -194,8 +194,8 @@ impl NearestValues {
         }
     }
 
-    /// Takes those of the recorded values, from sample `start` of the clock `own` on, that are
-    /// nearer than what is there.
+    /// Takes the recorded values, from sample `start` of the clock `own` on, that are nearer than
+    /// those taken before.
     fn take_nearer(&mut self, clock: &Clock, own: &Clock, start: usize, recorded: &[f64]) {
         for (i, value) in recorded.iter().enumerate().filter(|(_, v)| v.is_finite()) {
             let time_s = own.time_s(start + i);

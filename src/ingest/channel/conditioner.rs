@@ -24,8 +24,8 @@ use crate::units::Conversion;
 /// Unit of a 0/1 channel, whose values are never smoothed or interpolated.
 const FLAG_UNIT: &str = "0/1";
 
-/// Surroundings that decide about a sample, on either side, in samples: longer than any stand-still
-/// that must be recognised.
+/// Samples on either side of a sample that decide about it: longer than any unchanged run that must
+/// be recognised.
 const MARGIN: usize = SPELL / 4;
 
 /// Samples that are unwrapped at once: they stay in the processor's cache.
@@ -52,7 +52,8 @@ pub struct ChannelStatistics {
     pub period: usize,
     /// Intervals of samples in which the channel is stuck.
     pub stuck: Vec<(usize, usize)>,
-    /// Number of samples beyond [`LARGEST`], which count as missing, and the first of them.
+    /// Number of samples beyond [`LARGEST`], which count as missing, and the first of these
+    /// samples.
     pub beyond: usize,
     pub first_beyond: Option<usize>,
 }
@@ -100,7 +101,7 @@ pub struct Conditioner {
     /// Converted values from sample `first` on.
     values: Vec<f64>,
     first: usize,
-    /// Samples before this one have left.
+    /// Number of samples that have left, from the first.
     settled: usize,
     characters: Characters,
     statistics: ChannelStatistics,
@@ -203,7 +204,7 @@ impl Conditioner {
         self.first + self.values.len()
     }
 
-    /// Number of samples that must be pushed before those up to `until` can leave.
+    /// Number of samples that must be pushed before the samples up to `until` can leave.
     #[must_use]
     pub fn wanted(&self, until: usize) -> usize {
         ((until + MARGIN).div_ceil(SPELL) * SPELL).min(self.samples)
@@ -241,7 +242,7 @@ impl Conditioner {
         }
     }
 
-    /// Recorded values of which those beyond any measurement are NaN; `None` where none is.
+    /// Recorded values with those beyond any measurement set to NaN; `None` if no value is.
     fn without_beyond(&mut self, recorded: &[f64]) -> Option<Vec<f64>> {
         let conversion = self.conversion;
         let is_beyond = |value: f64| value.is_finite() && conversion.of(value).abs() > LARGEST;
@@ -373,7 +374,7 @@ impl Conditioner {
         stuck
     }
 
-    /// `true` where `count` equal values in a range are a stuck channel, by the character at either
+    /// `true` if `count` equal values in a range mean a stuck channel, by the character at either
     /// end.
     fn is_stuck(&self, range: &Range<usize>, count: usize, from: usize) -> bool {
         let at_start = self.characters.at(from + range.start).stuck_run;
@@ -381,8 +382,8 @@ impl Conditioner {
         at_start.or(at_end).is_some_and(|least| count >= least)
     }
 
-    /// Replaces spikes and returns their places. Those of a slow channel are found among its own
-    /// samples.
+    /// Replaces spikes and returns their places. Spikes of a slow channel are found among its
+    /// recorded samples only.
     fn despike(&self, values: &mut [f64], from: usize) -> Vec<usize> {
         let parts = self.characters.parts(from, values.len());
         let period = parts.iter().map(|(_, c)| c.rate.period).max().unwrap_or(1);
@@ -442,8 +443,8 @@ fn finite_values(values: &[f64]) -> (Vec<usize>, Vec<f64>) {
     UpdateRate::FULL.recorded(values, 0).unzip()
 }
 
-/// Ranges in which at least `least` values are equal, with the number of these values: missing
-/// samples between equal values do not count.
+/// Ranges in which at least `least` values are equal, with the number of these values. Missing
+/// samples between equal values are skipped.
 fn equal_runs(values: &[f64], least: usize) -> Vec<(Range<usize>, usize)> {
     if values.iter().all(|v| v.is_finite()) {
         let runs = long_runs(values, least).into_iter();
@@ -472,7 +473,7 @@ mod tests {
         offset: 0.0,
     };
 
-    /// As they are put together from pieces of some length.
+    /// Values unwrapped in pieces of a given length.
     fn unwrapped_in(piece: usize, wraps_at: Option<f64>, values: &[f64]) -> Vec<f64> {
         let channel = Channel {
             wraps_at,

@@ -13,12 +13,12 @@ pub enum Bridge {
     Held,
 }
 
-/// Bridges the gaps (NaN) of at most `longest` samples in place and returns the mark of every
+/// Bridges the gaps (NaN) of at most `longest` samples in place and returns the flag of every
 /// sample.
 ///
-/// A gap at either end of the record has one side only and stays missing, unless it lies between two
-/// values of a slow channel: its nearest value then holds. `period` gives the
-/// channel's samples per recorded value at a sample: a gap that is no longer lies between two
+/// A gap at either end of the record has one side only and stays missing, unless it lies between
+/// two values of a slow channel: then the nearest value is held. `period` gives the channel's
+/// samples per recorded value at a sample: a gap that is no longer than this lies between two
 /// recorded values and is no fault.
 pub fn bridge_gaps(
     values: &mut [f64],

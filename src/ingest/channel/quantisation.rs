@@ -5,7 +5,7 @@ use super::update_rate::LEAST_CHANGES;
 /// Changes of value from which the step is inferred, spread over the spell.
 const MOST_CHANGES: usize = 512;
 
-/// Neighbouring pairs looked at for each change that is wanted: a channel may repeat values.
+/// Neighbouring pairs searched for each change that is needed, since a channel may repeat values.
 const PAIRS_PER_CHANGE: usize = 4;
 
 /// Largest deviation of a change from a whole number of steps, in steps: the last digits of a
@@ -13,7 +13,7 @@ const PAIRS_PER_CHANGE: usize = 4;
 const OFF_GRID: f64 = 0.05;
 
 /// Largest change, in steps, that is compared with the grid. The smallest change is the estimate of
-/// the step, and the error of a multiple grows with it: changes near this size still tell a grid
+/// the step, and the error of a multiple grows with it. Up to this size a grid can be distinguished
 /// from chance.
 const MOST_STEPS: f64 = 40.0;
 

@@ -1,4 +1,4 @@
-//! Repeated values of a channel: when standing still means that it is stuck.
+//! Repeated values of a channel: the criteria by which an unchanged value means that it is stuck.
 
 use std::ops::Range;
 
@@ -6,14 +6,14 @@ use super::update_rate::neighbours;
 use crate::ingest::settings::Stuck;
 use crate::numerics::sample_count::nearest;
 
-/// Fewest samples from which the repeats of a channel's noise are estimated.
+/// Least number of samples from which the probability of a repeat by noise is estimated.
 const LEAST_SAMPLES: usize = 200;
 
-/// Least share of changes that turn around on a noisy channel: half of white noise's two thirds.
-/// Motion that is recorded without noise hardly ever turns around.
+/// Least share of changes that reverse their direction on a noisy channel: half of white noise's
+/// two thirds. Motion that is recorded without noise hardly ever reverses.
 const LEAST_TURNS: f64 = 1.0 / 3.0;
 
-/// Samples from which the share of turns is estimated: its standard error then is under 1 %.
+/// Samples from which the share of reversals is estimated: its standard error then is under 1 %.
 const TURN_SAMPLES: usize = 4096;
 
 /// Ratio of the repeats of noise centred on a quantisation step to the average repeats.
@@ -23,28 +23,30 @@ const CENTRED_REPEATS: f64 = 1.5;
 /// more than a campaign has.
 const CHANCE: f64 = 1e-12;
 
-/// Most runs beyond chance in one spell; with more of them they are the channel's nature.
+/// Largest number of stuck runs in one spell; with more, unchanged values are normal for the
+/// channel.
 const MOST_RUNS: usize = 3;
 
-/// Share of a stuck run, as one in so many, from which shorter runs are found and compared with it.
+/// Ratio of the shortest stuck run to the shortest run that is examined. Runs between the two
+/// lengths mean that the channel is not stuck.
 const SHORTER_RUNS: usize = 3;
 
-/// Least run, in samples, that counts as stuck at any rate.
+/// Least number of samples of a stuck run.
 const LEAST_RUN: usize = 4;
 
 /// Length of the runs of equal values that a spell shows to be stuck.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StuckRun {
-    /// Runs of at least so many samples are stuck.
+    /// Runs of at least this number of samples are stuck.
     AtLeast(usize),
-    /// Standing still is the channel's nature.
+    /// Unchanged values are normal for the channel.
     Never,
     /// Too few samples to decide.
     Undecided,
 }
 
-/// Runs of one value in at least `least` samples, one after the other. Only one of every `least`
-/// samples is looked at: a run that is long enough holds one.
+/// Runs of one value in at least `least` samples, in order. Only every `least`-th sample is
+/// examined: each long run contains one.
 pub fn long_runs(values: &[f64], least: usize) -> Vec<Range<usize>> {
     let mut runs = Vec::new();
     let mut from = 0;
@@ -61,7 +63,7 @@ pub fn long_runs(values: &[f64], least: usize) -> Vec<Range<usize>> {
     runs
 }
 
-/// Finds the length from which a run of equal values is stuck: only a channel whose noise changes
+/// Finds the length from which a run of equal values is stuck. Only a channel whose noise changes
 /// most of its values can be stuck.
 pub fn stuck_run(values: &[f64], step_s: f64, settings: &Stuck) -> StuckRun {
     let least = nearest(settings.least_s / step_s).max(LEAST_RUN);
@@ -94,8 +96,8 @@ pub fn stuck_run(values: &[f64], step_s: f64, settings: &Stuck) -> StuckRun {
     }
 }
 
-/// Share of values that repeat the one before, outside runs of `least` samples and more; `None`
-/// where there are too few.
+/// Share of values that repeat the one before, outside runs of `least` samples and more; `None` if
+/// there are too few.
 fn repeat_share(values: &[f64], runs: &[Range<usize>], least: usize) -> Option<f64> {
     let finite = values.iter().filter(|v| v.is_finite()).count();
     let is_new =
@@ -108,7 +110,7 @@ fn repeat_share(values: &[f64], runs: &[Range<usize>], least: usize) -> Option<f
     (samples >= LEAST_SAMPLES).then(|| 1.0 - (all_runs - lasting) as f64 / samples as f64)
 }
 
-/// Share of changes that turn around.
+/// Share of changes of value whose direction is opposite to that of the change before.
 fn turn_share(values: &[f64]) -> f64 {
     let (mut turns, mut all, mut last, mut before) = (0_usize, 0_usize, 0.0_f64, f64::NAN);
     for value in values.iter().take(TURN_SAMPLES).filter(|v| v.is_finite()) {

@@ -1,6 +1,6 @@
 //! Signature of a record: the values measured at every full ten seconds of its clock. Two records
-//! that share some of it hold the same rows, whatever their files are called and wherever they
-//! begin.
+//! whose signatures have times in common hold the same rows, whatever the names and beginnings of
+//! their files.
 
 use std::collections::BTreeMap;
 
@@ -14,15 +14,15 @@ use crate::numerics::sample_count::nearest;
 /// Interval between the times of a signature, s: a flight has some hundreds of them.
 const INTERVAL_S: f64 = 10.0;
 
-/// Fewest different times that two records of the same rows share. Fewer are chance, or two
-/// aircraft that stand still.
+/// Least number of times that two records of the same rows have in common. Fewer are chance, or two
+/// aircraft at rest.
 const LEAST_COMMON: usize = 3;
 
 /// Odd multiplier of the hash: 2⁶⁴ divided by the golden ratio (Knuth's multiplicative hashing).
 const HASH_MULTIPLIER: u64 = 0x9E37_79B9_7F4A_7C15;
 
-/// Rotation of the hash before the next signal's bits: coprime to 64, so that no two signals meet
-/// in place.
+/// Rotation of the hash before the next signal's bits: coprime to 64, so that the bits of two
+/// signals are never aligned.
 const HASH_ROTATION: u32 = 7;
 
 /// Bits of one signal at the times of the signature.
@@ -107,7 +107,7 @@ impl Signature {
         Signature(hashes.into_iter().collect())
     }
 
-    /// The rows that two records share; `None` where they share none.
+    /// The rows that two records share; `None` without any.
     #[must_use]
     pub fn overlap(&self, other: &Signature) -> Option<Overlap> {
         let other: BTreeMap<i64, u64> = other.0.iter().copied().collect();

@@ -23,23 +23,23 @@ const SAME_VALUE: f64 = 1e-12;
 /// Fewest samples off their neighbours' mean from which the rounding is inferred.
 const LEAST_ROUNDED: usize = 20;
 
-/// Quantile of the deviations that is the rounding: low, and above the few samples that a repair or
-/// a conversion put off the grid.
+/// Quantile of the deviations that equals the rounding: low, but above the few samples that a
+/// repair or a conversion moved off the grid.
 const ROUNDING_QUANTILE: f64 = 0.05;
 
-/// Share of its height off the mean by which a spike must be off each line: the lines are twice as
-/// noisy as the mean.
+/// Least distance of a spike from each line, as a share of its distance from the mean: the lines
+/// are twice as noisy as the mean.
 const LINES: f64 = 0.75;
 
-/// Distance of the two lines' predictions that noise alone may cause, in standard deviations of the
-/// noise. The difference has √10 of them.
+/// Largest distance between the two lines' predictions that noise alone may cause, in standard
+/// deviations of the noise; the deviation of the difference is √10 times that of the noise.
 const LINES_NOISE: f64 = 3.0;
 
 /// Stride of the samples from which the noise of a spell is estimated: a quarter of thousands is
 /// enough.
 const STRIDE: usize = 4;
 
-/// Samples that are looked at together: few of them have a candidate.
+/// Samples that are tested together, since few of them contain a candidate.
 const LOOKED_AT_ONCE: usize = 64;
 
 /// Least reach of a sample's surroundings, in samples: below it the local noise has no median.
@@ -117,7 +117,8 @@ fn has_candidate(values: &[f64], level: f64) -> bool {
     })
 }
 
-/// `true` where a sample that exceeds the spell's noise is off its surroundings as only a spike is.
+/// `true` if a sample that exceeds the spell's noise differs from its surroundings as only a spike
+/// does.
 fn is_spike(values: &[f64], k: usize, floor: f64, reach: usize, settings: &Spikes) -> bool {
     let Some(height) = Height::of(values, k) else {
         return false;
@@ -211,8 +212,8 @@ fn rounding(values: &[f64], mut deviations: Vec<f64>) -> f64 {
     }
 }
 
-/// Least difference between the values of a channel, beyond that of equal ones; zero for a constant
-/// but for one sample, which may be a spike.
+/// Least difference between the values of a channel, beyond rounding; zero for a channel that is
+/// constant except for one sample, which may be a spike.
 fn least_difference(values: &[f64], same: f64) -> f64 {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);

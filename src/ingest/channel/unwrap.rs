@@ -5,19 +5,19 @@ use crate::ingest::settings::Settings;
 use crate::numerics::sample_count::whole_steps;
 use crate::units::{Quantity, Unit};
 
-/// Jump that is a wrap of a channel whose map states the period, as a share of it: nothing turns
-/// by half a circle in a sample.
+/// Least jump that is a wrap of a channel whose map states the period, as a share of the period:
+/// nothing turns by half a circle in a sample.
 const HALF_TURN: f64 = 0.5;
 
-/// Jump that is a wrap of an angle whose map states no period, as a share of the circle: only a
-/// jump of nearly the whole circle cannot be a fault.
+/// Least jump that is a wrap of an angle whose map states no period, as a share of the circle: only
+/// a jump of nearly a whole circle cannot be a fault.
 const WHOLE_TURN: f64 = 0.9;
 
 /// Unwrapping state of one channel, in the recorder's unit.
 #[derive(Clone, Debug)]
 pub struct Unwrapper {
     period: f64,
-    /// Jump from which it is a wrap, as a share of the period.
+    /// Least jump that is a wrap, as a share of the period.
     wrap_share: f64,
     /// `true` for an attitude or a flow angle, which begins within half a turn of zero; `false` for
     /// a heading.
@@ -61,7 +61,7 @@ impl Unwrapper {
         self.wraps
     }
 
-    /// `true` where the turns of the next value do not follow from the values before it.
+    /// `true` if the turns of the next value do not follow from the values before it.
     fn begins_anew(&self) -> bool {
         self.is_about_zero && (self.last.is_nan() || self.missing > self.longest_gap)
     }
@@ -90,7 +90,7 @@ impl Unwrapper {
     }
 
     /// Begins with a value within half a turn of zero. A value beyond a whole turn belongs to no
-    /// angle that wraps around and stays as it is.
+    /// wrapped angle and stays as it is.
     fn begin(&mut self, value: f64) {
         self.turns = if value.abs() <= self.period {
             0.0 - (value / self.period).round()
@@ -101,8 +101,8 @@ impl Unwrapper {
         self.wraps += usize::from(self.turns != 0.0);
     }
 
-    /// Unwraps values without a gap or a wrap among them, nearly always the case: returns the
-    /// offset of all of them. `None`, and nothing changed, where they are not such values.
+    /// Offset that unwraps all values, if there is no gap and no wrap among them, as nearly always.
+    /// Otherwise `None`, and nothing is changed.
     pub fn common_offset(&mut self, values: &[f64]) -> Option<f64> {
         if self.begins_anew() {
             return None;
@@ -123,7 +123,7 @@ impl Unwrapper {
     }
 }
 
-/// 360° in a unit; `None` where it is no unit of an angle.
+/// 360° in a unit; `None` if the unit is not of an angle.
 fn full_circle(unit: &str) -> Option<f64> {
     let unit = Unit::parse(unit).ok()?;
     if unit.quantity != Quantity::Angle {

@@ -31,8 +31,8 @@ const CHANCES_PER_CHANGE: usize = 4;
 pub struct UpdateRate {
     /// Samples of the record from one recorded value to the next.
     pub period: usize,
-    /// For a channel that repeats its value until the next one: the sample, modulo the period, in
-    /// which it is new.
+    /// Phase of a channel that repeats its value until the next one: the sample, modulo the period,
+    /// at which the value changes.
     pub held_phase: Option<usize>,
 }
 
@@ -74,7 +74,7 @@ impl UpdateRate {
         Some(held.unwrap_or(UpdateRate::FULL))
     }
 
-    /// The recorded values with their places, without the repeated ones of a held channel. The
+    /// The recorded values with their places, without the repeated values of a held channel. The
     /// first value is sample `first` of the record.
     pub fn recorded(self, values: &[f64], first: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let is_new = move |k: usize| {
@@ -132,8 +132,8 @@ fn changes(values: &[f64], first: usize) -> Vec<usize> {
     changes
 }
 
-/// The distance that all of a few finite values have, give or take a sample, where it is more than
-/// one: a slow channel in a short record.
+/// Distance between the finite values of a channel that has few of them: equal for all within one
+/// sample, and more than one. Such is a slow channel in a short record.
 fn period_of_few(values: &[f64]) -> Option<usize> {
     let distances = distances(values);
     let total: usize = distances.iter().sum();
@@ -148,8 +148,8 @@ fn period_of_few(values: &[f64]) -> Option<usize> {
     (period > 1 && total >= FEW_DISTANCES && agree).then_some(period)
 }
 
-/// The distance that nearly all finite values have, where it is more than one. A clock of the
-/// channel's own makes it one more or less now and then.
+/// Distance that nearly all finite values have, if it is more than one. If the channel has its own
+/// clock, it is one more or less now and then.
 fn period_between_nulls(distances: &[usize]) -> Option<usize> {
     let total: usize = distances.iter().sum();
     let (period, _) = distances.iter().enumerate().max_by_key(|(_, n)| **n)?;
@@ -161,12 +161,12 @@ fn period_between_nulls(distances: &[usize]) -> Option<usize> {
     (period > 1 && fits && !is_full_rate).then_some(period)
 }
 
-/// `true` where a span of samples has room for so many changes in one phase of a period.
+/// `true` if a span of samples has room for this number of changes in one phase of a period.
 fn has_room(changes: usize, span: usize, period: usize) -> bool {
     (FITTING_SHARE * changes as f64 - 1.0) * period as f64 <= span as f64
 }
 
-/// The rate of a held channel where nearly all changes keep one phase of a period.
+/// Rate of a held channel in which nearly all changes keep one phase of a period.
 fn held_with_period(period: usize, changes: &[usize]) -> Option<UpdateRate> {
     let span = changes.last()? - changes.first()?;
     let are_too_few = CHANCES_PER_CHANGE * changes.len() * period < span;

@@ -11,25 +11,27 @@ use crate::ingest::settings::Checks;
 use crate::numerics::order_statistics::{SIGMA_PER_MAD, upper_median};
 use crate::tables::{CheckRow, CheckVerdict};
 
-/// Windows that are selected of a short flight where the largest are selected, in multiples of the
-/// least number that decides: enough for the slope of a relation whose noise reaches its level.
+/// Number of windows that are selected in a short flight, for relations that select the largest, as
+/// a multiple of the least number for a verdict. They suffice for the slope of a relation whose
+/// noise reaches its level.
 const LEAST_SELECTED: usize = 5;
 
-/// Distance of a window from the line through all windows, in robust standard deviations, from
-/// which it holds a jump of the record: far beyond noise, gusts and turbulence.
+/// Distance of a window from the line through all windows, in robust standard deviations, above
+/// which the window contains a jump of the record: far beyond noise, gusts and turbulence.
 const JUMP_DEVIATIONS: f64 = 10.0;
 
-/// Distance of a window, for a relation that only gusts excite, from which it holds the motion of a control.
+/// Distance of a window above which it contains the motion of a control, for a relation that only
+/// gusts excite.
 const MANEUVER_DEVIATIONS: f64 = 3.0;
 
-/// Least change of the gusts' velocity with which a relation that they excite is checked, ft/s²:
-/// that of turbulence of 1 ft/s, ten times what still air appears to have.
+/// Least change of the gusts' velocity at which a relation that gusts excite is checked, ft/s²:
+/// that of turbulence of 1 ft/s, ten times the value that still air seems to have.
 const LEAST_GUST_FT_S2: f64 = 0.75;
 
-/// Standard deviations that gusts reach in a window of many.
+/// Number of standard deviations that gusts reach in one of many windows.
 const GUST_DEVIATIONS: f64 = 3.0;
 
-/// Error of a relation that biases may cause, as a share of the level from which it counts as
+/// Error of a relation that biases may cause, as a share of the level above which it counts as
 /// excited. The levels of [`crate::ingest::Excitation`] are twice that error.
 const BIAS_SHARE: f64 = 0.5;
 
@@ -175,9 +177,9 @@ impl RelationWindows {
 
     /// Checks the relation; `jumped` are the windows in which any relation finds a jump.
     ///
-    /// A jump in what one relation compares is in the record of all, so a relation that disagrees
-    /// is checked without all of them. A wrong sign or unit makes jumps too and must not hide in
-    /// them, so it is found with the relation's own jumps removed.
+    /// A jump in one relation is in the record of all, so a relation that disagrees is checked
+    /// again without the jumps of all. A wrong sign or unit also makes jumps, which must not hide
+    /// it, so the relation is checked first without its own jumps only.
     fn check(&self, jumped: &BTreeSet<usize>, settings: &Checks) -> Check {
         let own = self.check_without(&self.jumps.iter().copied().collect(), settings);
         let disagrees = own.verdict == CheckVerdict::DoesNotAgree && own.fit.is_some();
@@ -213,8 +215,8 @@ impl RelationWindows {
 
 /// Disturbance of a relation by the gusts of a flight; `pairs` are all its windows.
 ///
-/// Most windows are quiet, so the predicted side moves in them as the aircraft responds to gusts.
-/// Where the largest windows are selected they may be those of the strongest gusts: all of their
+/// Most windows are quiet, so in them the predicted side moves as the aircraft responds to gusts.
+/// If the largest windows are selected, they may be those of the strongest gusts: all of their
 /// motion counts as response.
 fn disturbance(relation: &Relation, pairs: &[WindowPair], gusts: &Gusts) -> Disturbance {
     let Some((_, per_ft_s2)) = relation.disturbed_by_gusts() else {
@@ -236,8 +238,8 @@ fn spread(values: impl Iterator<Item = f64> + Clone) -> f64 {
     SIGMA_PER_MAD * upper_median(values.map(|v| (v - middle).abs())).unwrap_or_default()
 }
 
-/// Selects the windows in which a relation is excited. Where they are the largest of the predicted
-/// side, both sides lose their medians first: a bias would otherwise be the largest of all.
+/// Selects the windows in which a relation is excited. If they are the largest of the predicted
+/// side, both sides first lose their medians: otherwise a bias would be the largest of all.
 fn select_excited(
     relation: &Relation,
     mut pairs: Vec<WindowPair>,
@@ -267,9 +269,9 @@ fn select_excited(
     pairs
 }
 
-/// Finds the windows that hold a jump of the record: frames lost without a trace, parts that were
-/// put together. A wrong channel is wrong in every window, so where too many windows are off the
-/// line none holds a jump.
+/// Finds the windows that contain a jump of the record: frames lost without a trace, or parts that
+/// were joined. A wrong channel is wrong in every window, so if too many windows are off the line
+/// none contains a jump.
 fn find_jumps(relation: &Relation, pairs: &[WindowPair], settings: &Checks) -> Vec<usize> {
     let slope = median_slope(pairs);
     let distance =
@@ -314,8 +316,8 @@ fn median_slope(pairs: &[WindowPair]) -> f64 {
     f64::NAN
 }
 
-/// Fits the windows without jumps; the misfit is that of `all` windows. `None` where a side is
-/// nothing but zeros.
+/// Fits the windows without jumps; the misfit is that of `all` windows. `None` if a side is zero
+/// throughout.
 fn fit(pairs: &[WindowPair], all: &[WindowPair]) -> Option<LineFit> {
     let (xx, yy) = (sum(pairs, |x, _| x * x), sum(pairs, |_, y| y * y));
     let xy = sum(pairs, |x, y| x * y);
@@ -341,9 +343,9 @@ fn sum(pairs: &[WindowPair], term: impl Fn(f64, f64) -> f64) -> f64 {
     pairs.iter().map(|p| term(p.predicted, p.measured)).sum()
 }
 
-/// Verdict on a fit. It needs the slope to be wrong by several standard errors and by more than
-/// biases and gusts can make it. Correlation counts only where windows are selected by a level that
-/// noise does not reach, and as far as gusts leave it.
+/// Verdict on a fit. The relation fails if the slope is wrong by several standard errors, and by
+/// more than biases and gusts can cause. Correlation counts only if the windows are selected by a
+/// level that noise does not reach, and only as far as gusts leave it.
 fn verdict_of(
     fit: &LineFit,
     relation: &Relation,

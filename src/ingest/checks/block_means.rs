@@ -156,7 +156,7 @@ impl BlockMeans {
         self.means.contains_key(signal)
     }
 
-    /// `true` where a signal never changes: a dead sensor's does not, noise changes every other's.
+    /// `true` if a signal never changes. Noise changes every signal except that of a dead sensor.
     pub fn is_constant(&self, signal: &str) -> bool {
         let Some(own) = self.means.get(signal) else {
             return true;
@@ -168,8 +168,8 @@ impl BlockMeans {
         finite.all(|v| (v - first).abs() <= SAME_MEAN * first.abs())
     }
 
-    /// `true` where airspeed, dynamic pressure or Mach number exceed those of a velocity (ft/s) in
-    /// most of the record. One of them may be dead.
+    /// `true` if airspeed, dynamic pressure or Mach number exceed those of a velocity (ft/s) in
+    /// most of the record; one of the three may be dead.
     pub fn is_flying_faster_than(&self, velocity_ft_s: f64) -> bool {
         // At sea level: higher up the same pressure takes a higher velocity.
         let sea_level = air(0.0);

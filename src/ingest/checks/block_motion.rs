@@ -105,8 +105,8 @@ impl BlockMotion {
         [self.ax * G0_FT_S2, self.ay * G0_FT_S2, -self.an * G0_FT_S2]
     }
 
-    /// ω × (u, v, w) − gravity, ft/s²: what the specific force has to balance besides the change of
-    /// the velocity.
+    /// ω × (u, v, w) − gravity, ft/s²: the part of the specific force that does not change the
+    /// velocity.
     pub fn turning_acceleration(&self) -> [f64; 3] {
         let turning = cross(self.rates, self.uvw);
         std::array::from_fn(|i| turning[i] - self.gravity[i])

@@ -1,11 +1,11 @@
 //! Fault isolation: the channel whose correction by a sign or a unit makes all failed relations
 //! hold.
 //!
-//! A faulty channel fails every relation that it is in, so the failed relations alone name too many
-//! channels. Each channel in them is tried with a reversed sign, with each unit that it could have
-//! been recorded in, and with a conversion done twice. The trial after which every relation holds
-//! names the channel and the cause. Where there is no such trial, the channels that the failed
-//! relations share and no other relation confirms are named without a cause.
+//! A faulty channel fails every relation that contains it, so the failed relations alone name too
+//! many channels. Each channel in them is tried with a reversed sign, with each unit in which it
+//! could have been recorded, and with a conversion done twice. If every relation holds after a
+//! trial, the trial names the channel and the cause. If there is no such trial, the channels that
+//! the failed relations share and no other relation confirms are named without a cause.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,11 +18,11 @@ use crate::ingest::settings::Checks;
 use crate::tables::CheckVerdict;
 use crate::units::Unit;
 
-/// Ratio of squared misfits within which another channel's trial explains the failure as well as
-/// the best trial: residual noise differs by less between equally good explanations.
+/// Ratio of squared misfits up to which another channel's trial explains the failure as well as the
+/// best trial: by residual noise, equally good explanations differ by less.
 const EQUAL_MISFIT: f64 = 3.0;
 
-/// Most independent faults that are looked for in one flight; each costs a round of trials.
+/// Largest number of independent faults searched for in one flight; each costs a round of trials.
 const MOST_FAULTS: usize = 3;
 
 /// Relative difference below which two units are the same for a trial: no conversion is so close
@@ -38,7 +38,7 @@ pub struct FaultyChannel {
     pub cause: Option<String>,
     /// Factor by which the signal is corrected.
     pub factor: Option<f64>,
-    /// `false` where other channels explain the failed relations as well.
+    /// `false` if other channels explain the failed relations as well.
     pub is_unique: bool,
 }
 
@@ -197,8 +197,9 @@ impl<'a> Isolation<'a> {
         trials
     }
 
-    /// Recorded channels in a failed relation. The mass is in one relation only, so nothing could
-    /// tell its fault from one of the accelerometer beside it: it is not suspected.
+    /// Recorded channels in a failed relation. The mass is not suspected: it is in one relation
+    /// only, so its fault could not be distinguished from one of the accelerometer in that
+    /// relation.
     fn suspects(&self, checks: &[Check]) -> Vec<(&'a str, &'a Channel)> {
         let is_suspect = |name: &str| {
             name != signal::MASS
@@ -209,8 +210,8 @@ impl<'a> Isolation<'a> {
         suspects.map(|(name, c)| (name.as_str(), c)).collect()
     }
 
-    /// Channels that all failed relations share, without those that another relation confirms.
-    /// Where the failed relations share none, every unconfirmed channel that dominates one of them.
+    /// Channels that all failed relations share, except those that another relation confirms. If
+    /// the failed relations share none, every unconfirmed channel that dominates one of them.
     fn common_channels(&self, checks: &[Check], blocks: &BlockMeans) -> Vec<FaultyChannel> {
         let confirmed = confirmed_signals(checks);
         let is_unconfirmed = |s: &str| !confirmed.contains(&s);
@@ -312,7 +313,7 @@ fn corrections(channel: &Channel) -> Vec<(f64, String)> {
     corrections
 }
 
-/// Number of relations that fail, or that are no longer excited though they were before.
+/// Number of relations that fail, or that were excited before and no longer are.
 fn failures(checks: &[Check], before: &[Check]) -> usize {
     // A faulty channel may look like gusts, so one that gusts excite may fall silent.
     let is_silenced = |c: &Check, b: &Check| {
@@ -338,8 +339,8 @@ fn squared_misfit(checks: &[Check]) -> f64 {
         .sum()
 }
 
-/// The best trial, and the best ones of other channels that explain the failure as well: with as
-/// small a misfit, and with as few windows in which the record would have to jump.
+/// The best trial, and the best trial of each other channel that explains the failure as well: with
+/// as small a misfit, and with as few windows in which the record would have to jump.
 fn equally_good(best: &Trial, trials: &[Trial]) -> Vec<FaultyChannel> {
     let mut chosen: Vec<&Trial> = Vec::new();
     for trial in trials {

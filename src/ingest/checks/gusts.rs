@@ -3,16 +3,17 @@
 //!
 //! The measured side of an acceleration relation is the acceleration relative to the air, the
 //! predicted side the inertial one. Their difference is −ġ, the change of the gust's velocity in a
-//! step. Sums over steps return g without a constant and without a trend, which biases make.
-//! Second differences of g over a lag have neither:
+//! step. Sums over steps return g without a constant and without a trend, which biases make. Second
+//! differences of g over a lag have neither:
 //!
 //! - vanes' noise of variance s², white: V = 6 s² at any lag
-//! - gusts over a lag that is short against their scale, a random walk of a² per step: V(l) = 2 l a²
+//! - gusts over a lag that is short against their scale, a random walk of a² per step: V(l) = 2 l
+//!   a²
 //! - gusts over a lag that is long against their scale, of variance σ²: V = 6 σ²
 //!
-//! A step is a block. With lags of one and two, s² = (2 V(1) − V(2))/6; gusts that change entirely within a step
-//! would pass for noise. With the lag of a window of the checks, V − 6 s² is twice the mean square of the gusts'
-//! change in it, or more.
+//! A step is a block. With lags of one and two, s² = (2 V(1) − V(2))/6; gusts that change entirely
+//! within a step are mistaken for noise. With the lag of a window of the checks, V − 6 s² is twice
+//! the mean square of the gusts' change in it, or more.
 
 use super::relations::{BODY_AXES, Relation};
 use super::windows::{RelationPairs, WindowPair};
@@ -34,8 +35,9 @@ const LONG_S: f64 = 8.0;
 /// of it.
 const LEAST: usize = 20;
 
-/// Ratio of the gusts of two axes that is possible. Turbulence is isotropic at scales that an
-/// aircraft crosses in a second (Kolmogorov); its spectra across and along the flight differ by 4/3.
+/// Largest possible ratio of the gusts of two axes. Turbulence is isotropic at scales that an
+/// aircraft crosses in a second (Kolmogorov); its spectra across and along the flight differ by
+/// 4/3.
 const ISOTROPY: f64 = 1.5;
 
 /// Gusts along one body axis.
@@ -74,7 +76,7 @@ impl Gusts {
     /// Largest change of the gusts' velocity in a window, root mean square, that the weather
     /// explains in any axis, ft/s²; zero with fewer than two axes.
     ///
-    /// A faulty channel disturbs an axis or two and the weather all alike, so the calmest axis
+    /// A faulty channel disturbs one or two axes, the weather all axes alike, so the calmest axis
     /// decides.
     pub fn largest_change_ft_s2(&self) -> f64 {
         let axes: Vec<f64> = self.0.iter().flatten().map(|g| g.change_ft_s2).collect();

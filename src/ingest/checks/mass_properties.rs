@@ -1,5 +1,5 @@
-//! Checks of signals that no kinematic relation contains: sizes that are positive, inertias that a
-//! body can have, and a mass that the aircraft's lift can carry.
+//! Checks of signals that no kinematic relation contains: positive sizes, inertias that a body can
+//! have, and a mass that the aircraft's lift can carry.
 
 use std::collections::BTreeMap;
 
@@ -13,20 +13,20 @@ use crate::numerics::order_statistics::upper_median;
 use crate::numerics::sample_count::whole_steps;
 use crate::units::{G0_FT_S2, RAD, Unit};
 
-/// A signal that no aircraft has.
+/// A signal with values that no aircraft has.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImpossibleSignal {
     pub signal: &'static str,
     pub reason: String,
 }
 
-/// Excess of a principal moment of inertia over the sum of the others that errors of measured
-/// inertias may cause. Those of a flat body are equal.
+/// Largest excess of a principal moment of inertia over the sum of the two others, as a share;
+/// errors of measured inertias may cause it. For a flat body both are equal.
 const INERTIA_TOLERANCE: f64 = 0.05;
 
 /// Radius of gyration in roll over half the span, with margins of two: aircraft have 0.22 to 0.38
 /// (Raymer, *Aircraft Design*, table 16.1). Inertias in lb ft² for slug ft² make it 5.7 times as
-/// large; kg m² makes it 1.16 times as large, which nothing in a record can tell.
+/// large. kg m² makes it 1.16 times as large, which no check of a record can find.
 const GYRATION: std::ops::Range<f64> = 0.1..0.8;
 
 /// Least angle of attack at which the mass is checked, deg: below it the lift at zero angle counts
@@ -38,7 +38,7 @@ const LEAST_ALPHA_DEG: f64 = 5.0;
 /// makes it 14.6 times as large.
 const LIFT_PER_SIN_ALPHA: std::ops::Range<f64> = 0.6..24.0;
 
-/// Middle of the range in the sense of ratios, of aircraft in maneuvers.
+/// Geometric mean of the range for aircraft in maneuvers.
 const TYPICAL_LIFT: f64 = 4.0;
 
 /// Fewest blocks from which the mass is checked: ten seconds of a usual setting.
@@ -87,8 +87,8 @@ pub fn lift_curve(blocks: &BlockMeans, aircraft: &Aircraft, settings: &Checks) -
     bins.filter_map(point).collect()
 }
 
-/// Finds sizes that are not positive, and inertias that no body has. A velocity or dynamic pressure of
-/// zero is that of an aircraft at rest, or of a dead instrument.
+/// Finds sizes that are not positive, and inertias that no body has. A velocity or dynamic pressure
+/// of zero is allowed: the aircraft is at rest, or the instrument is dead.
 pub fn impossible_signals(blocks: &BlockMeans) -> Vec<ImpossibleSignal> {
     let sizes = signal::POSITIVE.iter();
     let found: Vec<ImpossibleSignal> = sizes
@@ -168,8 +168,8 @@ fn impossible_inertia(blocks: &BlockMeans) -> Option<ImpossibleSignal> {
     })
 }
 
-/// Finds a roll inertia with which the mass would lie at the axis, or beyond the wing tips: inertias
-/// of one wrong unit keep their ratios, so only the mass and the span contradict them.
+/// Finds a roll inertia for which the mass would lie at the axis, or beyond the wing tips. Inertias
+/// that are all in one wrong unit keep their ratios, so only the mass and the span contradict them.
 pub fn impossible_gyration(blocks: &BlockMeans, aircraft: &Aircraft) -> Option<ImpossibleSignal> {
     let (inertia, mass) = (median(blocks, signal::IX)?, median(blocks, signal::MASS)?);
     let share = (inertia / mass).sqrt() / (0.5 * aircraft.span_ft);

@@ -1,5 +1,4 @@
-//! Kinematic relations between channels: each has two sides that are equal whatever the
-//! aerodynamics.
+//! Kinematic relations between channels: each has two sides that are equal for any aerodynamics.
 //!
 //! The sides are compared in integrated form over windows, so that no noise is differentiated. A
 //! side is the change of a state plus the integral of a rate over the window, per second. With `v =
@@ -26,8 +25,8 @@ use crate::units::{DEG, G0_FT_S2};
 pub enum Selection {
     /// Windows in which either side exceeds this level.
     Above(f64),
-    /// This share of the windows, those with the largest deviation of the predicted side from its
-    /// median. For relations whose noise reaches the level.
+    /// This share of the windows: those with the largest deviation of the predicted side from its
+    /// median. It is for relations whose noise reaches the level.
     Largest { share: f64, level: f64 },
 }
 
@@ -378,18 +377,20 @@ fn air_data(settings: &Checks) -> Vec<Relation> {
     ]
 }
 
-/// Side force by sideslip, per rad, of wing area: the geometric middle of aircraft (Roskam, *Airplane
-/// Flight Dynamics*: −0.2 to −1.5).
+/// Side force by sideslip, per rad, of wing area: the geometric mean of usual aircraft (Roskam,
+/// *Airplane Flight Dynamics*: −0.2 to −1.5).
 const TYPICAL_CY_BETA: f64 = -0.6;
 
-/// Largest factor between the side force by sideslip of an aircraft and the typical one.
+/// Largest factor between an aircraft's side force by sideslip and the typical one.
 const CY_BETA_FACTOR: f64 = 4.0;
 
-/// Least rate of sideslip, deg/s: twice what an error of 0.2 deg in bank makes at 400 ft/s.
+/// Least rate of sideslip, deg/s: twice the apparent rate from an error of 0.2 deg in bank at 400
+/// ft/s.
 const SIDESLIP_DEG_S: f64 = 0.03;
 
-/// Side force against the sideslip that gusts make. The predicted side is the lateral acceleration of
-/// the motion over V: in gusts it is the gusts', to which no control of the aircraft contributes.
+/// Side force against the sideslip that gusts make. The predicted side is the lateral acceleration
+/// of the motion over V. In gusts that is the gusts' own acceleration, to which no control of the
+/// aircraft contributes.
 fn side_force() -> Relation {
     Relation {
         name: "side force against side gusts",

@@ -1,5 +1,5 @@
-//! Time in another unit or of another rate: every change of the motion is too fast or too slow by one factor, which
-//! no single channel explains.
+//! Time in a wrong unit or at a wrong rate: every change of the motion is too fast or too slow by
+//! one factor, which no single channel explains.
 
 use super::agreement::Check;
 use super::mass_properties::ImpossibleSignal;
@@ -14,13 +14,14 @@ const OF_PATH: [&str; 2] = [signal::ALTITUDE, signal::VELOCITY];
 /// Least correlation of a relation whose slope counts.
 const LEAST_CORRELATION: f64 = 0.9;
 
-/// Fewest relations with one slope: the fault of a channel fails at most two of them alike.
+/// Least number of relations that have one slope; the fault of a channel gives at most two
+/// relations the same slope.
 const FEWEST: usize = 3;
 
-/// Largest ratio of slopes that are one: biases and gusts turn them by a few percent.
+/// Largest ratio of slopes that count as equal: biases and gusts change them by a few percent.
 const ONE_SLOPE: f64 = 1.1;
 
-/// Least factor of a time that is wrong; slopes of good flights differ from one by a few percent.
+/// Least factor of a wrong time; slopes of good flights differ from one by a few percent.
 const LEAST_FACTOR: f64 = 1.1;
 
 /// Units of time with the seconds that a channel in them counts for each second.

@@ -7,21 +7,22 @@ use super::pieces::Piece;
 use super::time_channels::TimeChannels;
 use crate::ingest::column_source::ColumnSource;
 
-/// Rows of either piece that are compared: some seconds of a usual recorder.
+/// Rows of each piece that are compared: some seconds of a usual recorder.
 const COMPARED_ROWS: usize = 256;
 
-/// Share of equal values from which two pieces hold the same rows. A file exported twice may round
-/// or lose some values; rows of another time agree in none but constant channels.
+/// Share of equal values above which two pieces hold the same rows. A file exported twice may round
+/// or lose some values. Rows of different times agree only in constant channels.
 const EQUAL_SHARE: f64 = 0.9;
 
 /// Times that differ by less are equal, s: a microsecond, the finest resolution of usual recorders.
 const SAME_TIME_S: f64 = 1e-6;
 
-/// Relative difference below which two times are equal: times since 1970 in doubles are no finer.
+/// Relative difference below which two times are equal: the resolution of times since 1970 in
+/// double precision.
 const SAME_TIME: f64 = 1e-9;
 
-/// `true` where the rows of the second piece that have times of the first hold its values again, as
-/// far as channels of these names change at all.
+/// `true` if the rows of the second piece at times of the first piece repeat its values, in the
+/// channels of these names that change at all.
 ///
 /// # Errors
 /// The reason for which a file cannot be read.

@@ -1,9 +1,9 @@
 //! The pieces of a flight's files merged into sequences: rows in the order of their clock, each
 //! used once.
 //!
-//! A piece that goes on where another ended belongs to its sequence. A piece whose times are there
-//! already either repeats rows, which are left out, or comes from a clock that was started anew,
-//! which begins a new sequence. The values of the rows decide.
+//! A piece that continues after the end of another belongs to its sequence. A piece whose times are
+//! already in a sequence either repeats its rows, which are left out, or comes from a clock that
+//! was started anew, which begins a new sequence. The values of the rows decide.
 
 use super::pieces::{Piece, ScannedFile};
 use crate::ingest::settings::Settings;
@@ -37,21 +37,22 @@ pub struct PieceSequence {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MergedPieces {
     pub sequences: Vec<PieceSequence>,
-    /// Pieces whose rows, or some of them, are in a sequence already.
+    /// Pieces of which some or all rows are already in a sequence.
     pub duplicates: Vec<Piece>,
     /// Single rows whose time fits nowhere.
     pub strays: Vec<Piece>,
 }
 
-/// Least rows of a piece between two jumps of the time; fewer are strays if they do not fit where
-/// they stand. Two rows have a single step, which an outlier can imitate.
+/// Least rows of a piece between two jumps of the time. A shorter piece is a stray if it does not
+/// fit at its place. Two rows have a single step, which an outlier can imitate.
 const LEAST_ROWS: usize = 3;
 
-/// Most sequences of a flight: a recorder that starts for each maneuver makes some hundreds in a day.
+/// Largest number of sequences of a flight: a recorder that starts for each maneuver makes some
+/// hundreds in a day.
 const MOST_SEQUENCES: usize = 1000;
 
-/// Most comparisons of rows in a flight; each reads its files again. Files of five minutes that
-/// overlap make 288 in a day, a clock that starts anew 32 times 496.
+/// Largest number of comparisons of rows in a flight; each reads the files again. Overlapping files
+/// of five minutes make 288 in a day; a clock that starts anew 32 times makes 496.
 const MOST_COMPARISONS: usize = 512;
 
 /// Share of a step by which a row must be later than the end of a sequence to be a new row.
@@ -115,7 +116,8 @@ impl Merger<'_, '_> {
         Ok(())
     }
 
-    /// Reason for which a clock with so many jumps is refused. `piece` is the latest of them.
+    /// Reason for which a clock with too many jumps is refused. `piece` is the piece after the last
+    /// jump.
     fn too_often(&self, event: &str, most: usize, piece: &Piece) -> String {
         format!(
             "{event} more than {most} times, the last time in row {} of {}: its rows are out of \

@@ -2,8 +2,8 @@
 //! channel alone makes them.
 //!
 //! Single rows with an impossible time (no number, an outlier, the time of the row before) are left
-//! out where they stand. Where time jumps, back or far ahead, a new piece begins. [`super::merge`]
-//! decides what the jump means when all pieces are scanned.
+//! out. A jump of the time, back or far ahead, begins a new piece. [`super::merge`] decides about
+//! the jump when all pieces are scanned.
 
 use crate::numerics::order_statistics::upper_median;
 
@@ -72,7 +72,7 @@ const JUMP_S: f64 = 1.0;
 /// Jump ahead that begins a new piece, in median steps, for recorders slower than 4 Hz.
 const JUMP_STEPS: f64 = 4.0;
 
-/// Most rows of a piece: a stretch can end between pieces only.
+/// Largest number of rows of a piece: a stretch can end only between pieces.
 const LONGEST_PIECE: usize = 1 << 20;
 
 /// Largest step backwards that counts as jitter, in median steps: a row further back cannot be the
@@ -90,13 +90,13 @@ const WHOLE_STEP: std::ops::Range<f64> = 0.5..1.5;
 #[derive(Clone, Debug, Default)]
 pub struct PieceScanner {
     file: usize,
-    /// Times that wait for the median step.
+    /// Times that are kept until the median step is found.
     head: Vec<f64>,
     median_s: Option<f64>,
     /// Times of the last two rows of the open piece.
     last: Option<f64>,
     before_last: Option<f64>,
-    /// A row was left out after them, so the next row begins a piece.
+    /// `true` if a row was left out after them; the next row then begins a piece.
     is_closed: bool,
     whole_steps: MeanStep,
     found: ScannedFile,
@@ -130,8 +130,8 @@ impl PieceScanner {
         }
     }
 
-    /// Takes the median step from a fixed number of rows, whatever the parts in which they come,
-    /// and scans the rows that waited for it.
+    /// Takes the median step from a fixed number of rows, for any parts in which they come, and
+    /// scans the rows kept so far.
     fn begin(&mut self) {
         let head = std::mem::take(&mut self.head);
         self.median_s = Some(median_step(head.get(..HEAD_ROWS).unwrap_or(&head)));

@@ -39,7 +39,7 @@ pub struct Clock {
 /// the recorder's.
 const SAMPLES_PER_ROW: usize = 10;
 
-/// Bound of a sample's number, which only a damaged time reaches.
+/// Upper limit of a sample's number, which only a damaged time reaches.
 const MOST_SAMPLES: usize = usize::MAX / 2;
 
 /// Largest relative difference between the configured rate and the recorded one.
@@ -49,7 +49,7 @@ const RATE_TOLERANCE: f64 = 0.05;
 /// jitter, fast against drift.
 const PHASE_GAIN: f64 = 0.05;
 
-/// Share of a step by which a row may be early and still be the next sample. Beyond it the row
+/// Largest share of a step by which a row may be early and still be the next sample. An earlier row
 /// repeats a sample.
 const EARLY: f64 = 0.75;
 
@@ -57,8 +57,8 @@ const EARLY: f64 = 0.75;
 /// to the other: more than the interpolation reaches.
 const NEAR_STEPS: f64 = 8.0;
 
-/// Largest scatter of the time stamps, as a share of a step, for which the nearest sample is a
-/// row's own.
+/// Largest scatter of the time stamps, as a share of a step, at which the nearest sample still is
+/// the row's own.
 const MOST_JITTER: f64 = 0.3;
 
 /// Second pass over the times of a sequence: assigns its rows to samples.
@@ -115,8 +115,8 @@ impl ClockBuilder {
         self.clock.append_row(file, row, sample);
     }
 
-    /// Sample of a row that is `steps` after the first one; `None` where the sample has a row
-    /// already. A row early by jitter becomes the next sample.
+    /// Sample of a row that is `steps` after the first one; `None` if another row has this sample.
+    /// A row that is early by jitter becomes the next sample.
     fn sample_of(&self, steps: f64, time: f64) -> Option<usize> {
         let sample = nearest(steps - self.phase).min(MOST_SAMPLES);
         let next = self.clock.samples;

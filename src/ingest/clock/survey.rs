@@ -24,8 +24,8 @@ use crate::ingest::settings::Settings;
 /// leave gaps in most maneuvers.
 const MOST_UNUSABLE: f64 = 0.1;
 
-/// Rates of recorders of flight mechanics, Hz. Below, no short period is seen; above, a time is in
-/// another unit.
+/// Rates of recorders of flight mechanics, Hz. A slower recorder does not resolve the short period;
+/// a faster one probably has its time in another unit.
 const RATES_HZ: std::ops::RangeInclusive<f64> = 2.0..=1000.0;
 
 /// Usual rate of a recorder, Hz, by which the unit of a time is guessed.
@@ -84,8 +84,8 @@ struct Stream {
 }
 
 impl Stream {
-    /// `true` where a file holds at least half of the stream's columns, or the stream at least half of the
-    /// file's.
+    /// `true` if a file holds at least half of the stream's columns, or the stream at least half of
+    /// the file's.
     fn shares_half(&self, columns: &BTreeSet<String>) -> bool {
         let common = self.columns.intersection(columns).count();
         2 * common >= self.columns.len().min(columns.len())
@@ -95,8 +95,8 @@ impl Stream {
         self.files.first().map_or(f64::INFINITY, |f| f.step_s)
     }
 
-    /// Order of streams: the most values per second first, then the most channels. Many slow engine
-    /// channels are not the clock of a few rates.
+    /// Order of streams: the most values per second first, then the most channels. The clock of a
+    /// few fast rates thus precedes that of many slow engine channels.
     fn by_size(a: &Stream, b: &Stream) -> Ordering {
         let values_per_s = b.values_per_s().total_cmp(&a.values_per_s());
         values_per_s.then(b.columns.len().cmp(&a.columns.len()))
@@ -419,8 +419,8 @@ impl<S: ColumnSource + ?Sized> Surveyor<'_, S> {
     }
 }
 
-/// Clocks of another stream beside a stretch of the main one. A stream with as many stretches as the
-/// main one was interrupted where it was.
+/// Clocks of another stream that belong to a stretch of the main one. If a stream has as many
+/// stretches as the main one, both were interrupted together.
 fn clocks_beside(clocks: &[Clock], stretch: usize, stretches: usize) -> &[Clock] {
     match clocks.get(stretch) {
         Some(own) if clocks.len() == stretches => std::slice::from_ref(own),

@@ -27,8 +27,8 @@ pub const STATES: usize = 7;
 
 pub type State = SVector<f64, STATES>;
 
-/// Terms of the equations that are computed from the measured motion at a sample: they enter so
-/// weakly that the measurement is good enough.
+/// Terms of the equations that are computed from the measured motion at a sample: their effect is
+/// so weak that the measurement is accurate enough.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeasuredTerms {
     /// ft/s².

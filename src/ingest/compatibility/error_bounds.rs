@@ -10,13 +10,12 @@ use super::window_fit::{Squares, squares_about_mean};
 use crate::flight::signal;
 use crate::numerics::student;
 
-/// Relative error of the equations themselves: gravity, arms and positions are not known more
-/// closely.
+/// Relative error of the equations themselves: the accuracy of gravity, arms and positions.
 pub const MODEL_SCALE: f64 = 0.002;
 
-/// Share of a vane's unexplained motion that goes with the explained motion, and with its rate. The
-/// aircraft turns into a gust, and some time after it: the shares are taken for errors of scale and for
-/// delays.
+/// Share of a vane's unexplained motion that correlates with the explained motion, and with its
+/// rate. The aircraft turns into a gust, at once and with a delay: these shares look like errors of
+/// scale and like delays.
 const GUST_RESPONSE: f64 = 0.5;
 
 /// Outputs that feel the gusts into which the aircraft turns.
@@ -25,9 +24,10 @@ const VANES: [&str; 2] = [signal::ALPHA_VANE, signal::BETA_VANE];
 /// Standard deviations of the shared parameters.
 #[derive(Clone, Copy, Debug)]
 pub struct ErrorBounds {
-    /// With all that is below.
+    /// Standard deviations with all contributions.
     pub total: Parameters,
-    /// Part by gusts and the equations' own error: no number of windows or flights averages it out.
+    /// Contribution of gusts and of the equations' own error, which no number of windows or flights
+    /// averages out.
     pub systematic: Parameters,
     /// Share of the information on each parameter that comes from the data and not from the prior.
     pub data_shares: Parameters,
@@ -122,8 +122,9 @@ impl JointState<'_> {
 /// The first accelerometer among the inputs; three rate gyros stand before it.
 const FIRST_ACCELEROMETER: usize = 3;
 
-/// Ratio of the swings of ω × v to those of the specific force in each axis (forward, right, down).
-/// A relative error of the former is so many times as large an error of the accelerometer's scale.
+/// Ratio of the variations of ω × v to those of the specific force in each axis (forward, right,
+/// down). A relative error of the former looks like an error of the accelerometer's scale
+/// multiplied by this ratio.
 fn turning_over_force(windows: &[Window]) -> [f64; 3] {
     std::array::from_fn(|i| {
         let input = FIRST_ACCELEROMETER + i;

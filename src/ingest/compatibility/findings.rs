@@ -22,7 +22,7 @@ const MODEL_BIAS: f64 = 0.01;
 const MODEL_DELAY_S: f64 = 0.001;
 
 /// Largest bound of an estimated parameter, as a share of its prior. About half of the information
-/// then comes from the flight; with a larger bound the estimate is mostly the prior.
+/// then comes from the flight. An estimate with a larger bound is mostly the prior.
 const MOST_OF_PRIOR: f64 = 0.7;
 
 /// Least share of the information on an error that must come from the flight for evidence: with less,
@@ -53,11 +53,12 @@ pub struct ErrorEstimate {
     pub value: f64,
     /// Standard deviation.
     pub bound: f64,
-    /// Many times its bound and larger than any ordinary error.
+    /// `true` if the error is many times its bound, and larger than any ordinary error.
     pub fault: bool,
-    /// As large as a fault but not as sure: neither named nor corrected.
+    /// `true` if the error is as large as a fault but less certain: it is neither named nor
+    /// corrected.
     pub doubtful: bool,
-    /// At the limit of the search: named, and never corrected.
+    /// `true` at the limit of the search: the error is named, and never corrected.
     pub at_limit: bool,
     /// `true` where the record is corrected by it.
     pub applied: bool,
@@ -143,7 +144,7 @@ impl Findings {
         corrected
     }
 
-    /// These findings with every fault in doubt: neither named nor corrected.
+    /// These findings with every fault marked as doubtful: neither named nor corrected.
     #[must_use]
     pub fn without_faults(mut self) -> Findings {
         let estimates = self
@@ -248,8 +249,8 @@ fn model_error(instrument: usize, kind: Kind, settings: &Compatibility) -> f64 {
     }
 }
 
-/// Evidence on one parameter: estimate and bound as they would be without the prior. `None` where the
-/// flight says next to nothing.
+/// Evidence on one parameter: estimate and bound without the prior. `None` if the flight has almost
+/// no information on it.
 fn evidence(
     errors: &FittedErrors,
     instrument: usize,
@@ -315,8 +316,8 @@ fn estimate(
     })
 }
 
-/// Corrects a bias and a scale error together: their estimates are correlated, so where one is
-/// applied the other is too.
+/// Applies the corrections of a bias and a scale error together: their estimates are correlated, so
+/// if one is applied the other is too.
 fn correct_together(estimates: &mut [Option<ErrorEstimate>; KINDS], settings: &Compatibility) {
     let [bias, scale, _] = estimates;
     if let (Some(bias), Some(scale)) = (bias, scale)

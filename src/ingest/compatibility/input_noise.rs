@@ -31,8 +31,8 @@ const BLOCK_S: f64 = 0.2;
 const LEAST_INFORMATION: f64 = 1e-6;
 
 /// Covariance of the score on the shared parameters from the noise of the inputs, the window's own
-/// parameters eliminated. `weights` are 1/R of the outputs, and `information` is that of the outputs.
-/// `None` where the motion does not tell the initial state.
+/// parameters eliminated. `weights` are 1/R of the outputs, and `information` is that of the
+/// outputs. `None` if the motion does not determine the initial state.
 pub fn score_covariance(
     window: &Window,
     linearised: &LinearisedWindow,
@@ -53,7 +53,7 @@ pub fn score_covariance(
     Some(&scores * scores.transpose())
 }
 
-/// Sums of the products after the middle of each block, in their place.
+/// Replaces each block's products by the sum over later blocks, from the middle of the block on.
 fn sum_later(products: &mut DMatrix<f64>) {
     let mut later = vec![0.0; ALL * STATES];
     let blocks = products.as_mut_slice().chunks_exact_mut(ALL * STATES);
@@ -66,9 +66,9 @@ fn sum_later(products: &mut DMatrix<f64>) {
     }
 }
 
-/// Adds to the scores of all blocks what they lack in the score of a bias: noise that is constant is a
-/// bias b, whose score is H b. Otherwise combinations of scores on which the outputs say next to nothing
-/// would seem to separate the two.
+/// Completes the scores of all blocks so that they agree with the score of a bias: constant noise
+/// is a bias b, whose score is H b. Otherwise combinations of scores with almost no information in
+/// the outputs would seem to separate noise from bias.
 fn make_consistent(scores: &mut DMatrix<f64>, window: &Window, information: &DMatrix<f64>) {
     let length = block_length(window);
     let samples = |block: usize| length.min(window.samples - block * length) as f64;

@@ -5,7 +5,7 @@
 //! size² + θ² (Cauchy's distribution by reweighting) for an error that is surely larger than
 //! ordinary. An error that several instruments could explain thus goes to one. After the
 //! reweighting, the error that the data alone put most surely beyond the ordinary is freed of its
-//! prior, until there is none. An error that comes out as large as a fault, but not as sure as one,
+//! prior, until there is none. An error that comes out as large as a fault, but is less certain,
 //! gets the ordinary prior again.
 
 use rayon::prelude::*;
@@ -20,21 +20,22 @@ use super::window_fit::{FitContext, WindowFit};
 use crate::aircraft::Aircraft;
 use crate::numerics::mean::finite_mean;
 
-/// Most rounds in which R and P are estimated anew; the fit usually settles earlier.
+/// Largest number of rounds in which R and P are estimated anew; the fit usually settles earlier.
 const ROUNDS: usize = 8;
 
-/// Rounds with the wide prior, in which R settles before anything is decided: a flight in turbulence,
-/// whose delays are told by little, otherwise widens their priors by chance.
+/// Rounds with the wide prior, in which R settles first. Otherwise the priors of the delays would
+/// widen by chance in turbulence, where the data say little about delays.
 const WIDE_ROUNDS: usize = 4;
 
-/// Rounds that are taken at any rate: with the wide prior, and with two estimates of P.
+/// Least number of rounds: those with the wide prior, and two estimates of P.
 const LEAST_ROUNDS: usize = WIDE_ROUNDS + 1;
 
-/// Number of bounds from which a parameter is surely larger than ordinary, so that its prior widens.
+/// Number of bounds above which a parameter is certainly larger than ordinary, so that its prior
+/// widens.
 const SURELY: f64 = 3.0;
 
-/// Number of bounds from which a parameter is freed of its prior at the end. Without the other
-/// parameters' company it needs more.
+/// Number of bounds above which a parameter is freed of its prior at the end: more than for
+/// widening, since no other parameters are widened with it.
 const FREED: f64 = 4.0;
 
 /// Number of ordinary sizes below which no parameter is freed.
@@ -43,11 +44,12 @@ const LEAST_FREED: f64 = 2.0;
 /// Most parameters that are freed, as faults are rare.
 const MOST_FREED: usize = 4;
 
-/// Prior of the first round, in least sizes of a fault: any fault is possible.
+/// Prior of the first round, as a multiple of the least size of a fault, so that any fault is
+/// possible.
 const FIRST_PRIOR: f64 = 2.0;
 
 /// Least share of the information on a parameter that must come from the data for an estimate
-/// without prior: below it that estimate is rounding.
+/// without prior. With a smaller share that estimate consists of rounding errors.
 const LEAST_DATA_SHARE: f64 = 1e-6;
 
 /// Estimates of the instruments' errors.
@@ -140,8 +142,8 @@ fn estimated(windows: &[Window]) -> [bool; PARAMETERS] {
     estimated
 }
 
-/// Fits in rounds, the first of them with a wide prior, and then widens the prior of each parameter that is
-/// surely larger than ordinary.
+/// Fits in rounds, the first of them with a wide prior, and then widens the prior of each parameter
+/// that is certainly larger than ordinary.
 fn reweight(state: &mut JointState) -> Option<()> {
     for round in 0..ROUNDS {
         let steps = state.settle()?;
@@ -170,7 +172,7 @@ fn reweighted_prior(state: &JointState) -> Option<Parameters> {
     }))
 }
 
-/// Frees one parameter after another of its prior, the surest first, and fits again.
+/// Frees one parameter after another of its prior, the most certain first, and repeats the fit.
 fn free_surest(state: &mut JointState) -> Option<()> {
     for _ in 0..MOST_FREED {
         let Some((j, prior)) = surest(state) else {
@@ -182,7 +184,8 @@ fn free_surest(state: &mut JointState) -> Option<()> {
     Some(())
 }
 
-/// The parameter that the data alone put most surely beyond the ordinary, and its new prior.
+/// The parameter that, by the data alone, exceeds its ordinary size most certainly, and its new
+/// prior.
 fn surest(state: &JointState) -> Option<(usize, f64)> {
     let Posterior { values, covariance } = state.posterior()?;
     let gusts = state.gust_errors();
@@ -206,8 +209,8 @@ fn surest(state: &JointState) -> Option<(usize, f64)> {
         .map(|(j, prior, _)| (j, prior))
 }
 
-/// Parameters with a widened prior that came out as large as a fault but not as sure as one. No
-/// ordinary error is that large.
+/// Parameters with a widened prior that came out as large as a fault but less certain. No ordinary
+/// error is that large.
 fn doubtful(state: &JointState, values: &Parameters, bounds: &Parameters) -> Vec<usize> {
     let settings = state.context.settings;
     let is_doubtful = |j: &usize| {

@@ -14,21 +14,22 @@ use super::settings::Compatibility;
 use super::window_fit::{FitContext, WindowFit};
 use crate::numerics::symmetric;
 
-/// Most Gauss-Newton steps between two estimates of R: more would settle on weights that change.
+/// Largest number of Gauss-Newton steps between two estimates of R: more would converge for weights
+/// that change anyway.
 const STEPS: usize = 2;
 
 /// Most halvings of a step that raises the cost; after them the step is dropped.
 const HALVINGS: usize = 5;
 
-/// Rise of twice the cost that decides nothing: that of a tenth of a standard deviation. A gradient of
-/// interpolated sensitivities is not exact, so its last steps may raise the cost by so much.
+/// Rise of twice the cost that is ignored: that of a tenth of a standard deviation. A gradient of
+/// interpolated sensitivities is not exact, so its last steps may raise the cost by this amount.
 const LEAST_RISE: f64 = 0.01;
 
 /// Largest move of a parameter, as a share of its bound, at which the fit is settled.
 const SETTLED: f64 = 0.05;
 
-/// Largest move of a parameter, as a share of its bound, after which the sensitivities still serve:
-/// they change with the motion, which a bound hardly moves.
+/// Largest move of a parameter, as a share of its bound, for which the sensitivities remain usable:
+/// they change with the motion, which a move of one bound hardly changes.
 const LINEAR: f64 = 1.0;
 
 /// Standard deviation of the delays' weighted mean, s: a tenth of the error of the equations'
@@ -41,8 +42,8 @@ pub struct Posterior {
     pub covariance: DMatrix<f64>,
 }
 
-/// Factor on an estimate, and its variance, as they would be without the prior. The estimate is `share`
-/// times the truth with noise, and the prior's part of its variance is (1 − share)² P.
+/// Factor on an estimate, and its variance, without the prior. The estimate is `share` times the
+/// truth, plus noise; the prior's part of its variance is (1 − share)² P.
 pub fn without_prior(share: f64, variance: f64, prior: f64) -> (f64, f64) {
     let of_noise = variance - ((1.0 - share) * prior).powi(2);
     (share.recip(), of_noise.max(0.0) / (share * share))
@@ -63,7 +64,7 @@ pub struct JointState<'a> {
     pub prior: Parameters,
 }
 
-/// `true` for a value at the limit of its search.
+/// `true` for a value at the limit of its search range.
 pub fn is_at_limit(parameter: usize, value: f64, settings: &Compatibility) -> bool {
     match kind_of(parameter) {
         Kind::Delay => value.abs() >= settings.longest_delay_s,
@@ -134,7 +135,7 @@ impl JointState<'_> {
     }
 
     /// Takes one step of all parameters. Returns the largest move of a shared one over its bound;
-    /// zero where no part of the step lowers the cost.
+    /// zero if no fraction of the step lowers the cost.
     fn step(&mut self) -> Option<f64> {
         let inverse = self.inverse(&self.information())?;
         let step = &inverse * self.gradient();

@@ -44,11 +44,11 @@ pub fn signals() -> BTreeSet<String> {
         .collect()
 }
 
-/// Fewest windows from which a fault is named: with fewer their scatter does not confirm it.
+/// Least number of windows for naming a fault: with fewer their scatter does not confirm it.
 const FEWEST_TO_NAME: usize = 3;
 
-/// Removes a heading that is missing in most of a record: windows need it throughout where there is
-/// one, and the other instruments are found without it.
+/// Removes a heading that is missing in most of a record. A window uses a heading only if it is
+/// complete; the other instruments can be examined without it.
 fn leave_out_rare_heading(record: &mut Record) {
     let heading = record.values(signal::PSI).unwrap_or_default();
     let finite = heading.iter().filter(|v| v.is_finite()).count();

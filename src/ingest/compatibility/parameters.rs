@@ -44,8 +44,8 @@ pub const SIGNALS: [&str; INSTRUMENTS] = [
     s::MACH,
 ];
 
-/// Outputs that the motion along each input decides, by their signals. Without the input their
-/// equations lack a term, and they are not compared.
+/// Outputs that depend on the motion along each input. Without the input their equations lack a
+/// term, and they are not compared.
 const DECIDED_BY: [(&str, &[&str]); INPUTS] = [
     (s::P, &[s::PHI]),
     (s::Q, &[s::THETA, s::ALPHA_VANE]),
@@ -55,7 +55,7 @@ const DECIDED_BY: [(&str, &[&str]); INPUTS] = [
     (s::AN, &[s::ALPHA_VANE, s::ALTITUDE]),
 ];
 
-/// `true` for an output whose motion some input of a record does not decide.
+/// `true` for an output that depends on an input that is not recorded.
 pub fn lacks_input(output: usize, is_recorded: impl Fn(&str) -> bool) -> bool {
     let mut lacking = DECIDED_BY.iter().filter(|(input, _)| !is_recorded(input));
     lacking.any(|(_, decided)| decided.contains(&SIGNALS[INPUTS + output]))

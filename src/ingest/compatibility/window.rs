@@ -20,7 +20,7 @@ const EARTH_RATE: f64 = 7.292_115e-5;
 /// The earth's mean radius, ft (6,371 km).
 const EARTH_RADIUS_FT: f64 = 2.090_2e7;
 
-/// Largest pitch attitude, deg: beyond it the Euler angles are next to their singularity.
+/// Largest pitch attitude, deg: beyond it the Euler angles are close to their singularity.
 const STEEPEST_DEG: f64 = 75.0;
 
 /// Largest readings of the vanes, deg: beyond them the flow turns away from the vane's axis.
@@ -61,8 +61,8 @@ pub struct Window {
     pub start: State,
 }
 
-/// Chooses at most `most` windows of a record, in order of time. Each signal in turn proposes, of
-/// those left, the window in which it moves most.
+/// Chooses at most `most` windows of a record, in order of time. Each signal in turn proposes the
+/// remaining window in which it moves most.
 pub fn choose_windows(record: &Record, most: usize, settings: &Compatibility) -> Vec<Range<usize>> {
     let usable = usable_windows(record, settings);
     let activity: Vec<Vec<f64>> = SIGNALS
@@ -111,11 +111,11 @@ pub fn margin(settings: &Compatibility, step_s: f64) -> usize {
     samples(settings.longest_delay_s, step_s) + 3
 }
 
-/// The only window of a record may be shorter than the configured length by this factor.
+/// Factor by which the only window of a record may be shorter than the configured length.
 const SHORTEST_ONLY: usize = 4;
 
 /// Windows of the configured length, or at least half of it, over which the equations can be
-/// integrated. Of a record too short for one its longest part is the window.
+/// integrated. A record that is too short has one window, its longest usable part.
 fn usable_windows(record: &Record, settings: &Compatibility) -> Vec<Range<usize>> {
     let decimation = decimation(record.step_s);
     let length = samples(settings.window_s, record.step_s).max(2 * decimation);
@@ -329,8 +329,9 @@ fn decimate_measured(
         .collect()
 }
 
-/// Variance of white noise with the power of a signal's own noise, for each sample of the record; zero
-/// for a signal that is not recorded. A sample measured once in a while stands for those between.
+/// Variance of white noise with the power of a signal's own noise, for each sample of the record;
+/// zero for a signal that is not recorded. The noise of a slow channel's sample lasts until the
+/// next one.
 fn white_level(record: &Record, name: &str, range: &Range<usize>) -> f64 {
     let series = record.signals.get(name);
     let Some((values, marks)) =
@@ -395,7 +396,7 @@ fn measured_terms(record: &Record, samples: &[usize], aircraft: &Aircraft) -> Ve
 }
 
 /// Rotation of earth and horizon at an attitude (rad) and a velocity in body axes (ft/s). Without a
-/// heading only the part that does not depend on it.
+/// heading only the part that is independent of it.
 pub fn rotation_terms(
     aircraft: &Aircraft,
     [phi, theta, psi]: [f64; 3],

@@ -72,7 +72,8 @@ struct InputNoise {
 }
 
 impl InputNoise {
-    /// Largest ratio of a variance R to that of the covariance at which the covariance serves.
+    /// Largest ratio of a variance R to the one for which the covariance was computed, at which the
+    /// covariance is still used.
     const SERVES: f64 = 1.2;
 
     fn unknown() -> InputNoise {
@@ -214,8 +215,8 @@ impl<'a> WindowFit<'a> {
         score_covariance(self.window, &self.linearised, &weights, &self.information)
     }
 
-    /// Estimates R anew from the residuals: coloured noise counts as white noise as strong as its
-    /// slowest part.
+    /// Estimates R anew from the residuals: coloured noise counts as white noise of the same power
+    /// as its slowest part.
     pub fn reweigh(&mut self, context: &FitContext) {
         let range = context.compared(self.window);
         for output in 0..OUTPUTS {
@@ -317,11 +318,11 @@ fn reduced_information(
     ReducedInformation::of(&information)
 }
 
-/// Standard deviations of chance by which the squares must exceed those of white noise.
+/// Standard deviations of chance by which a sum of squares must exceed that of white noise.
 const CHANCE: f64 = 3.0;
 
-/// Sum of squares without that of white noise, which does not continue from sample to sample, and
-/// without what chance adds to it: the sum of v(k) v(k + 1) has a variance of N s⁴.
+/// Sum of squares without white noise, which does not continue from sample to sample, and without
+/// the excess by chance: the sum of v(k) v(k + 1) has a variance of N s⁴.
 fn slow_squares(values: &[f64]) -> f64 {
     let noise = values
         .windows(2)

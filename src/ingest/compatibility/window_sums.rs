@@ -1,8 +1,8 @@
 //! Sums of a window over its samples, output by output: residuals, gradient and information.
 //!
 //! Readings are known at points and sensitivities at nodes, and interpolated between them. So the
-//! gradient Σ s v over the samples is one over the nodes, with each residual shared out to the nodes
-//! around it by the weights of the interpolation.
+//! gradient Σ s v over the samples is one over the nodes, with each residual distributed over the
+//! nodes around it by the weights of the interpolation.
 
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
@@ -39,20 +39,20 @@ pub struct Comparison {
     /// Residuals of each output at every sample; NaN where the output does not count.
     pub residuals: [Vec<f64>; OUTPUTS],
     pub squares: [f64; OUTPUTS],
-    /// Residuals shared out to the nodes.
+    /// Residuals, distributed over the nodes.
     sums: [Vec<f64>; OUTPUTS],
-    /// Numbers of samples shared out to the nodes.
+    /// Numbers of samples, distributed over the nodes.
     counts: [Vec<f64>; OUTPUTS],
 }
 
-/// Samples at the same place after points that are `spacing` samples apart.
+/// Samples at the same distance after points that are `spacing` samples apart.
 struct Phase {
     spacing: usize,
-    /// Place after the point, in samples.
+    /// Distance after the point, in samples.
     offset: usize,
     /// Points before the samples.
     points: Range<usize>,
-    /// Kernel of the instant that such a sample shows.
+    /// Kernel for the instant at which the instrument measured the sample.
     kernel: InterpolationKernel,
 }
 
@@ -65,7 +65,7 @@ impl Phase {
     }
 }
 
-/// Phases of some samples that show what was `late` samples before.
+/// Phases of samples that were measured `late` samples earlier.
 fn phases(spacing: usize, late: f64, samples: &Range<usize>) -> impl Iterator<Item = Phase> {
     let Range { start, end } = *samples;
     let point = move |sample: usize, offset: usize| sample.saturating_sub(offset).div_ceil(spacing);
@@ -123,7 +123,7 @@ impl Comparison {
         }
     }
 
-    /// Shares the residuals of an output out to the nodes.
+    /// Distributes the residuals of an output over the nodes.
     fn share_out(&mut self, output: usize, spacing: usize, late: f64, samples: &Range<usize>) {
         let residuals = &self.residuals[output];
         let (mut values, mut counted) = (Vec::new(), Vec::new());

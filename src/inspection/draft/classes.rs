@@ -11,7 +11,8 @@ use crate::inspection::vocabulary::Input;
 
 /// Fewest steps of an input that make a maneuver: a doublet has three.
 const FEWEST_STEPS: usize = 3;
-/// Most steps of an input that is not the maneuver's: two may be a trim and its return.
+/// Largest number of steps of an input that is not excited in a maneuver: two may be a trim and its
+/// return.
 const MOST_OTHER_STEPS: usize = 2;
 
 /// A maneuver class of the draft.

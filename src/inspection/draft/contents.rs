@@ -1,4 +1,4 @@
-//! Contents of a draft, and how texts stand in YAML.
+//! Contents of a draft, and the form of texts in YAML.
 
 use crate::inspection::findings::{Channel, Inspection, Role};
 use crate::inspection::inputs::{Acts, InputColumn};
@@ -6,7 +6,7 @@ use crate::inspection::inputs::{Acts, InputColumn};
 /// Word in place of a value that the analyst must give. The configuration lists all of them.
 pub const OPEN: &str = "FILL_IN";
 
-/// Begin of a comment that names a doubt. `harvest check` lists them.
+/// Beginning of a comment on a finding that is not sure. `harvest check` lists these comments.
 pub const UNSURE: &str = "unsure:";
 
 /// Name, archive and findings from which a draft is made.

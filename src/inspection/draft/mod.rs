@@ -1,5 +1,5 @@
-//! Draft of a pipeline from the findings of an inspection: the YAML files of its folder, with a question
-//! in each place that no recording answers.
+//! Draft of a pipeline from the findings of an inspection: the YAML files of its folder, with an
+//! open question for each value that no recording contains.
 
 mod aircraft;
 mod classes;

@@ -78,8 +78,8 @@ fn row(condition: &str, class: &str, points: &[&MeasuredPoint], scales: Scales) 
 }
 
 impl Scales<'_> {
-    /// `true` for a derivative that multiplies nothing: its size depends on the choice of the axes,
-    /// not on the maneuver.
+    /// `true` for a derivative without a regressor: its size depends on the choice of the axes, not
+    /// on the maneuver.
     fn is_constant(&self, derivative: &str) -> bool {
         let mut derivatives = self.buildup.derivatives.iter();
         derivatives.any(|d| d.name == derivative && d.regressor == Regressor::Constant)

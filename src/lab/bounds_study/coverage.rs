@@ -20,8 +20,8 @@ pub struct MeasuredPoint {
 }
 
 impl MeasuredPoint {
-    /// Estimates a maneuver from many recordings. Returns also the problem of the first record whose
-    /// flight departs; such records are left out.
+    /// Estimates a maneuver from many recordings. Also returns the problem of the first record
+    /// whose flight departs; such records are left out.
     pub fn measure(
         maneuver: &StudyManeuver,
         count: usize,
