@@ -3,11 +3,11 @@
 //! # A sample's way from file to report
 //!
 //! 1. **File.** [`store::archive::find`] lists an archive as [`store::archive::FlightFiles`]. The
-//!    channel map of the [`config::Config`] gives each column as a [`flight::Channel`]: signal, unit
-//!    and sign.
+//!    channel map of the [`config::Config`] gives each column as a [`flight::Channel`]: signal,
+//!    unit and sign.
 //! 2. **Sample.** [`ingest::survey`] reads the time channels and gives every row a sample of a
-//!    [`ingest::Clock`]. An [`ingest::ChannelReader`] converts a column to its signal, repairs it, and
-//!    flags each sample with a [`flight::Mark`].
+//!    [`ingest::Clock`]. An [`ingest::ChannelReader`] converts a column to its signal, repairs it,
+//!    and flags each sample with a [`flight::Mark`].
 //! 3. **Record.** A [`flight::Record`] holds the signals of a flight on one clock.
 //!    [`ingest::compatibility`] estimates the errors of its instruments; a [`flight::Correction`]
 //!    removes them.
@@ -19,20 +19,20 @@
 //!    measured outputs.
 //! 6. **Estimate.** [`output_error::newton_raphson`] minimises the cost of the case to a
 //!    [`output_error::Fit`], and [`output_error::cramer_rao`] bounds it. In moving air
-//!    [`filter_error`] takes its place. [`estimate::maneuver`] returns
-//!    the rows [`tables::FitRow`] and [`tables::EstimateRow`].
+//!    [`filter_error`] replaces output error. [`estimate::maneuver`] returns the rows
+//!    [`tables::FitRow`] and [`tables::EstimateRow`].
 //! 7. **Model and trend.** [`model::model`] fuses the [`aero::WindTunnel`] and the estimates to the
 //!    posterior ([`tables::PosteriorRow`]); [`trend::trends`] fits the estimates of a derivative
-//!    across angle of attack ([`tables::TrendRow`]). [`compare::compare_posterior`] sets the posterior
-//!    against the tunnel ([`tables::ComparisonRow`]).
+//!    across angle of attack ([`tables::TrendRow`]). [`compare::compare_posterior`] sets the
+//!    posterior against the tunnel ([`tables::ComparisonRow`]).
 //! 8. **Report.** [`report::html`] makes the page of all results, [`pdf::pdf`] its PDF, and
 //!    [`night::run`] publishes both with the tables.
 //!
 //! [`pipeline`] runs the stages over flights and maneuvers; [`cli`] is the command line.
 //!
-//! The modules stand in order; a module uses only modules listed above it (`tests/stages/house.rs`).
-//! Public are those that tests and benchmarks use; in the others the compiler sees dead code.
-//! `make doc` documents all of them.
+//! The modules stand in order; a module uses only modules listed above it
+//! (`tests/stages/house.rs`). The modules that tests and benchmarks use are public; in the others
+//! the compiler finds dead code. `make doc` documents all of them.
 
 // Vocabulary: flights, aircraft, derivatives, tables.
 pub mod schema;

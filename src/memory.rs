@@ -1,19 +1,19 @@
-//! Memory that was given back stays with the process, so that the next maneuver need not ask the
-//! kernel for it again.
+//! Settings of the allocator: memory that is freed stays with the process, so that the next
+//! maneuver need not request it from the kernel again.
 //!
-//! A maneuver made ready is some two megabytes in vectors of a few hundred kilobytes. glibc returns
-//! such blocks at once and takes them anew, page by page, and on a virtual machine those faults
-//! cost more than what is computed in the pages: a quarter of an estimate. Only blocks up to
-//! [`LARGEST_KEPT`] are kept, and no more than [`MOST_KEPT`] at the end of the heap, so that a
-//! large flight's pages go back as before.
+//! A prepared maneuver takes some two megabytes in vectors of a few hundred kilobytes. By default
+//! glibc returns such blocks to the kernel at once and takes them anew, page by page. On a virtual
+//! machine these page faults cost a quarter of the time of an estimate. Only blocks up to
+//! [`LARGEST_KEPT`] are kept, and no more than [`MOST_KEPT`] at the end of the heap, so that the
+//! pages of a large flight are returned as before.
 
-/// Larger blocks, the buffers of the archive's files among them, are taken from the kernel and
-/// returned to it, bytes.
+/// Size above which blocks, such as the buffers of the archive's files, are taken from the kernel
+/// and returned to it, bytes.
 pub const LARGEST_KEPT: i32 = 1 << 20;
 /// Free bytes at the end of a heap beyond which it shrinks.
 pub const MOST_KEPT: i32 = 16 << 20;
 
-/// Tells the allocator; where it is not glibc nothing is to be told.
+/// Sets the limits of glibc's allocator; does nothing with another allocator.
 pub fn keep() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     #[expect(

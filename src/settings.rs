@@ -1,9 +1,9 @@
 //! Declaration of settings: field, default and explanation in one place.
 //!
-//! [`settings!`] makes four things of one declaration: the struct that stages read, its defaults,
-//! its parser and its [`Key`]s, from which `docs/settings.md` is made. A stage declares the keys
-//! that an analyst decides first, then those that stand under `expert:` in the YAML. The stage
-//! reads both as fields of one struct.
+//! From one declaration [`settings!`] makes the struct that stages read, its defaults, its parser
+//! and its [`Key`]s, from which `docs/settings.md` is made. A stage first declares the keys that an
+//! analyst decides, then those under `expert:` in the YAML. The stage reads both as fields of one
+//! struct.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -23,7 +23,7 @@ pub struct Key {
 }
 
 impl Key {
-    /// The path as the pages and messages write it: `ingest: expert: checks: block_s`.
+    /// The path as written in pages and messages: `ingest: expert: checks: block_s`.
     #[must_use]
     pub fn written(&self) -> String {
         self.path.join(": ")
@@ -63,7 +63,7 @@ impl<T: Setting> Setting for Option<T> {
     }
 }
 
-/// Keys of a field: its own, unless it is a group, and those below it.
+/// Keys of a field: its own key, unless it is a group, and the keys below it.
 #[must_use]
 pub fn keys_of<T: Setting>(
     path: &[&'static str],
@@ -110,7 +110,8 @@ pub fn element_default(attribute: &str) -> Option<String> {
     (attribute == "default").then(|| "none".to_owned())
 }
 
-/// A group whose keys stand in two places of a file: in sight, and under the stage's `expert:`.
+/// A group whose keys stand in two places of a file: outside `expert:`, and under the stage's
+/// `expert:`.
 pub trait SplitGroup: Sized {
     type InSight: DeserializeOwned + Default;
     type Expert: DeserializeOwned + Default;

@@ -1,5 +1,5 @@
-//! Errors of a wrong configuration: each test copies the shipped pipeline, spoils one thing and reads
-//! the error.
+//! Errors of a wrong configuration: each test copies the shipped pipeline, makes one thing wrong
+//! and reads the error.
 
 use approx::assert_relative_eq;
 use std::fs;
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Config, Overrides};
 
-/// A copy of the shipped pipeline that can be spoiled.
+/// A copy of the shipped pipeline, to be made wrong.
 struct Copy {
     folder: tempfile::TempDir,
 }

@@ -162,7 +162,7 @@ impl Scored {
     }
 }
 
-/// Damping after a step that gained this share of its prediction.
+/// Damping after a step, by the ratio of its gain to the predicted gain.
 fn next_damping(damping: f64, kept: f64) -> f64 {
     match kept {
         k if k > 0.75 && damping > FIRST_DAMPING => damping / 10.0,

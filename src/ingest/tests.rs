@@ -143,7 +143,7 @@ impl Flight {
         self.channels.get_mut(name).unwrap()
     }
 
-    /// Every channel noisy, each with noise of its own: rows that can be told from each other.
+    /// Every channel noisy, each with noise of its own, so that all rows differ.
     fn noisy() -> Flight {
         let mut flight = Flight::steady();
         let mut state = 1_u64;
@@ -671,7 +671,7 @@ fn reasons(ingested: &Ingested) -> Vec<&str> {
         .collect()
 }
 
-/// Signals alike to the bit, and all else.
+/// Asserts that signals are equal bit by bit, and everything else is equal.
 fn assert_same(a: &Ingested, b: &Ingested) {
     for (name, series) in &a.record.signals {
         let bits = |s: &Series| s.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();

@@ -68,7 +68,7 @@ pub struct Learnt {
     pub now_deviation: f64,
 }
 
-/// Flight or class that the rest of the campaign contradicts, and did not in the earlier night.
+/// Flight or class that the rest of the campaign contradicts, but did not in the earlier night.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Contradiction {
     /// Flight or class.
@@ -79,7 +79,7 @@ pub struct Contradiction {
     pub inside_95_pct: f64,
 }
 
-/// Error of an instrument that steps or drifts over the flights, and did not in the earlier night.
+/// Error of an instrument that steps or drifts over the flights, but did not in the earlier night.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct InstrumentChange {
     pub channel: String,
@@ -102,7 +102,7 @@ pub struct Changes {
     /// `true` if a value moved, vanished or changed, an instrument changed, the rest of the campaign
     /// contradicts a part, or the nights cannot be compared. New maneuvers alone are no alert.
     pub alert: bool,
-    /// Reason why the values of the two nights are not compared; `None` where they are.
+    /// Reason why the values of the two nights cannot be compared; `None` if they are.
     #[serde(default)]
     pub not_compared: Option<String>,
     /// Differences of flights, configuration and code.

@@ -17,7 +17,7 @@ pub struct Code {
     pub methods: BTreeMap<String, u32>,
 }
 
-/// Everything that decides the results of a night, or of its stages as far as one.
+/// Everything that decides the results of a night, or of its stages up to one.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Lineage {
     pub code: Code,
@@ -30,7 +30,7 @@ pub struct Lineage {
 }
 
 impl Lineage {
-    /// Lineage as far as a stage, without the parts that only later stages read.
+    /// Lineage up to a stage, without the parts that only later stages read.
     #[must_use]
     pub fn until(&self, stage: Stage) -> Lineage {
         let mut part = self.clone();
@@ -43,7 +43,7 @@ impl Lineage {
     }
 }
 
-/// Stage of a method. Joint estimates and predictions belong to `estimate`.
+/// Stage to which a method belongs. Joint estimates and predictions belong to `estimate`.
 pub(super) fn method_stage(method: &str) -> Stage {
     Stage::from_word(method).unwrap_or(Stage::Estimate)
 }

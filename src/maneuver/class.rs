@@ -77,8 +77,8 @@ fn an_octave() -> f64 {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recognition {
-    /// Flag signal → true where it is up for most of the maneuver. It raises or lowers the confidence,
-    /// and decides only between classes that differ in nothing else that is recorded.
+    /// Flag signal → true if it is up for most of the maneuver. Flags raise or lower the
+    /// confidence. They decide only between classes that differ in nothing else that is recorded.
     #[serde(default)]
     pub flags: BTreeMap<String, bool>,
     /// Signal → number of its steps. A signal without an entry may step any number of times.
@@ -120,12 +120,12 @@ impl Recognition {
             .collect()
     }
 
-    /// The signals of its conditions and flags.
+    /// Signals in its conditions and flags.
     pub fn signals(&self) -> impl Iterator<Item = &str> {
         self.counted().chain(self.flags.keys()).map(String::as_str)
     }
 
-    /// The signals that need a smallest step: those of all conditions.
+    /// Signals for which a smallest step must be configured: those of all conditions.
     pub fn counted(&self) -> impl Iterator<Item = &String> {
         self.steps
             .keys()
@@ -179,8 +179,8 @@ impl Class {
             .copied()
     }
 
-    /// The class with the overrides at a mean angle of attack applied and none left: for maneuvers
-    /// that are estimated together.
+    /// The class with the overrides at a mean angle of attack applied, for maneuvers that are
+    /// estimated together.
     #[must_use]
     pub fn at(&self, alpha_deg: f64) -> Class {
         let mut class = self.clone();
@@ -206,8 +206,8 @@ impl Class {
         class
     }
 
-    /// Leaves out the derivatives that the class holds: without a wind tunnel there is no value to
-    /// hold them at. Returns their number.
+    /// Removes the status `held` from all derivatives: without a wind tunnel there is no value at
+    /// which to hold them. Returns the number of removed statuses.
     pub fn hold_nothing(&mut self) -> usize {
         let overrides = self.overrides.iter_mut().map(|o| &mut o.statuses);
         let statuses = std::iter::once(&mut self.statuses).chain(overrides);

@@ -190,8 +190,8 @@ table! {
 }
 
 impl Maneuver {
-    /// Condition at which the tunnel is read for this maneuver: its means. A third variable that is
-    /// no mean of a maneuver has the tunnel's own value.
+    /// Condition at which the tunnel is read for this maneuver: its means. If the tunnel's third
+    /// variable is no mean of a maneuver, it has the value in the tunnel's settings.
     #[must_use]
     pub fn condition(&self, tunnel: &WindTunnel) -> Condition {
         let third = tunnel.settings().third.as_ref().map(|third| {

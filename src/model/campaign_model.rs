@@ -18,10 +18,11 @@ pub struct Model {
 pub enum Failure {
     /// An estimate, or a covariance, is not finite.
     NotFinite,
-    /// The grids of its derivatives have this many points, more than [`MOST_POINTS`].
+    /// The grids of its derivatives have this number of points, more than [`MOST_POINTS`].
     TooManyPoints(usize),
 }
 
-/// Most points of a coefficient's grids: time grows with their cube and memory with their square, 2,000
-/// points take some seconds and 32 MB a matrix. The largest published tables have some hundred.
+/// Largest number of points of a coefficient's grids. Time grows with their cube and memory with
+/// their square: 2,000 points take some seconds and 32 MB a matrix. The largest published tables
+/// have some hundred.
 pub const MOST_POINTS: usize = 2000;

@@ -1,4 +1,4 @@
-//! Posterior of one coefficient: evidence to scales, weights and a Gaussian.
+//! Posterior of one coefficient, in steps: evidence, scales, weights, Gaussian.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,10 +18,10 @@ use super::unknowns::Unknowns;
 use crate::aero::WindTunnel;
 use crate::numerics::root::EXACT;
 
-/// Reweightings: weights follow from scales, and scales from weights.
+/// Number of reweightings: weights follow from scales, and scales from weights.
 const REWEIGHTINGS: usize = 2;
 
-/// Share of the largest variance below which the check of classes leaves directions out.
+/// Share of the largest variance below which the comparison of classes ignores a direction.
 const CHECKED_VARIANCE: f64 = 1e-6;
 
 /// Posterior of one coefficient.
@@ -32,14 +32,14 @@ pub struct CoefficientPosterior {
     pub scales: Vec<Scale>,
     /// Scales before their last step: those of the noise between the points of the grids.
     pub noise_scales: Vec<Scale>,
-    /// With the spread over the scales that the data leave open.
+    /// Posterior, including the spread over the scales that the data leave open.
     pub gaussian: Gaussian,
-    /// Weight of each maneuver that takes part, by its place in the evidence.
+    /// Weight of each maneuver that takes part, by its index in the evidence.
     pub weights: BTreeMap<usize, f64>,
-    /// Terms that each maneuver estimates, by its place in the evidence.
+    /// Terms that each maneuver estimates, by its index in the evidence.
     pub estimated: BTreeMap<usize, Vec<usize>>,
-    /// Differences from the tunnel of the values that a maneuver holds, by the posterior of the other flights.
-    /// The key is the maneuver's id.
+    /// Differences from the tunnel of the values that a maneuver holds, by the posterior of the
+    /// other flights. The key is the maneuver's id.
     pub held: BTreeMap<String, HeldDifferences>,
     /// Agreement of each flight with the others.
     pub flights: BTreeMap<String, Agreement>,
@@ -48,7 +48,7 @@ pub struct CoefficientPosterior {
 }
 
 impl CoefficientPosterior {
-    /// Posterior of a coefficient from its terms; `None` where the evidence is not finite.
+    /// Posterior of a coefficient from its terms; `None` if the evidence is not finite.
     #[must_use]
     pub fn of(
         terms: Vec<Term>,
@@ -89,7 +89,7 @@ pub struct Data {
     flight_ids: Vec<String>,
     /// Class and observation of each maneuver that takes part.
     observations: Vec<(usize, Observation)>,
-    /// Maneuvers of each flight: place in the evidence, and among the observations.
+    /// Maneuvers of each flight: index in the evidence, and index among the observations.
     places: Vec<Vec<(usize, usize)>>,
     estimated: BTreeMap<usize, Vec<usize>>,
 }
@@ -101,8 +101,9 @@ impl Data {
         Data::with_planned(terms, evidence, &[], basis).0
     }
 
-    /// As [`Data::new`], with the observation that each planned maneuver will make. Their classes, and
-    /// the delays that they share with the campaign, are among the unknowns; they are no evidence.
+    /// Evidence as in [`Data::new`], with the observation that each planned maneuver will make. The
+    /// classes of the planned maneuvers, and the delays that they share with the campaign, are
+    /// among the unknowns; the planned maneuvers are no evidence.
     #[must_use]
     pub fn with_planned(
         terms: &[Term],
@@ -148,15 +149,15 @@ impl Data {
         (data, planned)
     }
 
-    /// Sets the noise to the maneuvers' own and what lies between the points of the grids.
+    /// Sets the noise of each maneuver to its own plus the noise between the points of the grids.
     pub fn set_between(&mut self, terms: &[Term], scales: &[Scale]) {
         for (flight, own) in self.flights.iter_mut().zip(&self.places) {
             flight.set_between(&observed(own, &self.observations), terms, scales);
         }
     }
 
-    /// Most probable scales, from a start, and the Gaussian that they give; before them the data that the
-    /// scales are of.
+    /// Most probable scales, from a start, and the Gaussian for them. Before them, the data with
+    /// the noise for the scales of the start.
     fn fit(
         &mut self,
         terms: &[Term],
@@ -172,7 +173,8 @@ impl Data {
         Some((touched, scales, gaussian))
     }
 
-    /// Differences of what each maneuver holds, by the flights other than its own.
+    /// Differences from the tunnel of the values that each maneuver holds, by the posterior of the
+    /// other flights.
     fn held(
         &self,
         posterior: &Posterior,
@@ -232,7 +234,7 @@ impl Data {
     }
 }
 
-/// Maneuvers of a flight from their places in the evidence and among the observations.
+/// Maneuvers of a flight, from their indices in the evidence and among the observations.
 fn observed<'o>(
     places: &[(usize, usize)],
     observations: &'o [(usize, Observation)],

@@ -1,4 +1,4 @@
-//! Results of a maneuver, as the posterior takes them.
+//! Results of a maneuver, in the form that the posterior reads.
 
 use crate::estimate::Covariance;
 use crate::maneuver::Maneuver;

@@ -14,14 +14,14 @@ use crate::output_error::error_effect::SharedError;
 /// Evidence of a flight: y = A z + K u + e.
 #[derive(Clone, Debug)]
 pub struct FlightData {
-    /// Place of each maneuver in the evidence, and its rows.
+    /// Index of each maneuver in the evidence, and its rows.
     pub maneuvers: Vec<(usize, Range<usize>)>,
     /// y.
     pub differences: DVector<f64>,
     /// A.
     pub rows: Vec<SparseRow>,
-    /// Covariance of e, maneuver by maneuver; with what lies between the points of the grids once it is
-    /// set.
+    /// Covariance of e, maneuver by maneuver. Once set, it includes the noise between the points of
+    /// the grids.
     noise: Vec<DMatrix<f64>>,
     /// K Kᵀ.
     calibration: DMatrix<f64>,
@@ -44,7 +44,7 @@ impl Information {
     }
 }
 
-/// Evidence of one maneuver: place in the evidence, class, and observation.
+/// Evidence of one maneuver: index in the evidence, class, and observation.
 pub type Observed<'a> = (usize, usize, &'a Observation);
 
 impl FlightData {
@@ -82,7 +82,7 @@ impl FlightData {
         data
     }
 
-    /// Sets each maneuver's noise to its own and what lies between the points of the grids.
+    /// Sets each maneuver's noise to its own plus the noise between the points of the grids.
     pub fn set_between(&mut self, observed: &[Observed], terms: &[Term], scales: &[Scale]) {
         for (noise, (_, _, observation)) in self.noise.iter_mut().zip(observed) {
             let Observation {
@@ -121,7 +121,8 @@ impl FlightData {
         }
     }
 
-    /// Covariance of what no other maneuver shares, of the maneuver at a place in this flight.
+    /// Covariance of the errors that no other maneuver shares, of the maneuver at an index in this
+    /// flight.
     #[must_use]
     pub fn noise(&self, maneuver: usize) -> &DMatrix<f64> {
         &self.noise[maneuver]
@@ -165,7 +166,7 @@ impl FlightData {
         Cholesky::new(self.covariance(weights))
     }
 
-    /// Unknowns that the flight's rows touch, ascending.
+    /// Unknowns on which the flight's rows depend, ascending.
     fn active(&self) -> Vec<usize> {
         let touched = self.rows.iter().flatten().map(|(place, _)| *place);
         touched.collect::<BTreeSet<_>>().into_iter().collect()
@@ -195,7 +196,7 @@ impl FlightData {
         columns
     }
 
-    /// A m and A P Aᵀ of a vector and a covariance of the unknowns.
+    /// A m and A P Aᵀ of a mean m and a covariance P of the unknowns.
     #[must_use]
     pub fn image(
         &self,

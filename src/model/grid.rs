@@ -1,10 +1,10 @@
-//! Grid of flight conditions. A quantity is known at its points and is linear between them.
+//! Grid of flight conditions. A quantity has values at its points and is linear between them.
 
 use crate::aero::Condition;
 use crate::aero::wind_tunnel::each_or_none;
 
-/// Points over angle of attack, Mach number and third variable. A variable without points does not
-/// matter.
+/// Points over angle of attack, Mach number and third variable. The quantity does not depend on a
+/// variable without points.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Grid {
     /// Ascending, deg.
@@ -64,8 +64,8 @@ impl Grid {
         nodes
     }
 
-    /// Shares of the points in a value at a condition; a condition beyond the grid has those at its
-    /// edge.
+    /// Weights of the points for the value at a condition. A condition beyond the grid has the
+    /// weights at the edge.
     #[must_use]
     pub fn shares(&self, at: &Condition) -> Vec<(usize, f64)> {
         let third = either_side(&self.thirds, at.third.unwrap_or(f64::NAN));
@@ -87,7 +87,7 @@ impl Grid {
     }
 }
 
-/// Points on either side of a value with their shares.
+/// Points on either side of a value, with their weights.
 fn either_side(points: &[f64], value: f64) -> Vec<(usize, f64)> {
     let last = points.len().saturating_sub(1);
     let above = points.partition_point(|p| *p < value);
@@ -102,7 +102,7 @@ fn either_side(points: &[f64], value: f64) -> Vec<(usize, f64)> {
     vec![(above - 1, 1.0 - share), (above, share)]
 }
 
-/// Ascending points, each once, with further ones between so that no gap exceeds `widest`.
+/// Ascending points, each once, with added ones so that no gap exceeds `widest`.
 #[must_use]
 pub fn refined(points: impl IntoIterator<Item = f64>, widest: f64) -> Vec<f64> {
     let mut points: Vec<f64> = points.into_iter().collect();

@@ -1,4 +1,5 @@
-//! Differences from the tunnel of what a maneuver holds, as the other flights have them.
+//! Differences from the tunnel of the values that a maneuver holds, by the posterior of the other
+//! flights.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -37,8 +38,8 @@ impl Evidence<'_> {
         })
     }
 
-    /// Differences of what the maneuver holds, by the other flights; `None` where it holds nothing of
-    /// the coefficient.
+    /// Differences from the tunnel of the values that the maneuver holds, by the other flights;
+    /// `None` if it holds nothing of the coefficient.
     #[must_use]
     pub fn held_differences(
         &self,

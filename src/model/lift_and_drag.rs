@@ -4,17 +4,17 @@
 //! C_L = C_N cos α − C_A sin α        C_D = C_N sin α + C_A cos α
 //! ```
 //!
-//! at the maneuver's mean flight condition, and their slopes along each regressor. Along α the axes turn
-//! as well: ∂C_L/∂α has −C_D, ∂C_D/∂α has C_L, per rad. All are weighted sums of the derivatives. With p
-//! those that were estimated, of covariance Σ, and h those that were held, in error by f of covariance C,
-//! the errors are G f + e and −f, so a sum has the variance
+//! at the maneuver's mean flight condition, and their slopes along each regressor. Along α the axes
+//! turn as well: ∂C_L/∂α has −C_D, ∂C_D/∂α has C_L, per rad. All are weighted sums of the
+//! derivatives. Let p be the estimated derivatives, with covariance Σ, and h the held ones. The
+//! held values have the error f of covariance C. The errors of p and h are G f + e and −f, so a sum
+//! has the variance
 //!
 //! ```text
 //! w_p' Σ w_p − 2 w_p' G C w_h + w_h' C w_h
 //! ```
 //!
-//! What the maneuver holds counts with the tunnel's uncertainty, or with the posterior's of the other
-//! flights.
+//! Held values have the tunnel's uncertainty, or that of the posterior of the other flights.
 
 use nalgebra::{DMatrix, DVector, Matrix2, RowDVector};
 
@@ -53,16 +53,16 @@ struct HeldErrors {
     names: Vec<String>,
     /// G.
     gains: DMatrix<f64>,
-    /// Covariance that the maneuver's corrected one assumes.
+    /// Covariance of held values that the maneuver's corrected covariance contains.
     assumed: DMatrix<f64>,
     /// C.
     covariance: DMatrix<f64>,
 }
 
 impl Model {
-    /// Lift and drag of a longitudinal maneuver whose normal and axial force are estimated, and their
-    /// slopes along the regressors; empty for others. Derivatives that are held are the posterior's of
-    /// the other flights, or the tunnel's.
+    /// Lift and drag of a longitudinal maneuver whose normal and axial force are estimated, and
+    /// their slopes along the regressors; empty for others. Held derivatives have the values of the
+    /// posterior of the other flights, or of the tunnel.
     #[must_use]
     pub fn lift_and_drag(&self, flown: &Flown, held_by_posterior: bool) -> Vec<LiftAndDragRow> {
         let derivatives = flown.derivatives();
@@ -112,7 +112,7 @@ impl Flown<'_> {
         row.is_some_and(|row| row.status == Status::Estimated && row.value.is_some())
     }
 
-    /// Value of a derivative; one that is inactive acts with the tunnel's.
+    /// Value of a derivative; an inactive one has the tunnel's value.
     fn value(&self, derivative: &Derivative) -> f64 {
         let row = self.estimate(derivative);
         row.and_then(|row| row.value.or(row.wind_tunnel))
@@ -244,7 +244,7 @@ impl HeldErrors {
         }
     }
 
-    /// Takes the covariance that the other flights give.
+    /// Replaces the tunnel's covariance by that of the other flights.
     fn take_posterior(&mut self, model: &Model, maneuver_id: &str) {
         for (_, coefficient) in &model.coefficients {
             let Some(known) = coefficient.held.get(maneuver_id) else {
@@ -263,7 +263,7 @@ impl HeldErrors {
     }
 }
 
-/// Regressors of the derivatives that are neither constant nor composed, each once.
+/// Regressors, each once, that are neither constant nor composed of others.
 fn leaves<'a>(derivatives: &[&'a Derivative]) -> Vec<&'a Regressor> {
     let mut leaves: Vec<&Regressor> = Vec::new();
     for leaf in derivatives.iter().flat_map(|d| d.regressor.leaves()) {

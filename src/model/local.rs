@@ -108,8 +108,8 @@ impl CoefficientPosterior {
     }
 }
 
-/// Weights of the grid's points in the value of a term, or in its slope along Mach number; `None` for
-/// the slope of a table without Mach.
+/// Weights of the grid's points in the value of a term, or in its slope along Mach number; `None`
+/// for the slope of a table without Mach.
 pub fn local_shares(term: &Term, condition: &Condition, is_mach_slope: bool) -> Option<SparseRow> {
     let grid = &term.prior.grid;
     if !is_mach_slope {

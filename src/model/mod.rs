@@ -1,12 +1,12 @@
-//! Model: the campaign as one answer. The posterior of every derivative over the flight condition, from
-//! the tunnel as prior and the maneuvers as evidence.
+//! Model: one posterior of every derivative over the flight condition for the whole campaign. The
+//! tunnel is the prior, and the maneuvers are the evidence.
 //!
-//! Each coefficient is one Gaussian problem. Its unknowns are the differences of its derivatives from
-//! the tunnel at the points of a grid ([`prior`]), linear between them. A maneuver is evidence
-//! with its whole corrected covariance, the exact effect of what it held, and the calibration errors
-//! that it shares with its flight ([`observation`]). Sizes and lengths of the differences are the most
-//! probable ones ([`scales`]), and what the data leave open of them is in the covariance
-//! ([`open_scales`]). A maneuver that the others contradict weighs less ([`posterior`]).
+//! Each coefficient is one Gaussian problem. Its unknowns are the differences of its derivatives
+//! from the tunnel at the points of a grid ([`prior`]), linear between them. A maneuver is evidence
+//! with its whole corrected covariance, the exact effect of its held values, and the calibration
+//! errors that it shares with its flight ([`observation`]). Sizes and lengths of the differences
+//! are the most probable ones ([`scales`]); their remaining uncertainty is added to the covariance
+//! ([`open_scales`]). A maneuver that the others contradict has a lower weight ([`posterior`]).
 
 mod settings;
 mod evidence;

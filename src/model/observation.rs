@@ -1,13 +1,14 @@
-//! Evidence of a maneuver about a coefficient: differences of its estimates from the tunnel, as linear
-//! functions of the coefficient's unknown differences and of errors that maneuvers share.
+//! Evidence of a maneuver about a coefficient: differences of its estimates from the tunnel, as
+//! linear functions of the coefficient's unknown differences and of errors that maneuvers share.
 //!
-//! With f the differences at the maneuver's condition, an estimate is off the tunnel by
+//! With f the differences at the maneuver's condition, an estimate differs from the tunnel by
 //!
 //! y = (S + G) f + K u + e,
 //!
-//! where S picks the estimated derivatives, G is the change of the estimates with what they hold, K u
-//! the effect of calibration errors, and e has the rest of the corrected covariance. Nuisances of the
-//! maneuver are marginalised by taking the rows and columns of its estimates alone.
+//! where S selects the estimated derivatives, G is the change of the estimates with the held
+//! values, K u the effect of calibration errors, and e has the rest of the corrected covariance.
+//! Nuisance parameters of the maneuver are marginalised: only the rows and columns of its estimates
+//! of this coefficient are used.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -25,22 +26,22 @@ const LEAST_EIGENVALUE: f64 = 1e-6;
 #[derive(Clone, Debug)]
 pub struct Observation {
     pub condition: Condition,
-    /// Place of each row's term.
+    /// Index of each row's term.
     pub terms: Vec<usize>,
     /// Estimates less the tunnel's values.
     pub differences: DVector<f64>,
     /// S + G: one row per estimate, one column per term.
     pub design: DMatrix<f64>,
-    /// Covariance of what no other maneuver shares.
+    /// Covariance of the errors that no other maneuver shares.
     pub noise: DMatrix<f64>,
     /// Changes of the rows by one standard deviation of each calibration error.
     pub calibration: Vec<(SharedError, DVector<f64>)>,
 }
 
-/// One row of an observation: an estimate, or the sum that stands for a constant.
+/// One row of an observation: an estimate, or the sum that replaces a constant.
 struct Row {
     term: usize,
-    /// Weights of the maneuver's parameters in it.
+    /// Weights of the maneuver's parameters in the row.
     of_parameters: Vec<(usize, f64)>,
     /// Estimate less the tunnel's value.
     difference: f64,
@@ -106,7 +107,7 @@ impl Evidence<'_> {
         })
     }
 
-    /// Place among the parameters and value of an estimated derivative.
+    /// Index among the parameters, and value, of an estimated derivative.
     fn estimated(&self, name: &str) -> Option<(usize, f64)> {
         let place = self.covariance.names.iter().position(|n| n == name)?;
         let row = self.estimates.iter().find(|e| e.derivative == name)?;
@@ -174,7 +175,7 @@ impl Evidence<'_> {
         }
     }
 
-    /// Corrected covariance of the rows without the effects that are modelled.
+    /// Corrected covariance of the rows without the effects that are modelled separately.
     fn noise<'e>(
         &self,
         of_rows: &DMatrix<f64>,

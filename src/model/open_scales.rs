@@ -1,10 +1,10 @@
-//! Spread of the posterior's mean over the scales that the data leave open.
+//! Spread of the posterior's mean over the scales that the data leave uncertain.
 //!
 //! Sizes and lengths are the most probable ones, θ. With H the second derivatives of −log of their
-//! posterior and H = V Λ Vᵀ, the mean m is computed at θ ± √3 v/√λ for each direction v. The three values
-//! have the weights 1/6, 2/3, 1/6 of Gauss and Hermite's rule. The published mean is that of θ, so their
-//! mean square about it is added to the covariance. Where the data say nothing the mean does not depend on
-//! the scales, and the tunnel's uncertainty stays as stated.
+//! posterior and H = V Λ Vᵀ, the mean m is computed at θ ± √3 v/√λ for each direction v. The three
+//! values have the weights 1/6, 2/3, 1/6 of the Gauss-Hermite rule. The published mean is that of
+//! θ, so their mean square about it is added to the covariance. In conditions without data the mean
+//! does not depend on the scales, and the tunnel's uncertainty stays as stated.
 
 use nalgebra::DVector;
 
@@ -19,8 +19,8 @@ const LEAST_CURVATURE: f64 = 1.5;
 /// Weight of the outer points.
 const OUTER: f64 = 1.0 / 6.0;
 
-/// Adds the spread to the covariance of a Gaussian at the most probable scales. A direction in which
-/// the posterior cannot be computed adds nothing.
+/// Adds the spread to the covariance of a Gaussian at the most probable scales. A direction in
+/// which the posterior cannot be computed is skipped.
 pub fn add_open_scales(touched: &Touched, scales: &[Scale], whole: &mut Gaussian) {
     let at = logarithms_of(scales);
     let mean = |logarithms: &DVector<f64>| touched.mean(&scales_of(logarithms), LEAST_VARIANCE);

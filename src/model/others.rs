@@ -9,7 +9,7 @@ use super::flight_data::FlightData;
 use super::posterior::Gaussian;
 use super::unknowns::{SparseRow, between, sum};
 
-/// The other flights, seen from one flight.
+/// Posterior of the other flights, from the point of view of one flight.
 pub struct Others<'a> {
     whole: &'a Gaussian,
     own: Option<OwnRows<'a>>,

@@ -1,13 +1,13 @@
-//! Outlook: covariance of the posterior as planned maneuvers will find it.
+//! Outlook: covariance of the posterior after planned maneuvers.
 //!
-//! The covariance of a Gaussian posterior follows from the design and the noise of its data, not from
-//! their values. An [`Outlook`] has all that planned maneuvers need for their part: with A the rows of
-//! their estimates over the unknowns, K the effects of the calibration errors of their common flight, B
-//! the rows of the quantities asked for, and P the posterior's covariance, it has the covariance of
-//! (A z + K u, B z). A maneuver then observes its rows of A z + K u with its own noise.
+//! The covariance of a Gaussian posterior follows from the design and the noise of its data, not
+//! from their values. With A the rows of the planned estimates over the unknowns, K the effects of
+//! the calibration errors of their common flight, B the rows of the quantities of interest, and P
+//! the posterior's covariance, an [`Outlook`] holds the covariance of (A z + K u, B z). A maneuver
+//! then observes its rows of A z + K u with its own noise.
 //!
-//! Scales and weights stay those of the posterior; its spread over open scales is in P. The values of the
-//! evidence do not matter, so it may have been read with other held values.
+//! Scales and weights remain those of the posterior; its spread over uncertain scales is in P. The
+//! values of the evidence have no effect, so it may have been computed with other held values.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -34,7 +34,7 @@ pub struct Point {
     pub condition: Condition,
 }
 
-/// Quantity whose variance is asked for.
+/// Quantity whose variance is needed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PointQuantity {
     /// A derivative, or sum of derivatives, as published.
@@ -44,7 +44,8 @@ pub enum PointQuantity {
     Combination(Vec<(LocalValue, f64)>),
 }
 
-/// Rows of a planned maneuver's estimates, with the covariance of what no other maneuver shares.
+/// Rows of a planned maneuver's estimates, with the covariance of the errors that no other maneuver
+/// shares.
 #[derive(Clone, Debug)]
 pub struct PlannedRows {
     pub rows: Range<usize>,
@@ -59,7 +60,7 @@ pub struct Outlook {
     /// In the order of the planned maneuvers; `None` for one that estimates nothing of the
     /// coefficient.
     pub planned: Vec<Option<PlannedRows>>,
-    /// Place among the points asked for, and row, of each point that the coefficient has a part in.
+    /// Index among the requested points, and row, of each point that depends on the coefficient.
     pub points: Vec<(usize, usize)>,
 }
 
@@ -151,8 +152,8 @@ impl CoefficientPosterior {
         })
     }
 
-    /// Covariance of the unknowns of data with planned maneuvers. That of the differences has the
-    /// posterior's spread over open scales, which is what it has beyond the covariance at its scales.
+    /// Covariance of the unknowns of the data, planned maneuvers included. For the differences the
+    /// spread of the posterior over uncertain scales is added.
     fn covariance(&self, data: &Data, maneuvers: usize) -> Option<DMatrix<f64>> {
         let mut weights = vec![1.0; maneuvers];
         for (place, weight) in &self.weights {
@@ -172,13 +173,15 @@ impl CoefficientPosterior {
         Some(covariance)
     }
 
-    /// Covariance of what no other maneuver shares, with what lies between the points of the grids.
+    /// Covariance of the errors that no other maneuver shares, with the noise between the points of
+    /// the grids.
     fn noise(&self, observation: &Observation) -> DMatrix<f64> {
         let (design, at) = (&observation.design, &observation.condition);
         &observation.noise + between_points(&self.terms, &self.noise_scales, design, at)
     }
 
-    /// Row of a point over the unknowns; `None` for one that the coefficient has no part in.
+    /// Row of a point over the unknowns; `None` for a point that does not depend on the
+    /// coefficient.
     fn row(&self, point: &Point, unknowns: &Unknowns) -> Option<SparseRow> {
         match &point.quantity {
             PointQuantity::Published(name) => self.published_row(name, &point.condition, unknowns),
@@ -212,7 +215,7 @@ impl CoefficientPosterior {
         Some(of_term(term, 1.0).chain(of_slope).collect())
     }
 
-    /// Row of the coefficient's part in a combination; `None` without one.
+    /// Row of the coefficient's part in a combination; `None` if it has none.
     fn combined_row(
         &self,
         values: &[(LocalValue, f64)],

@@ -12,8 +12,8 @@ use crate::numerics::root::{BlockRoot, EXACT};
 use crate::numerics::symmetric::square;
 use crate::numerics::triangular::{cholesky, solve_lower};
 
-/// Share of the information that rounding may hide: data a million times as sure as the prior stay
-/// positive definite.
+/// Share of the information that may be lost by rounding: with data a million times more accurate
+/// than the prior, matrices stay positive definite.
 const ROUNDING: f64 = 1e-13;
 
 /// Gaussian of all unknowns of a coefficient.
@@ -110,18 +110,19 @@ pub fn of_differences(information: &Information, unknowns: &Unknowns) -> Option<
     })
 }
 
-/// Prediction of rows that were left out: what was observed less what the others predict, with the
-/// covariance of that difference.
+/// Prediction of rows that were left out: the observed value less the prediction from the others,
+/// with the covariance of that difference.
 #[derive(Clone, Debug)]
 pub struct LeftOut {
     pub differences: DVector<f64>,
     pub covariance: DMatrix<f64>,
 }
 
-/// Predictions of a flight's rows without them, in closed form.
+/// Predictions of a flight's rows without these rows, in closed form.
 ///
-/// With F = A P Aᵀ of the whole posterior and r = y − A m, the rows left out have the precision
-/// V⁻¹ = Σ⁻¹ − Σ⁻¹ F Σ⁻¹ and the difference V Σ⁻¹ r; a part of them likewise from the part of V⁻¹.
+/// With F = A P Aᵀ of the whole posterior and r = y − A m, the rows left out have the precision V⁻¹
+/// = Σ⁻¹ − Σ⁻¹ F Σ⁻¹ and the difference V Σ⁻¹ r. For some of the flight's rows the same holds with
+/// their part of V⁻¹.
 #[derive(Clone, Debug)]
 pub struct LeavingOut {
     /// V⁻¹.
@@ -131,7 +132,7 @@ pub struct LeavingOut {
 }
 
 impl LeavingOut {
-    /// Predictions of a flight's rows; `None` where their covariance is not positive definite.
+    /// Predictions of a flight's rows; `None` unless their covariance is positive definite.
     #[must_use]
     pub fn new(flight: &FlightData, weights: &[f64], whole: &Gaussian) -> Option<LeavingOut> {
         let (predicted, spread) = flight.image(&whole.mean, &whole.covariance);
@@ -142,13 +143,13 @@ impl LeavingOut {
         })
     }
 
-    /// The flight as the other flights predict it.
+    /// The flight, predicted from the other flights.
     #[must_use]
     pub fn flight(&self) -> Option<LeftOut> {
         self.rows(&(0..self.weighted.len()))
     }
 
-    /// Some rows as all others predict them.
+    /// Some rows, predicted from all others.
     #[must_use]
     pub fn rows(&self, rows: &Range<usize>) -> Option<LeftOut> {
         let own = (rows.start, rows.start);
@@ -161,9 +162,11 @@ impl LeavingOut {
     }
 }
 
-/// Weights of the maneuvers by Student's t: a maneuver far from what all others predict weighs less.
+/// Weights of the maneuvers by Student's t: a maneuver far from its prediction by all others has a
+/// lower weight.
 ///
-/// Each is judged at its full weight: V of the prediction less the noise that its weight added.
+/// Each is compared at its full weight: with V of the prediction less the noise that its weight
+/// added.
 #[must_use]
 pub fn reweighted(
     flights: &[FlightData],

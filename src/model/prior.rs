@@ -74,8 +74,8 @@ impl Prior {
         }
     }
 
-    /// Variance of what lies between the points of the grid: of the difference at a condition about the
-    /// straight line through its neighbours.
+    /// Variance of the difference at a condition about the straight line between the neighbouring
+    /// points of the grid.
     #[must_use]
     pub fn between(&self, scale: &Scale, at: &Condition) -> f64 {
         let shares = self.grid.shares(at);

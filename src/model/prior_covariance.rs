@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 
 use super::scale_prior::Scale;
 
-/// Share of the offset beside the part that fades over α.
+/// Share of the offset, relative to the part that fades over α.
 const OFFSET: f64 = 0.25;
 
 /// Covariance between two lists of points.
@@ -19,8 +19,8 @@ pub struct PriorCovariance {
     pub across: DMatrix<f64>,
 }
 
-/// Covariance of a scale with its derivatives by the logarithm of the length. By that of the size they are
-/// two times the same.
+/// Covariance of a scale with its derivatives by the logarithm of the length. The derivatives by
+/// the logarithm of the size are twice the same matrices.
 #[derive(Clone, Debug)]
 pub struct Slopes {
     pub value: DMatrix<f64>,

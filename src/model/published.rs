@@ -1,4 +1,4 @@
-//! Quantities of a coefficient's posterior that are published: its terms, and the constants of sums.
+//! Published quantities of a coefficient's posterior: its terms, and the constants of sums.
 
 use nalgebra::DVector;
 
@@ -14,9 +14,9 @@ pub struct PublishedDerivative {
     pub name: String,
     pub unit: &'static str,
     pub nodes: Vec<Node>,
-    /// Term whose grid it has.
+    /// Index of the term whose grid it has.
     pub term: usize,
-    /// Tunnel's values; zero where it has none.
+    /// Tunnel's values; zero at points without one.
     pub tunnel: Vec<f64>,
     pub has_tunnel: bool,
     /// Weights of the differences, point by point.
@@ -24,7 +24,7 @@ pub struct PublishedDerivative {
 }
 
 impl CoefficientPosterior {
-    /// Published quantities: each term, and after a sum its constant.
+    /// Published quantities: each term; for a sum, its constant as well.
     #[must_use]
     pub fn quantities(&self) -> Vec<PublishedDerivative> {
         let mut quantities = Vec::new();

@@ -1,5 +1,4 @@
-//! Size and length of a derivative's difference from the tunnel, and what is known of them before
-//! flight: both are lognormal.
+//! Prior of the size and length of a derivative's difference from the tunnel: both are lognormal.
 
 use crate::tables::Knowledge;
 

@@ -1,17 +1,18 @@
 //! Sizes and lengths of the differences, by the marginal likelihood.
 //!
-//! With Λ and η the normal equations of the differences, whose other unknowns are marginalised, and C
-//! = R Rᵀ their prior covariance, the log marginal likelihood is, but for a constant,
+//! With Λ and η the normal equations of the differences, whose other unknowns are marginalised, and
+//! C = R Rᵀ their prior covariance, the log marginal likelihood is, but for a constant,
 //!
 //! −½ log |B| + ½ ηᵀ P η,  B = I + Rᵀ Λ R,  P = R B⁻¹ Rᵀ.
 //!
-//! With a = η − Λ P η, M = Λ − Λ P Λ and subscripts for derivatives by logarithms of scales, f = −log of it has
+//! With a = η − Λ P η, M = Λ − Λ P Λ and subscripts for derivatives by logarithms of scales, f =
+//! −log of it has
 //!
-//! f_i = ½ tr(M C_i) − ½ aᵀ C_i a,
-//! f_ij = −½ tr(M C_i M C_j) + aᵀ C_i M C_j a + ½ tr(M C_ij) − ½ aᵀ C_ij a,
+//! f_i = ½ tr(M C_i) − ½ aᵀ C_i a, f_ij = −½ tr(M C_i M C_j) + aᵀ C_i M C_j a + ½ tr(M C_ij) − ½ aᵀ
+//! C_ij a,
 //!
-//! since M_j = −M C_j M and a_j = −M C_j a. Of data that the scales predict, a aᵀ is M in the mean, and f_ij is
-//! ½ tr(M C_i M C_j), which is never negative.
+//! since M_j = −M C_j M and a_j = −M C_j a. For data that the scales predict, the mean of a aᵀ is
+//! M, and that of f_ij is ½ tr(M C_i M C_j), which is never negative.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -20,8 +21,8 @@ use super::term::Term;
 use super::touched::{Fit, Touched, TouchedTerm};
 use crate::numerics::minimise::{Local, minimum};
 
-/// Share of a term's largest variance below which the search leaves directions out: they change a
-/// difference by a thousandth of its deviation.
+/// Share of a term's largest variance below which the search ignores a direction: such directions
+/// change a difference by a thousandth of its deviation.
 pub const LEAST_VARIANCE: f64 = 1e-6;
 
 /// Steps of the search.
@@ -64,8 +65,8 @@ pub fn scales_of(logarithms: &DVector<f64>) -> Vec<Scale> {
         .collect()
 }
 
-/// −log of marginal likelihood times prior, with its derivatives by the logarithms of the scales. Directions
-/// below `least` of a term's largest variance are left out.
+/// −log of marginal likelihood times prior, with its derivatives by the logarithms of the scales.
+/// Directions below `least` of a term's largest variance are ignored.
 #[must_use]
 pub fn negative_log_posterior(touched: &Touched, scales: &[Scale], least: f64) -> Option<Local> {
     let fit = touched.fit(scales, least)?;
@@ -135,7 +136,8 @@ impl<'a> Changes<'a> {
         }
     }
 
-    /// Adds the first derivatives, what follows from second ones of the covariance, and the prior.
+    /// Adds the first derivatives, the terms from second derivatives of the covariance, and the
+    /// prior.
     fn add_single(&self, scale: &Scale, i: usize, local: &mut Local) {
         let [value, by_length, by_length_twice] = self.halves;
         let penalty = self.term.scale.penalty(scale);

@@ -1,5 +1,5 @@
-//! Check without truth: each flight as the others predict it, each class as the other classes predict
-//! it. Scales and weights are those of all data.
+//! Self-check of the model, without a truth: each flight is predicted from the others, and each
+//! class from the other classes. Scales and weights are those of all data.
 
 use nalgebra::{Cholesky, DVector};
 
@@ -8,7 +8,7 @@ use super::posterior::{Gaussian, LeavingOut, LeftOut, Solved, information};
 use crate::numerics::root::BlockRoot;
 use crate::numerics::student::NORMAL_95;
 
-/// Agreement of what was left out with its prediction.
+/// Agreement of omitted data with their prediction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Agreement {
     /// Number of estimates.
@@ -55,8 +55,8 @@ pub fn flight(data: &FlightData, weights: &[f64], whole: &Gaussian) -> Option<Ag
     Some(left_out.agreement())
 }
 
-/// Agreement of some maneuvers with all others. What their flights' calibration errors are is not
-/// taken from the others.
+/// Agreement of some maneuvers with all others. The calibration errors of their flights are not
+/// estimated from the others.
 #[must_use]
 pub fn maneuvers(
     flights: &[FlightData],

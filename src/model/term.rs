@@ -1,8 +1,8 @@
 //! Terms of a coefficient whose difference from the tunnel is unknown.
 //!
-//! A constant whose sum with its slope the tunnel tabulates is replaced by the sum, which flight and
-//! tunnel both know better. A constant about which nothing is known is no term: each maneuver keeps
-//! its own.
+//! If the tunnel tabulates the sum of a constant and its slope, the sum replaces the constant,
+//! since flight and tunnel both determine it better. A constant without a table or estimate is no
+//! term: each maneuver keeps its own.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -19,18 +19,18 @@ use crate::tables::Knowledge;
 /// One unknown of a coefficient.
 #[derive(Clone, Debug)]
 pub struct Term {
-    /// Derivative of the model that it is or stands for.
+    /// Derivative of the model that the term is or replaces.
     pub derivative: String,
-    /// Slope of the sum that stands for its constant; `None` for a derivative itself.
+    /// Slope of the sum that replaces its constant; `None` for a derivative itself.
     pub slope: Option<String>,
     pub unit: &'static str,
     pub prior: Prior,
-    /// Tunnel's breakpoints; all of the grid's without a table.
+    /// Tunnel's breakpoints; without a table, all points of the grid.
     pub breakpoints_deg: Vec<f64>,
 }
 
-/// Covariance of weighted sums of the terms at a condition, by what lies between the points of their
-/// grids; one sum per row of `design`.
+/// Covariance of weighted sums of the terms at a condition, from the variation between the points
+/// of their grids; one sum per row of `design`.
 #[must_use]
 pub fn between_points(
     terms: &[Term],
@@ -148,7 +148,7 @@ impl TermSources<'_> {
     }
 
     /// Tunnel's table over a grid, and the centre of the difference's relative size. A derivative
-    /// without table has the order of magnitude of its estimates; `None` without estimates.
+    /// without table gets the order of magnitude of its estimates; `None` without estimates.
     fn table(&self, name: &str, grid: &Grid, evidence: &[Evidence]) -> Option<(Table, f64)> {
         let read = |node: super::grid::Node| self.tunnel.at(name, &node.condition());
         let values: Option<Vec<_>> = grid.nodes().into_iter().map(read).collect();

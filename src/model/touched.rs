@@ -1,6 +1,7 @@
-//! Differences at the points of the grids that the data touch.
+//! Differences, at points of the grids, on which the data depend.
 //!
-//! The likelihood of the scales depends on no others, and the mean at all points follows from these.
+//! The likelihood of the scales depends on these alone, and the mean at all other points follows
+//! from them.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -14,17 +15,17 @@ use crate::numerics::root::{BlockRoot, root, root_of_some};
 use crate::numerics::symmetric::square;
 use crate::numerics::triangular::solve_lower;
 
-/// Differences that the data touch, term by term, with the information on them.
+/// Differences on which the data depend, term by term, with the information on them.
 #[derive(Clone, Debug)]
 pub struct Touched {
     pub terms: Vec<TouchedTerm>,
     pub information: Information,
 }
 
-/// One term's differences that the data touch.
+/// Differences of one term on which the data depend.
 #[derive(Clone, Debug)]
 pub struct TouchedTerm {
-    /// First of them among those of all terms.
+    /// Index of the first of them among those of all terms.
     pub start: usize,
     /// Prior covariance between them.
     pub covariance: PriorCovariance,
@@ -73,7 +74,8 @@ impl Touched {
         }
     }
 
-    /// Root of the prior covariance, without directions below `least` of a term's largest variance.
+    /// Root of the prior covariance. Directions below `least` of a term's largest variance are
+    /// ignored.
     #[must_use]
     pub fn root(&self, scales: &[Scale], least: f64) -> BlockRoot {
         let mut whole = BlockRoot::default();
@@ -101,7 +103,7 @@ impl Touched {
         mean.iter().all(|v| v.is_finite()).then_some(mean)
     }
 
-    /// Posterior of the differences for some scales, as the likelihood of the scales needs it.
+    /// Fit of the differences for some scales, from which the likelihood of the scales follows.
     #[must_use]
     pub fn fit(&self, scales: &[Scale], least: f64) -> Option<Fit> {
         let Information { matrix, vector } = &self.information;
@@ -120,7 +122,7 @@ impl Touched {
     }
 }
 
-/// Likelihood of scales, and what its derivatives are made of.
+/// Likelihood of scales, and the vectors and matrices from which its derivatives follow.
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// −log of the marginal likelihood, but for a constant.

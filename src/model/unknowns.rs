@@ -1,8 +1,8 @@
-//! Unknowns of a coefficient in one vector: differences from the tunnel at the points of the grids, then
-//! errors that all maneuvers of a class, or of the campaign, share.
+//! Unknowns of a coefficient in one vector: differences from the tunnel at the points of the grids,
+//! then errors that all maneuvers of a class, or of the campaign, share.
 //!
-//! What a class gets wrong alike every time is, for each derivative it estimates, a function of α in
-//! bounds of a maneuver. Its variance is ω², and its correlation fades over 10°.
+//! The systematic error of a class is, for each derivative that it estimates, a function of α in
+//! units of the bounds of a maneuver. Its variance is ω², and its correlation fades over 10°.
 
 use std::collections::BTreeMap;
 
@@ -37,7 +37,7 @@ pub struct Unknowns {
     class_error: f64,
 }
 
-/// Function of α that a class's estimates of a term share.
+/// Systematic error, a function of α, that a class's estimates of a term share.
 #[derive(Clone, Debug)]
 struct ClassError {
     start: usize,
@@ -136,8 +136,8 @@ impl Unknowns {
         (0..design.nrows()).map(row).collect()
     }
 
-    /// Root of the prior covariance of all unknowns but the differences, without directions below `least`
-    /// of the largest variance of its kind.
+    /// Root of the prior covariance of all unknowns but the differences. Directions below `least`
+    /// of the largest variance of their kind are ignored.
     #[must_use]
     pub fn root_of_others(&self, least: f64) -> BlockRoot {
         let mut whole = BlockRoot::default();
@@ -145,7 +145,7 @@ impl Unknowns {
         whole
     }
 
-    /// As [`Unknowns::root_of_others`], of all unknowns.
+    /// Root of the prior covariance of all unknowns; `least` as in [`Unknowns::root_of_others`].
     #[must_use]
     pub fn root(&self, terms: &[Term], scales: &[Scale], least: f64) -> BlockRoot {
         let mut whole = root_of_differences(terms, scales, least);
@@ -167,8 +167,8 @@ impl Unknowns {
     }
 }
 
-/// Root of the prior covariance of the differences, without directions below `least` of a term's
-/// largest variance.
+/// Root of the prior covariance of the differences. Directions below `least` of a term's largest
+/// variance are ignored.
 #[must_use]
 pub fn root_of_differences(terms: &[Term], scales: &[Scale], least: f64) -> BlockRoot {
     let mut whole = BlockRoot::default();
@@ -178,7 +178,8 @@ pub fn root_of_differences(terms: &[Term], scales: &[Scale], least: f64) -> Bloc
     whole
 }
 
-/// True for an error that is common to all flights: surfaces are recorded late by the recorder.
+/// True for an error that is common to all flights, such as the delay with which a recorder records
+/// the surfaces.
 #[must_use]
 pub fn is_of_campaign(error: &SharedError) -> bool {
     matches!(error, SharedError::Delay(_))

@@ -1,8 +1,9 @@
-//! Estimates of a maneuver with what it holds read from the posterior of the other flights.
+//! Estimates of a maneuver with the values that it holds taken from the posterior of the other
+//! flights.
 //!
-//! With G the change of the estimates with the held derivatives, and f, C the others' means and
-//! covariance of these, the estimates move by −G f, and their covariance has G C Gᵀ in place of the
-//! tunnel's part.
+//! With G the change of the estimates with the held derivatives, and f and C the means and
+//! covariance of these by the other flights, the estimates move by −G f, and in their covariance G
+//! C Gᵀ replaces the tunnel's part.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +18,8 @@ use crate::maneuver::Status;
 use crate::output_error::error_effect::ErrorEffect;
 use crate::tables::EstimateRow;
 
-/// Change of a maneuver's results with what it holds read from the posterior of the other flights.
+/// Change of a maneuver's results if the values that it holds are taken from the posterior of the
+/// other flights.
 #[derive(Clone, Debug)]
 pub struct WithHeld<'a> {
     evidence: &'a Evidence<'a>,
@@ -30,7 +32,8 @@ pub struct WithHeld<'a> {
 }
 
 impl Model {
-    /// Change of a maneuver's results with what it holds read from the posterior of the other flights.
+    /// Change of a maneuver's results if the values that it holds are taken from the posterior of
+    /// the other flights.
     #[must_use]
     pub fn with_held<'a>(&'a self, evidence: &'a Evidence<'a>) -> WithHeld<'a> {
         let parameters = evidence.covariance.names.len();
@@ -71,7 +74,7 @@ impl<'a> WithHeld<'a> {
             .extend(names().zip(differences.values.iter().copied()));
     }
 
-    /// Row of the maneuver's estimates, or of its sums, with the change.
+    /// Row of the maneuver's estimates, or of its sums, after the change.
     #[must_use]
     pub fn row(&self, row: &EstimateRow, sums: &[Combined]) -> EstimateRow {
         let mut new = row.clone();

@@ -11,7 +11,7 @@ use crate::maneuver::Class;
 use crate::pipeline::{Conductor, method_versions};
 use crate::store::Fingerprint;
 
-/// Lineage of the results that this conductor brings.
+/// Lineage of the results that this conductor loads or makes.
 #[must_use]
 pub fn campaign_lineage(conductor: &Conductor) -> Lineage {
     let config = conductor.runner.config;

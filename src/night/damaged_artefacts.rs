@@ -1,4 +1,4 @@
-//! Artefacts of a night that are not as they were written.
+//! Artefacts of a night that differ from what was written.
 
 use std::collections::BTreeMap;
 
@@ -7,8 +7,8 @@ use rayon::prelude::*;
 use crate::pipeline::IngestedFlight;
 use crate::store::{ArtefactName, Digest, InputDigests, Kind, Night, Store};
 
-/// Artefacts of a night that are damaged, gone, or another's under their name. A record has no seal:
-/// its digest is in its flight's artefact.
+/// Artefacts of a night that are damaged, missing, or replaced by another artefact. A record has no
+/// seal of its own; its digest is in its flight's artefact.
 pub fn damaged_artefacts(
     store: &Store,
     contents: &InputDigests,

@@ -39,7 +39,7 @@ pub fn diff(config: &Config, since: Option<&str>, to: Option<&str>) -> Result<Di
     })
 }
 
-/// Finds the last complete night, where the current one is whole.
+/// Finds the last complete night; the current night must be whole.
 fn last_night(config: &Config, nights: &Nights) -> Result<Night> {
     let none = |what: &str| Error::not_found(&config.reports, what);
     match nights.damaged_current() {

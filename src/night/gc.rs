@@ -1,7 +1,7 @@
-//! Removal of artefacts that no published night is made of, and of nights beyond those to keep.
+//! Removal of artefacts that no published night needs, and of nights beyond those to keep.
 //!
-//! Only this machine's cache of a store in an object store is cleaned: the nights of other machines
-//! are unknown here.
+//! Only this machine's cache of a store in an object store is cleaned, since the nights of other
+//! machines are not visible here.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -28,8 +28,8 @@ struct ServedReports {
     is_own: bool,
 }
 
-/// Finds what no published night needs, and removes it if `remove` is set. The store may serve
-/// several folders of reports; the nights of all of them count.
+/// Finds the artefacts and nights that no published night needs, and removes them if `remove` is
+/// set. The store may serve several folders of reports; the nights of all of them count.
 ///
 /// # Errors
 /// A store in use; reports that cannot be found, or a night whose manifest cannot be read, since
@@ -96,7 +96,7 @@ fn served_reports(
     folders.into_iter().map(open).collect()
 }
 
-/// A disk that is not mounted today still has its nights.
+/// Error for reports that cannot be found: a disk that is not mounted today still has its nights.
 fn lost_reports(config: &Config, folder: &Path) -> Error {
     let what = format!(
         "the reports in {} are made of this store and cannot be found, so what they need is unknown: nothing is \

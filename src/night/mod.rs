@@ -1,5 +1,5 @@
-//! The night: a run's results published together with everything that decided them, and the
-//! questions of the next morning.
+//! The night: a run's results, published together with everything that decided them, and commands
+//! that inspect it the next morning.
 //!
 //! [`run()`] publishes a night. [`status`] reports the artefacts that a run would make, [`diff`]
 //! the changes since the night before, [`explain`] everything about one maneuver, [`verify`]
@@ -24,7 +24,7 @@ pub use run::{RunOutcome, has_rejections, run};
 pub(crate) use campaign_lineage::campaign_lineage;
 pub(crate) use table_metadata::shelf_of_stage;
 
-/// Answer of a command that reads a night where there is none.
+/// Answer of a command that needs a published night if there is none.
 const NONE_PUBLISHED: &str = "no night has been published here yet; `harvest run` publishes one";
 
 /// Message for a night whose manifest is missing or damaged.

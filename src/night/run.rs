@@ -86,7 +86,7 @@ pub fn run(
     outcome
 }
 
-/// Names that the report prints and that decide no number: archive, tunnel, files of the
+/// Names that the report prints and that affect no number: archive, tunnel, files of the
 /// configuration.
 fn printed_names(config: &Config) -> BTreeMap<String, String> {
     let files = config.files.iter().map(|(name, text)| {
@@ -116,8 +116,8 @@ impl NightRun<'_> {
         self.conductor.runner.config
     }
 
-    /// The current night, if this run would make the same: its lineage is this run's, it reaches as
-    /// far, and its files and artefacts are whole.
+    /// The current night, if this run would make the same one: it has this run's lineage, reaches
+    /// as far, and its files and artefacts are whole.
     fn valid_night(&self) -> Option<Night> {
         let night = self
             .nights
@@ -132,7 +132,7 @@ impl NightRun<'_> {
         night.lineage == self.lineage && night.shown == self.printed_names
     }
 
-    /// Brings the campaign, writes tonight's files and puts them in their place.
+    /// Runs the stages, writes tonight's files and publishes them.
     fn publish(&self) -> Result<RunOutcome> {
         let tonight = self.nights.tonight()?;
         let mut campaign = self.conductor.campaign(self.until)?;
@@ -169,7 +169,7 @@ impl NightRun<'_> {
         Ok(changes)
     }
 
-    /// Changes since the last complete night; none if there is no such night.
+    /// Changes since the last complete night; empty without such a night.
     fn changes(&self, campaign: &Campaign) -> Changes {
         let Some(before) = self.night_before() else {
             return Changes::default();
@@ -194,7 +194,7 @@ impl NightRun<'_> {
         changes::since(&self.nights, &before, &now)
     }
 
-    /// The complete night that tonight's is compared with. A night that is repaired keeps its
+    /// The complete night with which tonight's is compared. A night that is repaired keeps its
     /// predecessor.
     fn night_before(&self) -> Option<Night> {
         let last = self.nights.complete()?;
@@ -231,8 +231,8 @@ impl NightRun<'_> {
         }
     }
 
-    /// Puts tonight's files in their place: as a new night, or as those that the current night of the
-    /// same lineage has lost. A current night that reaches further stays.
+    /// Publishes tonight's files: as a new night, or in place of files that the current night of
+    /// the same lineage has lost. A current night that reaches further stays.
     fn place(&self, tonight: &Night) -> Result<RunOutcome> {
         let current = self.nights.current();
         match current.filter(|night| self.has_same_lineage(night)) {

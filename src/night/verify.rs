@@ -38,9 +38,10 @@ impl Verified {
     }
 }
 
-/// Digests all input anew and compares it, the configuration and the code with the lineage that the
-/// files of a night state. Where they agree, the tables are made again from the artefacts. The night is
-/// the one named, by default the current one; with `tables` only files of these names are compared.
+/// Digests all input anew, and compares input, configuration and code with the lineage that the
+/// files of a night state. If they agree, the tables are made again from the artefacts and
+/// compared. The night is the one named, by default the current one; with `tables` only files of
+/// these names are compared.
 ///
 /// # Errors
 /// No night, no archive, or a table that the night does not have.
@@ -142,7 +143,7 @@ struct Comparison<'a> {
     lineage: Lineage,
     /// Files whose bytes changed since they were published.
     damaged: Vec<String>,
-    /// Tables whose rows are not those that the artefacts make.
+    /// Tables whose rows differ from those that the artefacts make.
     other_rows: BTreeSet<String>,
     nights: &'a Nights,
     night: &'a Night,

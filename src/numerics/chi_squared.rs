@@ -2,7 +2,7 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// Probability of a larger sum of squares; one without a degree of freedom.
+/// Probability of a larger sum of squares; one with zero degrees of freedom.
 #[must_use]
 pub fn exceedance(sum_of_squares: f64, degrees_of_freedom: usize) -> f64 {
     ChiSquared::new(degrees_of_freedom as f64).map_or(1.0, |chi| chi.sf(sum_of_squares))

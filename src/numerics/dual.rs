@@ -27,7 +27,7 @@ impl Dual {
         }
     }
 
-    /// Square root; not a number of a negative one.
+    /// Square root; NaN of a negative number.
     #[must_use]
     pub fn sqrt(self) -> Dual {
         let root = self.value.sqrt();

@@ -14,7 +14,7 @@ const SIDE_BY_SIDE: usize = 8;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Harmonics {
     numbers: Range<usize>,
-    /// Cosine and sine of each sample's share of a turn.
+    /// Cosine and sine of each sample's fraction of a turn.
     turn: Vec<[f64; 2]>,
 }
 

@@ -18,7 +18,7 @@ pub(crate) struct Lanes<S: Simd> {
 }
 
 impl<S: Simd> Lanes<S> {
-    /// Loads the numbers that begin at a place of a slice.
+    /// Loads the numbers that begin at an index of a slice.
     #[inline(always)]
     pub fn load(simd: S, from: &[f64], at: usize) -> Lanes<S> {
         Lanes {
@@ -27,7 +27,7 @@ impl<S: Simd> Lanes<S> {
         }
     }
 
-    /// Stores the numbers at a place of a slice.
+    /// Stores the numbers at an index of a slice.
     #[inline(always)]
     pub fn store(self, to: &mut [f64], at: usize) {
         store::<S>(to, at, self.values);
@@ -81,8 +81,9 @@ impl<S: Simd> Mul<f64> for Lanes<S> {
     }
 }
 
-/// Numbers that a function returns for each place. Unlike `std::array::from_fn` it is part of its caller, as its
-/// function must be: where the processor's vectors are not enabled, each operation is a call.
+/// Numbers that a function returns for each place. Unlike `std::array::from_fn` it is inlined with
+/// its function; otherwise each operation would be a call, as the called function is compiled
+/// without the processor's vectors.
 #[inline(always)]
 pub(crate) fn each<S: Simd, const N: usize>(of: impl Fn(usize) -> Lanes<S>) -> [Lanes<S>; N] {
     let mut all = [of(0); N];

@@ -22,7 +22,7 @@ const LAGS_AT_ONCE: usize = 7;
 const ROWS_REACHED: usize = LAGGED_ROWS_AT_ONCE + LAGS_AT_ONCE - 1;
 /// Longest lag of [`AlignedMatrix::lagged_products`].
 pub(crate) const LONGEST_LAG: usize = 2 * LAGS_AT_ONCE - 1;
-/// Zero rows behind the last one: room for products and lags that are computed several at once.
+/// Zero rows after the last row: room for products and lags that are computed several at once.
 const ZERO_ROWS: usize = LONGEST_LAG + LAGGED_ROWS_AT_ONCE;
 const _: () = assert!(ZERO_ROWS >= ROWS_AT_ONCE);
 
@@ -125,7 +125,7 @@ impl AlignedMatrix {
         longer
     }
 
-    /// Removes the rows from a number on.
+    /// Keeps the first rows, up to a number.
     pub fn truncate(&mut self, rows: usize) {
         let from = rows.min(self.rows) * self.width();
         self.values_mut()[from..].fill(0.0);
@@ -338,7 +338,7 @@ impl WithSimd for Product<'_> {
     }
 }
 
-/// Filter u = s/A of each column in place, at rest outside the series.
+/// Filter u = s/A of each column in place, starting from zero.
 struct Filter<'a> {
     coefficients: &'a [f64],
     series: &'a mut [f64],

@@ -2,28 +2,29 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-/// Decrease of a step over that of the tangent, at least (Armijo).
+/// Least decrease of a step, relative to that of the tangent (Armijo).
 const LEAST_DECREASE: f64 = 1e-4;
 
-/// Longest change of a variable in a step.
+/// Largest change of a variable in a step.
 const LONGEST: f64 = 1.0;
 
 /// Halvings of a step before the search ends.
 const HALVINGS: usize = 25;
 
-/// Function about a point.
+/// Value and derivatives of a function at a point.
 #[derive(Clone, Debug)]
 pub struct Local {
     pub value: f64,
     pub gradient: DVector<f64>,
     /// Second derivatives.
     pub curvature: DMatrix<f64>,
-    /// Positive definite matrix in their place where they are not.
+    /// Positive definite matrix that replaces the second derivatives if they are not positive
+    /// definite.
     pub expected: DMatrix<f64>,
 }
 
 impl Local {
-    /// Newton's step; `None` where neither matrix is positive definite.
+    /// Newton's step; `None` if neither matrix is positive definite.
     fn step(&self) -> Option<DVector<f64>> {
         let root = Cholesky::new(self.curvature.clone());
         let root = root.or_else(|| Cholesky::new(self.expected.clone()))?;
@@ -33,9 +34,10 @@ impl Local {
 
 /// Minimum of a function from a start.
 ///
-/// `function` has no value where it returns `None`. The search ends where √(sᵀ H s) of a step s falls below
-/// `tolerance`, with H the second derivatives: of a negative log density that is the distance in standard
-/// deviations. It also ends after `steps`, or where no step decreases.
+/// `function` returns `None` outside its domain. The search ends once √(sᵀ H s) of a step s falls
+/// below `tolerance`, with H the second derivatives. For a negative log density that is the
+/// distance in standard deviations. The search also ends after `steps`, or if no step decreases the
+/// function.
 #[must_use]
 pub fn minimum(
     start: DVector<f64>,

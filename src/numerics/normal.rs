@@ -11,10 +11,10 @@ pub fn within(width: f64, mean: f64, deviation: f64) -> f64 {
     0.5 * (error_function(scale * (width - mean)) + error_function(scale * (width + mean)))
 }
 
-/// Argument from which the error function rounds to one: there it is 1 − 2e-17.
+/// Argument above which the error function rounds to one: there it is 1 − 2e-17.
 const ROUNDS_TO_ONE: f64 = 6.0;
 
-/// The error function. A limit that is far away takes no polynomials.
+/// The error function. Large arguments return one without evaluating polynomials.
 fn error_function(x: f64) -> f64 {
     if x.abs() >= ROUNDS_TO_ONE {
         1.0_f64.copysign(x)
@@ -29,7 +29,7 @@ pub fn below(value: f64) -> f64 {
     0.5 * (1.0 + erf(FRAC_1_SQRT_2 * value))
 }
 
-/// Value below which a standard normal deviate is with a probability.
+/// Value that a standard normal deviate is below with a given probability.
 #[must_use]
 pub fn quantile(probability: f64) -> f64 {
     SQRT_2 * erf_inv(2.0 * probability - 1.0)

@@ -1,11 +1,11 @@
-//! Random effects: one quantity seen several times with known errors and an unknown scatter.
+//! Random effects: one quantity, observed several times with known errors and an unknown scatter.
 //!
-//! y_i = x_iᵀ β + u_i + e_i with e_i of the known variance s_i² and u_i of the common variance τ². With
-//! weights w_i = 1/(s_i² + τ²) the coefficients β are those of weighted least squares, and τ² solves
-//! the moment equation of Paule and Mandel, Σ w_i (y_i − x_iᵀ β)² = n − p; it is zero where the left
-//! side is below n − p without scatter. For equal s_i this is restricted maximum likelihood.
-//! (R. C. Paule, J. Mandel, J. Res. NBS 87 (1982) 377; R. DerSimonian, R. Kacker, Contemp. Clin. Trials
-//! 28 (2007) 105.)
+//! y_i = x_iᵀ β + u_i + e_i with e_i of the known variance s_i² and u_i of the common variance τ².
+//! With weights w_i = 1/(s_i² + τ²) the coefficients β are those of weighted least squares, and τ²
+//! solves the moment equation of Paule and Mandel, Σ w_i (y_i − x_iᵀ β)² = n − p; it is zero where
+//! the left side is below n − p without scatter. For equal s_i this is restricted maximum
+//! likelihood. (R. C. Paule, J. Mandel, J. Res. NBS 87 (1982) 377; R. DerSimonian, R. Kacker,
+//! Contemp. Clin. Trials 28 (2007) 105.)
 
 use nalgebra::{SMatrix, SVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -72,10 +72,11 @@ impl RandomEffects<1> {
         RandomEffects::of(observations, |_| [1.0])
     }
 
-    /// Upper 90 % limit of τ²: the larger of two. At the first the weighted sum of squares about the mean,
-    /// which has a χ² distribution, is at its lower 10 % (W. Viechtbauer, Stat. Med. 26 (2007) 37). The
-    /// second is the τ² that the observations would not show: 1.28 times its standard error √(2/Σ s⁻⁴)
-    /// without scatter. Variances that are stated too large hide a scatter from the first.
+    /// Upper 90 % limit of τ²: the larger of two limits. At the first one, the weighted sum of
+    /// squares about the mean, which has a χ² distribution, is at its lower 10 % (W. Viechtbauer,
+    /// Stat. Med. 26 (2007) 37). The second is the smallest τ² that the observations can show: 1.28
+    /// times its standard error √(2/Σ s⁻⁴) without scatter. It covers the case of variances that
+    /// are stated too large, which hide a scatter from the first limit.
     #[must_use]
     pub fn scatter_limit(&self, observations: &[Observation]) -> Option<f64> {
         let least = ChiSquared::new(self.degrees_of_freedom)

@@ -6,20 +6,20 @@ use nalgebra::{DMatrix, DVector};
 
 use super::symmetric::{scale, scaled};
 
-/// Share of the largest variance below which a direction has none.
+/// Share of the largest variance below which the variance of a direction counts as zero.
 pub const EXACT: f64 = 1e-14;
 
 /// Square root of a positive semidefinite covariance by Cholesky's method with pivoting. Directions
-/// whose variance is below `least` of the largest one are left out, so the root has as many columns as
-/// there are directions left.
+/// whose variance is below `least` of the largest one are left out, so the root has one column per
+/// remaining direction.
 #[must_use]
 pub fn root(covariance: &DMatrix<f64>, least: f64) -> DMatrix<f64> {
     root_with_pivots(covariance, least).0
 }
 
-/// Root D S, with the standard deviations D and the symmetric root S of the correlations. It changes as little
-/// as the covariance does, so draws by it do too. A small difference of two variances may change the order of the
-/// pivots of [`root`], and with it every draw.
+/// Root D S, with the standard deviations D and the symmetric root S of the correlations. It is
+/// continuous in the covariance, and so are draws made with it. With [`root`] a small difference of
+/// two variances may change the order of the pivots, and with it every draw.
 #[must_use]
 pub fn continuous_root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
     let correlations = scaled(covariance, &scale(covariance));
@@ -39,15 +39,16 @@ pub fn symmetric_root(matrix: DMatrix<f64>) -> DMatrix<f64> {
     vectors * DMatrix::from_diagonal(&roots) * vectors.transpose()
 }
 
-/// Root of the covariance of some quantities, continued to all: of `covariance`, between all and these, and the
-/// `places` of these among all. Their rows are their own root, and all rows with them give `covariance`.
+/// Root of a covariance of all quantities from that of a few. `covariance` is between all
+/// quantities and the few, `places` has the indices of the few among all. The rows of the few are
+/// their own root; all rows times these rows give `covariance`.
 #[must_use]
 pub fn root_of_some(covariance: &DMatrix<f64>, places: &[usize], least: f64) -> DMatrix<f64> {
     pivoted(covariance, places, least).0
 }
 
-/// As [`root`], with the row of each column's pivot. These rows are a lower triangular matrix, the exact root
-/// of their own covariance.
+/// Root as by [`root`], with the row of each column's pivot. These rows are a lower triangular
+/// matrix, the exact root of their own covariance.
 #[must_use]
 pub fn root_with_pivots(covariance: &DMatrix<f64>, least: f64) -> (DMatrix<f64>, Vec<usize>) {
     let all: Vec<usize> = (0..covariance.nrows()).collect();

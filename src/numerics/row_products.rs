@@ -16,7 +16,7 @@ use pulp::Simd;
 use super::simd::VECTOR;
 
 /// Work that advances in small steps between the rows of a sum. A chain of dependent operations and
-/// the sums, which wait for nothing, then share the processor.
+/// the independent sums then share the processor.
 pub(crate) trait Interleaved {
     /// Takes one step, if any is left.
     fn advance(&mut self);

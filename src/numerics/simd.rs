@@ -43,13 +43,13 @@ impl AlignedBuffer {
     }
 }
 
-/// Loads the vector that begins at a place of a slice.
+/// Loads the vector that begins at an index of a slice.
 #[inline(always)]
 pub(crate) fn load<S: Simd>(from: &[f64], at: usize) -> S::f64s {
     S::as_simd_f64s(&from[at..at + S::F64_LANES]).0[0]
 }
 
-/// Stores a vector at a place of a slice.
+/// Stores a vector at an index of a slice.
 #[inline(always)]
 pub(crate) fn store<S: Simd>(to: &mut [f64], at: usize, value: S::f64s) {
     S::as_mut_simd_f64s(&mut to[at..at + S::F64_LANES]).0[0] = value;

@@ -1,5 +1,5 @@
-//! Products of matrices of a few rows, whose sizes the compiler knows. The library's product packs
-//! and allocates from six rows on, which costs more than the product.
+//! Products of matrices of a few rows whose sizes are compile-time constants. From six rows on, the
+//! library's product packs and allocates, which costs more than the product.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use nalgebra::{ArrayStorage, SMatrix};

@@ -9,12 +9,12 @@ pub const NORMAL_95: f64 = 1.959_963_984_540_054;
 /// the variance, and the delta method behind the degrees of freedom fails.
 const FEWEST: f64 = 3.0;
 
-/// Degrees of freedom from which the first term of the expansion about the normal distribution is
-/// taken: its error is 1.4e-6 there. The inverse of the distribution function loses its digits far
-/// above (7 % at 1e7).
+/// Degrees of freedom above which only the first term of the expansion about the normal
+/// distribution is used: its error is 1.4e-6 there. The inverse of the distribution function loses
+/// its digits far above (7 % at 1e7).
 const MANY: f64 = 1e3;
 
-/// Half width of a 95 % interval in standard errors; NaN without a degree of freedom.
+/// Half width of a 95 % interval in standard errors; NaN with zero degrees of freedom.
 #[must_use]
 pub fn quantile_95(degrees_of_freedom: f64) -> f64 {
     if degrees_of_freedom >= MANY {
@@ -30,7 +30,7 @@ pub fn widening_95(degrees_of_freedom: f64) -> f64 {
     quantile_95(degrees_of_freedom.max(FEWEST)) / NORMAL_95
 }
 
-/// Probability of a larger magnitude; one without a degree of freedom.
+/// Probability of a larger magnitude; one with zero degrees of freedom.
 #[must_use]
 pub fn exceedance(magnitude: f64, degrees_of_freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, degrees_of_freedom).map_or(1.0, |t| 2.0 * t.sf(magnitude))

@@ -9,7 +9,7 @@ use pulp::Arch;
 /// Size up to which the plain methods are as fast.
 const PLAIN: usize = 48;
 
-/// Lower triangular L with L Lᵀ = A; what stands above its diagonal is not defined. `None` unless A is
+/// Lower triangular L with L Lᵀ = A; the part above its diagonal is not defined. `None` unless A is
 /// positive definite.
 #[must_use]
 pub fn cholesky(mut matrix: DMatrix<f64>) -> Option<DMatrix<f64>> {
@@ -55,7 +55,7 @@ pub fn solve_lower(lower: DMatrixView<f64>, mut right: DMatrixViewMut<f64>) {
     );
 }
 
-/// Columns that the plain method solves side by side: one alone waits for its own divisions.
+/// Columns that the plain method solves together; a single column would wait for its own divisions.
 const SIDE_BY_SIDE: usize = 4;
 
 /// [`solve_lower`] column by column.

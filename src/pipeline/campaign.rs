@@ -1,4 +1,5 @@
-//! A campaign as far as it has been brought: the rows of its tables, and the state of each stage.
+//! State of a campaign after some of its stages: the rows of its tables, and the state of each
+//! stage.
 
 use std::collections::BTreeMap;
 
@@ -49,7 +50,7 @@ pub struct StageState {
     pub failed: Vec<Failure>,
 }
 
-/// Rows that an earlier flight has, too.
+/// Rows that an earlier flight also has.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RepeatedRows {
     /// Id of the later flight.
@@ -58,7 +59,7 @@ pub struct RepeatedRows {
     pub end_s: f64,
 }
 
-/// A campaign as far as it has been brought.
+/// State of a campaign after some of its stages.
 #[derive(Clone, Debug, Default)]
 pub struct Campaign {
     /// State of the stages whose artefacts the store keeps.
@@ -74,7 +75,7 @@ pub struct Campaign {
     pub instruments: Vec<InstrumentRow>,
     /// Errors of the instruments over the flights.
     pub instrument_trends: Vec<InstrumentTrendRow>,
-    /// Corrections of flights whose instruments all flights together decide.
+    /// Corrections of flights, determined from the instruments of all flights together.
     pub flight_corrections: Vec<FlightCorrections>,
     pub maneuvers: Vec<Maneuver>,
     /// Excitation that fits no class.
@@ -125,12 +126,12 @@ pub struct Campaign {
 }
 
 impl Campaign {
-    /// State of a stage, empty until the stage is brought.
+    /// State of a stage, empty until the stage has run.
     pub fn state(&mut self, stage: Stage) -> &mut StageState {
         self.states.entry(stage).or_default()
     }
 
-    /// Corrects flights as all flights together decide.
+    /// Corrects flights by the corrections from all flights together.
     pub fn correct_flights(&mut self, corrections: &[FlightCorrections]) {
         for flight in &mut self.flights {
             let own = corrections.iter().find(|c| c.flight_id == flight.id());

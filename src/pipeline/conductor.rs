@@ -104,7 +104,7 @@ impl<'a> Conductor<'a> {
         Conductor::new(config, store, contents, archive, absent, progress)
     }
 
-    /// Opens the campaign to look at; nothing is made or changed.
+    /// Opens the campaign for reading only; nothing is made or changed.
     ///
     /// # Errors
     /// No archive.
@@ -114,7 +114,7 @@ impl<'a> Conductor<'a> {
         Conductor::looking(config, store, contents, progress)
     }
 
-    /// Opens the campaign to look at, with every input file digested anew.
+    /// Opens the campaign for reading only, with every input file digested anew.
     ///
     /// # Errors
     /// No archive.
@@ -168,9 +168,10 @@ impl<'a> Conductor<'a> {
         self.runner.store.remember(&self.runner.contents)
     }
 
-    /// Brings the campaign as far as `until`; the report is no part of it.
+    /// Brings the campaign up to date as far as `until`, without the report.
     ///
-    /// A conductor that only looks stops before the first stage that needs a missing artefact.
+    /// A conductor that is open for reading only stops before the first stage that needs a missing
+    /// artefact.
     ///
     /// # Errors
     /// A fault that stops the run. A fault of one flight or maneuver is a problem.
@@ -178,7 +179,7 @@ impl<'a> Conductor<'a> {
         self.campaign_of(&self.archive, until)
     }
 
-    /// Brings the campaign of some flights as far as `until`.
+    /// Brings the campaign of some flights up to date as far as `until`.
     ///
     /// # Errors
     /// As [`Conductor::campaign`].
@@ -211,7 +212,8 @@ impl<'a> Conductor<'a> {
         Ok(campaign)
     }
 
-    /// Brings the delays of the surfaces of a segmented campaign, by which estimates are corrected.
+    /// Loads or makes the delays of the surfaces of a segmented campaign, by which estimates are
+    /// corrected.
     ///
     /// # Errors
     /// As [`Conductor::campaign`].
@@ -219,8 +221,8 @@ impl<'a> Conductor<'a> {
         surfaces_step::surfaces(&self.runner, campaign)
     }
 
-    /// Brings the estimates of all maneuvers and groups of a segmented campaign; `false` if some are
-    /// missing.
+    /// Loads or makes the estimates of all maneuvers and groups of a segmented campaign; `false` if
+    /// some are missing.
     ///
     /// # Errors
     /// As [`Conductor::campaign`].

@@ -37,7 +37,7 @@ pub struct EstimateKey<'a> {
     estimate: &'a estimate::Settings,
     /// Corrections of the surfaces of the maneuver's axis.
     delays: Vec<&'a DelayCorrection>,
-    /// Corrections of the flight's instruments that all flights decide.
+    /// Corrections of the flight's instruments from all flights together.
     #[serde(skip_serializing_if = "Option::is_none")]
     corrections: Option<&'a [Correction]>,
 }
@@ -137,7 +137,7 @@ impl<'a> Step for EstimateStep<'a> {
     }
 }
 
-/// Corrections of the surfaces of an axis: the others decide nothing.
+/// Corrections of the surfaces of an axis; those of other surfaces have no effect.
 fn delays_of_axis<'a>(
     config: &'a Config,
     delays: &'a [DelayCorrection],
@@ -173,8 +173,8 @@ pub fn context<'a>(config: &'a Config, delays: &'a [DelayCorrection]) -> Context
     .with_delays(delays)
 }
 
-/// Brings the estimates of all maneuvers, in their order. `None` if some are missing where nothing
-/// is made.
+/// Loads or makes the estimates of all maneuvers, in their order. `None` if some are missing and
+/// nothing is made.
 ///
 /// # Errors
 /// A fault that stops the run.
@@ -218,7 +218,7 @@ fn failure(estimated: &Estimated) -> Option<Failure> {
     })
 }
 
-/// Brings the estimates of some maneuvers, flight by flight in the order of the flights.
+/// Loads or makes the estimates of some maneuvers, flight by flight in the order of the flights.
 ///
 /// # Errors
 /// A fault that stops the run.

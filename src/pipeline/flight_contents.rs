@@ -15,7 +15,7 @@ use crate::store::{Digest, Fingerprint, InputDigests};
 /// Content of the archive.
 #[derive(Clone, Debug, Default)]
 pub struct FlightContents {
-    /// Fingerprint of each flight's content, or the reason that there is none.
+    /// Fingerprint of each flight's content, or the reason for its absence.
     pub fingerprints: BTreeMap<String, Result<String, String>>,
     /// All files that could be read.
     pub sources: Vec<SourceFile>,
@@ -24,7 +24,8 @@ pub struct FlightContents {
 }
 
 impl FlightContents {
-    /// Digests every file of the archive. Of flights with the same bytes the first counts.
+    /// Digests every file of the archive. If several flights have the same bytes, the first one
+    /// counts.
     pub fn gather(
         files: &[FlightFiles],
         contents: &InputDigests,
@@ -116,7 +117,7 @@ impl FlightContents {
     /// Fingerprint of a flight's content.
     ///
     /// # Errors
-    /// The reason that there is none.
+    /// The reason for its absence.
     pub fn fingerprint(&self, flight_id: &str) -> Result<&str, &str> {
         match self.fingerprints.get(flight_id) {
             Some(Ok(fingerprint)) => Ok(fingerprint),

@@ -184,7 +184,8 @@ fn add_joined(campaign: &mut Campaign, joined: Joined) {
 #[derive(Serialize)]
 pub struct PredictKey<'a> {
     settings: &'a PredictionSettings,
-    /// Estimate of the predicted maneuver itself, for what else decides it.
+    /// Estimate of the predicted maneuver itself; its name covers everything else that decides the
+    /// prediction.
     estimate: &'a str,
     from: Vec<&'a str>,
 }

@@ -93,7 +93,7 @@ impl<'a> Step for IngestStep<'a> {
 }
 
 impl IngestStep<'_> {
-    /// Fault of the network or of a file that changed while it was read. The bytes that were read
+    /// Fault of the network, or of a file that changed while it was read. The bytes that were read
     /// may then differ from those of the key.
     fn passing_fault(&self) -> Option<Problem> {
         let fault = |place: &std::path::Path, reason: &str| {
@@ -111,7 +111,7 @@ impl IngestStep<'_> {
     }
 }
 
-/// Brings the records of these flights.
+/// Loads or makes the records of these flights.
 ///
 /// # Errors
 /// A fault that stops the run. A fault of one flight is a problem.
@@ -157,7 +157,8 @@ fn missing(flight_id: &str) -> MissingArtefact {
     }
 }
 
-/// Brings a flight. One whose files cannot be read is rejected, but not kept so.
+/// Loads or makes the records of a flight. A flight whose files cannot be read is rejected, but the
+/// rejection is not saved.
 fn bring_flight(
     runner: &StepRunner,
     shares: MemoryShares,

@@ -68,8 +68,8 @@ impl IngestedFlight {
 pub struct Flight {
     pub fingerprint: String,
     pub ingested: IngestedStretch,
-    /// Corrections of the instruments that all flights together decide, in place of those that the
-    /// flight alone gives; estimates have them, segmentation does not.
+    /// Corrections of the instruments from all flights together, in place of those from the flight
+    /// alone; estimates use them, segmentation does not.
     pub by_all_flights: Option<Vec<Correction>>,
 }
 

@@ -1,5 +1,5 @@
-//! Normal force of each flight against the tunnel's. No kinematic relation contains the mass, and a
-//! mass in another unit makes every force derivative wrong by one factor.
+//! Comparison of each flight's normal force with the tunnel's. No kinematic relation contains the
+//! mass, and a mass in another unit makes every force derivative wrong by one factor.
 
 use super::campaign::Campaign;
 use super::problems::problem;
@@ -8,14 +8,15 @@ use crate::config::Config;
 use crate::error::{Problem, ProblemStage};
 use crate::ingest::LiftPoint;
 
-/// Factor between flight and tunnel from which, at every angle of attack, the mass is named. Pounds for
-/// kilograms make 2.2; surfaces and a tunnel's errors change some angles by a third.
+/// Ratio of flight to tunnel, or the inverse, above which the mass is reported if it is exceeded at
+/// every angle of attack. Pounds for kilograms make 2.2. Surfaces and errors of the tunnel change
+/// the ratio at some angles by a third.
 const FACTOR: f64 = 1.6;
 
 /// Fewest angles of attack for a verdict.
 const FEWEST_ANGLES: usize = 2;
 
-/// Adds a problem for each flight whose normal force is a multiple of the tunnel's, or a fraction, at
+/// Adds a problem for each flight whose normal force is a multiple or a fraction of the tunnel's at
 /// every angle of attack.
 pub fn compare_lift(config: &Config, campaign: &mut Campaign) {
     let accepted = campaign
@@ -39,7 +40,8 @@ fn mass_problem(flight_id: &str, factor: f64) -> Problem {
     problem(ProblemStage::Ingest, flight_id, "mass", &reason)
 }
 
-/// Factor between flight and tunnel that is nearest to one, if all are beyond [`FACTOR`] on one side.
+/// Ratio of flight to tunnel that is nearest to one, if all ratios are beyond [`FACTOR`] on one
+/// side.
 fn common_factor(lift: &[LiftPoint], buildup: &Buildup, tunnel: &WindTunnel) -> Option<f64> {
     let ratio = |point: &LiftPoint| {
         let tunnel = tunnel_normal_force(point, buildup, tunnel)?;

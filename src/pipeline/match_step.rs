@@ -100,7 +100,7 @@ impl<'a> Step for MatchStep<'a> {
     }
 }
 
-/// Flies every maneuver again, where the pipeline has tolerances.
+/// Flies every maneuver again, if the pipeline has tolerances.
 ///
 /// # Errors
 /// A fault that stops the run.
@@ -143,8 +143,8 @@ pub fn fly_again(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
     Ok(())
 }
 
-/// Finds what decides the proof of match of the flown maneuvers of a class, when a model predicts them:
-/// the differences of those that can be flown again, in the order of the flights.
+/// Finds the differences that decide the proof of match, predicted by a model, of the flown
+/// maneuvers of a class: one for each that can be flown again, in the order of the flights.
 ///
 /// # Errors
 /// A record that cannot be read.
@@ -185,7 +185,7 @@ pub fn decisive_differences(
     Ok(found?.into_iter().flatten().collect())
 }
 
-/// Derivatives of the models, and of what stands beside them.
+/// Derivatives of the models, of the posterior, and of the tunnel.
 struct Databases {
     models: Vec<(ModelSource, WindTunnel)>,
     posterior: WindTunnel,

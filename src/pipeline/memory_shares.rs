@@ -41,7 +41,7 @@ pub struct MemoryShares {
 }
 
 impl MemoryShares {
-    /// Divides the memory: half for what flights hold, half for what threads hold.
+    /// Divides the memory: half for flights, half for threads.
     pub fn of(memory_mb: f64, channels: usize, threads: usize) -> MemoryShares {
         let half = 0.5e6 * memory_mb;
         let flights = clamped(
@@ -78,10 +78,10 @@ fn clamped(value: f64, least: usize, most: usize) -> usize {
     count
 }
 
-/// Does `work` on every item by a few threads of their own, and returns the results in the order of
+/// Calls `work` on every item in a few threads of its own, and returns the results in the order of
 /// the items; `None` for an item whose thread panicked.
 ///
-/// Within `work` the thread pool serves one item: no thread of the pool takes up another while it
+/// Within `work` the thread pool serves one item: no thread of the pool begins another while it
 /// waits.
 pub fn map_with_workers<T: Sync, R: Send>(
     workers: usize,

@@ -1,12 +1,12 @@
 //! The pipeline: the stages of a campaign, brought up to date in order.
 //!
-//! Ingest, segment, surfaces, estimate, joint estimate, prediction and proof of match are steps ([`step::Step`]): artefacts
-//! of the store, each a function of a key. [`step_runner::StepRunner`] loads an artefact or makes
-//! it, so what is up to date is not done again and a killed run goes on where it was. Trends,
-//! posterior, flying qualities, comparison and report are small and made anew each time. [`Conductor`] brings the stages in
-//! order, and its [`Campaign`] carries the state of each flight and maneuver: a run, `status`,
-//! `explain` and the shards of a cluster all ask it. Results do not depend on threads: they are
-//! collected in the order of flights and maneuvers.
+//! Ingest, segment, surfaces, estimate, joint estimate, prediction and proof of match are steps
+//! ([`step::Step`]): artefacts of the store, each a function of a key. [`step_runner::StepRunner`]
+//! loads an artefact or makes it, so nothing is computed twice, and a killed run continues where it
+//! ended. Trends, posterior, flying qualities, comparison and report are small and made anew each
+//! time. [`Conductor`] runs the stages in order, and its [`Campaign`] carries the state of each
+//! flight and maneuver. A run, `status`, `explain` and the shards of a cluster all use it. Results
+//! do not depend on threads: they are collected in the order of flights and maneuvers.
 
 mod campaign;
 mod conductor;

@@ -39,7 +39,7 @@ pub fn fit_model(config: &Config, campaign: &mut Campaign) {
     campaign.model = found;
 }
 
-/// Results of the maneuvers that converged, as the posterior takes them.
+/// Results of the maneuvers that converged, as evidence for the posterior.
 pub fn evidence(campaign: &Campaign) -> Vec<Evidence<'_>> {
     let estimates = by_maneuver(&campaign.estimates);
     let combined = by_maneuver(&campaign.combined);
@@ -82,7 +82,7 @@ fn lift_and_drag(
     evidence.iter().filter_map(of_maneuver).flatten().collect()
 }
 
-/// Rows of the maneuvers with what they hold read from the posterior of the other flights.
+/// Rows of the maneuvers with their held values taken from the posterior of the other flights.
 fn with_held(
     rows: &[EstimateRow],
     model: &Model,
@@ -112,7 +112,7 @@ fn failed((coefficient, failure): &(Coefficient, Failure)) -> Problem {
     problem(ProblemStage::Model, "", &place, &reason(*failure))
 }
 
-/// Reason of a posterior's failure, as a problem has it.
+/// Reason of a posterior's failure, in the words of a problem.
 fn reason(failure: Failure) -> String {
     match failure {
         Failure::NotFinite => {
@@ -126,7 +126,7 @@ fn reason(failure: Failure) -> String {
     }
 }
 
-/// Rows of each maneuver, which stand together.
+/// Rows of each maneuver, which are consecutive.
 pub fn by_maneuver(rows: &[EstimateRow]) -> BTreeMap<&str, &[EstimateRow]> {
     rows.chunk_by(|a, b| a.maneuver_id == b.maneuver_id)
         .map(|own| (own[0].maneuver_id.as_str(), own))

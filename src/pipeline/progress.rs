@@ -4,7 +4,7 @@
 pub trait Progress: Sync {
     /// Opens a stage of this many items.
     fn begin(&self, stage: &str, items: usize);
-    /// Names an item that is taken to work and may take long.
+    /// Reports an item that begins now and may take long.
     fn start(&self, item: &str);
     /// Counts a finished item.
     fn advance(&self, item: &str);

@@ -16,8 +16,8 @@ use crate::tables::EventRow;
 /// Samples of a window: an hour at 36 Hz. A record up to half as long again is one window.
 const WINDOW: usize = 1 << 17;
 
-/// Surroundings that a window sees beyond its own samples on either side, s: longer than any
-/// maneuver with its lead-in and decay.
+/// Time beyond its own samples, on either side, that a window searches, s: longer than any maneuver
+/// with its lead-in and decay.
 const SURROUNDINGS_S: f64 = 180.0;
 
 /// Shortest time between an event and the end of a window, s.
@@ -120,7 +120,7 @@ fn find_in_window(
     })
 }
 
-/// Number of samples that a window sees beyond its own on either side.
+/// Number of samples beyond its own, on either side, that a window searches.
 fn surroundings(header: &RecordHeader) -> usize {
     samples(SURROUNDINGS_S, header.step_s)
 }

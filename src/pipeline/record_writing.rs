@@ -1,7 +1,7 @@
-//! Writing of a flight's records: the files surveyed, every channel through its flow into the
-//! record's file, and the record checked.
+//! Writing of a flight's records: the files are surveyed, every channel is conditioned and written
+//! into the record's file, and the record is checked.
 //!
-//! The channels of a row group flow in parallel, in batches that the memory allows.
+//! The channels of a row group are processed in parallel, in batches that the memory allows.
 
 use std::collections::BTreeSet;
 use std::ops::Range;

@@ -11,10 +11,11 @@ use crate::maneuver::Maneuver;
 /// Share of common rows from which a flight counts as a copy of another.
 const COPY_SHARE: f64 = 0.9;
 
-/// Signatures compare ten seconds at a time: up to so much more on either side may be repeated, s.
+/// Signatures compare ten seconds at a time: up to this much more on either side may be repeated,
+/// s.
 const SIGNATURE_STEP_S: f64 = 10.0;
 
-/// Rejects flights whose id is another's: `f.2` may be a file and the second stretch of `f`.
+/// Rejects flights whose id another flight has: `f.2` may be a file and the second stretch of `f`.
 pub fn reject_second_ids(campaign: &mut Campaign) {
     let mut ids = BTreeSet::new();
     for flight in &mut campaign.flights {
@@ -27,7 +28,7 @@ pub fn reject_second_ids(campaign: &mut Campaign) {
     }
 }
 
-/// Rejects flights whose rows are another's, and notes the rows that two flights share.
+/// Rejects flights that repeat the rows of another, and notes the rows that two flights share.
 pub fn reject_copies(campaign: &mut Campaign) {
     for later in 1..campaign.flights.len() {
         let (before, rest) = campaign.flights.split_at_mut(later);
@@ -90,7 +91,7 @@ fn note(flight: &mut Flight, earlier: &str, rows: &RepeatedRows) {
         .push(problem(ProblemStage::Ingest, &id, &id, &reason));
 }
 
-/// Leaves out maneuvers in rows that an earlier flight has, too.
+/// Leaves out maneuvers in rows that an earlier flight also has.
 pub fn leave_out_repeated(campaign: &mut Campaign) {
     let Campaign {
         maneuvers,

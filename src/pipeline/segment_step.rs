@@ -40,7 +40,7 @@ pub struct SegmentStep<'a> {
 }
 
 impl<'a> SegmentStep<'a> {
-    /// Lays out the step. The record is opened only if the analyst gives events.
+    /// Prepares the step. The record is opened only if the analyst gives events.
     ///
     /// # Errors
     /// The record cannot be opened.
@@ -92,7 +92,7 @@ impl<'a> Step for SegmentStep<'a> {
     }
 }
 
-/// Brings the maneuvers of all accepted flights.
+/// Loads or makes the maneuvers of all accepted flights.
 ///
 /// # Errors
 /// A fault that stops the run.

@@ -48,9 +48,10 @@ pub trait Step: Sync {
 /// A computed artefact.
 #[derive(Clone, Debug)]
 pub enum Made<A> {
-    /// Decided by the key alone; it is saved.
+    /// Determined by the key alone; it is saved.
     Settled(A),
-    /// Spoilt by a passing fault, such as a file that changed meanwhile; the next run tries again.
+    /// Affected by a temporary fault, such as a file that changed meanwhile; the next run tries
+    /// again.
     Passing(A),
 }
 
@@ -62,11 +63,11 @@ pub struct Companion {
     pub digest: Option<Digest>,
 }
 
-/// An artefact at hand.
+/// An artefact, loaded or made.
 #[derive(Clone, Debug)]
 pub struct Brought<A> {
     pub name: ArtefactName,
     pub artefact: A,
-    /// `false` for an artefact spoilt by a passing fault, which the store does not keep.
+    /// `false` for an artefact that a temporary fault affected; the store does not keep it.
     pub is_stored: bool,
 }

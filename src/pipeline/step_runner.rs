@@ -1,4 +1,4 @@
-//! Loading or making, saving and requiring of artefacts, for every kind of step.
+//! Loading, making and saving of artefacts, and the list of missing ones, for every kind of step.
 
 use std::collections::BTreeSet;
 use std::sync::Mutex;
@@ -11,7 +11,7 @@ use crate::config::Config;
 use crate::error::Result;
 use crate::store::{ArtefactName, InputDigests, Listed, Store};
 
-/// Treatment of an artefact that the store lacks.
+/// Treatment of an artefact that is absent from the store.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Absent {
     /// It is made and saved.
@@ -20,7 +20,7 @@ pub enum Absent {
     Report,
 }
 
-/// Brings artefacts from the store, and makes those that it lacks unless told to only look.
+/// Loads artefacts from the store, and makes those that are missing unless it only reports them.
 pub struct StepRunner<'a> {
     pub config: &'a Config,
     pub store: Store,
@@ -50,8 +50,7 @@ impl<'a> StepRunner<'a> {
         }
     }
 
-    /// Returns a step's artefact, made if need be; `None` for one that is missing where nothing is
-    /// made.
+    /// Returns a step's artefact, made if necessary; `None` for a missing one if nothing is made.
     ///
     /// # Errors
     /// As [`Step::make`]; an artefact that cannot be saved.
@@ -73,7 +72,7 @@ impl<'a> StepRunner<'a> {
         Ok(Some(brought))
     }
 
-    /// Loads a step's artefact; `None` unless it and its companions are as they were written.
+    /// Loads a step's artefact; `None` unless it and its companions are unchanged.
     pub fn load<S: Step>(&self, step: &S) -> Option<Brought<S::Artefact>> {
         let name = step.name();
         let artefact = self.store.load(&name)?;
@@ -117,7 +116,7 @@ impl<'a> StepRunner<'a> {
             .unwrap_or_default()
     }
 
-    /// `true` if the store has a companion as it was written.
+    /// `true` if the store has a companion unchanged.
     fn has(&self, companion: &Companion) -> bool {
         let Companion { name, digest } = companion;
         match digest {
@@ -126,7 +125,7 @@ impl<'a> StepRunner<'a> {
         }
     }
 
-    /// Brings the artefacts of several steps in parallel, in their order.
+    /// Loads or makes the artefacts of several steps in parallel, in their order.
     ///
     /// # Errors
     /// As [`StepRunner::bring`].
@@ -144,7 +143,7 @@ impl<'a> StepRunner<'a> {
             .collect()
     }
 
-    /// Does `work` with a progress display of so many items, unless nothing is made.
+    /// Calls `work` with a progress display of this number of items, unless nothing is made.
     pub fn with_progress<T>(&self, stage: &str, items: usize, work: impl FnOnce() -> T) -> T {
         if self.absent == Absent::Report {
             return work();
@@ -155,8 +154,8 @@ impl<'a> StepRunner<'a> {
         result
     }
 
-    /// Names a flight in work to the progress display and in the store, until the returned value is
-    /// dropped.
+    /// Reports a flight as being processed, to the progress display and in the store, until the
+    /// returned value is dropped.
     pub fn start_flight<'b>(&'b self, flight_id: &'b str) -> Option<Listed<'b>> {
         self.progress.start(flight_id);
         self.store.list_in_work(flight_id)

@@ -75,7 +75,7 @@ impl<'a> Step for SurfacesStep<'a> {
     }
 }
 
-/// Brings the evidence of all flights, and combines it to the delays of the surfaces.
+/// Loads or makes the evidence of all flights, and combines it to the delays of the surfaces.
 ///
 /// # Errors
 /// A fault that stops the run.
@@ -119,8 +119,8 @@ pub fn surfaces(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
     Ok(())
 }
 
-/// Adds the delays of the surfaces from all flights, and what was found of each flight. Then the errors
-/// of all instruments are compared over the flights.
+/// Adds the delays of the surfaces from all flights, and the findings on each flight. Then the
+/// errors of all instruments are compared over the flights.
 fn combine(config: &Config, campaign: &mut Campaign, flights: &[FlightEvidence]) {
     let delays = surfaces::of_campaign(flights);
     campaign.delays = surfaces::corrections(&delays, &config.estimate.surfaces);
@@ -131,8 +131,8 @@ fn combine(config: &Config, campaign: &mut Campaign, flights: &[FlightEvidence])
     campaign.problems.extend(found.problems);
 }
 
-/// Compares the errors of the instruments over the flights, and corrects the flights that hardly determine
-/// them by the others.
+/// Compares the errors of the instruments over the flights. Flights that hardly determine an error
+/// are corrected by the others.
 fn compare_flights(config: &Config, campaign: &mut Campaign, of_surfaces: Vec<ErrorSeries>) {
     let evidence = |flight: &Flight| flight.ingested.assessment.error_evidence.clone();
     let flights: Vec<(String, Vec<ErrorEvidence>)> = campaign

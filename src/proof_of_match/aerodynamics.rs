@@ -1,9 +1,9 @@
-//! Aerodynamic coefficients of a simulation: those of the trim, and their change with everything that
-//! moves from it.
+//! Aerodynamic coefficients of a simulation: the values at trim, and their change with the motion
+//! and the surfaces.
 //!
-//! C = C_trim + ∫ C_α dα + Σ C_x(α) (x − x_trim), with the derivatives at the present angle of attack.
-//! A derivative is the local slope, as it is estimated; the level of a coefficient is matched at the
-//! trim, so constants of the database do not enter.
+//! C = C_trim + ∫ C_α dα + Σ C_x(α) (x − x_trim), with the derivatives at the present angle of
+//! attack. A derivative is the local slope, as it is estimated. The level of a coefficient is
+//! matched at the trim, so constants of the database do not enter.
 
 use nalgebra::Vector3;
 
@@ -23,7 +23,8 @@ pub const FORCE: [(usize, f64); 3] = [(2, -1.0), (3, 1.0), (0, -1.0)];
 /// Coefficient of the moment about each body axis.
 pub const MOMENT: [usize; 3] = [4, 1, 5];
 
-/// Recorded signals of a build-up, each once: surfaces and vanes. The simulation has the flow itself.
+/// Recorded signals of a build-up, each once: surfaces and vanes. The flow itself comes from the
+/// simulation.
 #[must_use]
 pub fn recorded_signals(buildup: &Buildup) -> Vec<&str> {
     let all = buildup
@@ -51,7 +52,7 @@ pub struct Flow {
 }
 
 impl Flow {
-    /// Flow by the air data at the c.g., rates in rad/s.
+    /// Flow from the air data at the c.g., rates in rad/s.
     #[must_use]
     pub fn new(air: &AirData, rates: [f64; 3], alpha_rate: f64) -> Flow {
         Flow {
@@ -65,7 +66,7 @@ impl Flow {
         }
     }
 
-    /// Places of its quantities among the slopes.
+    /// Indices of its quantities among the slopes.
     pub const ALPHA: usize = 0;
     pub const BETA: usize = 1;
     pub const VELOCITY: usize = 2;
@@ -98,7 +99,7 @@ enum Factor {
     AlphaRate {
         half_length: f64,
     },
-    /// Recorded signal with this place.
+    /// Recorded signal with this index.
     Recorded(usize),
     /// Recorded deflection over dynamic pressure times this area or volume.
     Vane {
@@ -180,7 +181,7 @@ impl<'a> Aerodynamics<'a> {
         )
     }
 
-    /// Place of a derivative's coefficient.
+    /// Index of a derivative's coefficient.
     #[must_use]
     pub fn coefficient(&self, derivative: usize) -> usize {
         self.terms[derivative].0
@@ -202,8 +203,8 @@ impl<'a> Aerodynamics<'a> {
     }
 }
 
-/// Aerodynamics about a trim, prepared for a run of thousands of instants: the coefficients at the trim
-/// are computed once, and factors that several derivatives have once an instant.
+/// Aerodynamics about a trim, prepared for a run of thousands of instants. The coefficients at the
+/// trim are computed once; a factor that several derivatives have is computed once per instant.
 #[derive(Clone, Debug)]
 pub struct AboutTrim<'a> {
     table: &'a DerivativeTable,
@@ -221,7 +222,7 @@ pub struct AboutTrim<'a> {
 #[derive(Clone, Debug)]
 struct TrimmedTerm {
     derivative: usize,
-    /// Place among the factors.
+    /// Index among the factors.
     factor: usize,
     is_along_alpha: bool,
     /// Factor at the trim; along α the integral of the derivative there.
@@ -292,8 +293,8 @@ impl<'a> AboutTrim<'a> {
         change
     }
 
-    /// Change of the coefficients from the trim with its slopes along the flow, and along the derivatives at every
-    /// angle of attack alike.
+    /// Change of the coefficients from the trim, with its slopes along the flow, and along each
+    /// derivative raised by the same amount at every angle of attack.
     #[must_use]
     pub fn change_with_slopes(&mut self, flow: &Flow, recorded: &[f64]) -> CoefficientSlopes {
         let change = self.change(flow, recorded);
@@ -335,7 +336,7 @@ pub struct CoefficientSlopes {
     pub by_derivative: Vec<f64>,
 }
 
-/// Place of a coefficient among those of both axes.
+/// Index of a coefficient among those of both axes.
 fn index(coefficient: Coefficient) -> usize {
     let first = match coefficient.axis() {
         Axis::Longitudinal => 0,

@@ -1,11 +1,12 @@
 //! Difference that decides whether a repeat flight passes, as a linear function of the derivatives.
 //!
-//! To first order the outputs of a repeat flight differ from a model's by the mean difference, the
-//! effects of the derivatives' deviations, those of the start's errors, and the sensors' noise. At one
-//! sample the difference is therefore normal, and its nearest limit is some standard deviations away. Of
-//! an alternative the sample with the smallest distance counts, of a requirement the alternative with
-//! the largest, and of the requirements the one with the smallest. A requirement of the Dutch roll is on
-//! one value, whose noise is the error of the repeat flight's estimates.
+//! To first order the outputs of a repeat flight differ from a model's by four parts: the mean
+//! difference, the effects of the derivatives' deviations, those of the start's errors, and the
+//! sensors' noise. At one sample the difference is therefore normal, and its nearest limit is a
+//! number of standard deviations away. For an alternative, the sample with the smallest distance
+//! counts; for a requirement, the alternative with the largest; among the requirements, the one
+//! with the smallest. A requirement on the Dutch roll is on one value, whose noise is the error of
+//! the repeat flight's estimates.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -28,13 +29,13 @@ pub struct DecisiveDifference {
     pub maneuver_id: String,
     pub condition: Condition,
     pub quantity: MatchedQuantity,
-    /// Difference of a repeat flight of the posterior's mean from the model.
+    /// Difference between a repeat flight at the posterior's mean and the model.
     pub mean: f64,
     /// Slopes along the values of the posterior.
     pub slopes: Vec<(LocalValue, f64)>,
-    /// Standard deviation by the start and the noise.
+    /// Standard deviation from the start and the noise.
     pub rest: f64,
-    /// `true` where the model is the posterior, whose mean the model is.
+    /// `true` if the model is the posterior, so that it moves with the posterior's mean.
     pub follows_mean: bool,
 }
 
@@ -48,7 +49,7 @@ pub struct PredictedDutchRoll<'a> {
 }
 
 impl PredictedDutchRoll<'_> {
-    /// Difference of a quantity; `None` where that of the repeat flights does not oscillate.
+    /// Difference of a quantity; `None` if the repeat flights have no oscillation.
     fn difference(
         &self,
         posterior: &LocalPosterior,
@@ -77,8 +78,8 @@ impl PredictedDutchRoll<'_> {
 }
 
 impl MeanRun {
-    /// The decisive difference of the run of a model at every `stride`-th sample, and of its Dutch roll where
-    /// that is known; `None` where a run departs or no tolerance can be judged.
+    /// The decisive difference of the run of a model at every `stride`-th sample, and of its Dutch
+    /// roll if that is available; `None` if a run departs or no tolerance can be judged.
     #[must_use]
     pub fn decisive(
         &self,
@@ -106,8 +107,8 @@ impl MeanRun {
         decisive.map(|(_, difference)| difference)
     }
 
-    /// Difference at the sample of a tolerance with the smallest distance inside its limit, after that
-    /// distance.
+    /// Difference at the sample with the smallest distance inside a tolerance's limit, preceded by
+    /// that distance.
     fn worst(
         &self,
         flown: (&Recording, &FreeRun),
@@ -156,9 +157,9 @@ impl MeanRun {
 pub struct LinearDifference {
     pub quantity: MatchedQuantity,
     pub mean: f64,
-    /// Slopes by place among the values of the posterior.
+    /// Slopes by index among the values of the posterior.
     pub slopes: Vec<(usize, f64)>,
-    /// Standard deviation by the start and the noise.
+    /// Standard deviation from the start and the noise.
     pub rest: f64,
 }
 
@@ -168,7 +169,7 @@ impl LinearDifference {
         (1.0 - self.mean.abs()) / self.deviation(covariance).hypot(self.rest)
     }
 
-    /// Standard deviation by the derivatives.
+    /// Standard deviation from the derivatives.
     #[must_use]
     pub fn deviation(&self, covariance: &DMatrix<f64>) -> f64 {
         let mut slopes = DVector::zeros(covariance.nrows());

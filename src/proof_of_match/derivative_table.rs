@@ -7,7 +7,8 @@ use crate::numerics::trapezoid::running_integral;
 /// Spacing of the table, deg. It is linear between, as most databases are.
 const STEP_DEG: f64 = 1.0;
 
-/// Reach of the table either way from the maneuver's mean, deg. Beyond, derivatives are constant.
+/// Reach of the table on either side of the maneuver's mean, deg. Beyond it, derivatives are
+/// constant.
 const REACH_DEG: f64 = 20.0;
 
 /// Derivatives over angle of attack. A derivative along α is tabulated as its integral from the
@@ -21,7 +22,7 @@ pub struct DerivativeTable {
     derivatives: usize,
 }
 
-/// Place of an angle of attack in a table.
+/// Position of an angle of attack in a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
     row: usize,
@@ -30,8 +31,8 @@ pub struct Place {
 }
 
 impl DerivativeTable {
-    /// Tabulates a model at a maneuver's condition. A derivative that the model lacks is the
-    /// fallback's, or zero.
+    /// Tabulates a model at a maneuver's condition. A derivative that the model lacks is taken from
+    /// the fallback, or is zero.
     #[must_use]
     pub fn new(
         buildup: &Buildup,
@@ -106,7 +107,7 @@ impl DerivativeTable {
         }
     }
 
-    /// Entries of all derivatives on both sides of a place.
+    /// Entries of all derivatives on both sides of a position.
     #[inline]
     #[must_use]
     pub fn entries(&self, place: Place) -> Entries<'_> {
@@ -120,7 +121,7 @@ impl DerivativeTable {
         }
     }
 
-    /// Derivative at a place, constant beyond the table.
+    /// Derivative at a position, constant beyond the table.
     #[must_use]
     pub fn value(&self, place: Place, derivative: usize) -> f64 {
         self.entries(place).value(derivative)
@@ -133,7 +134,7 @@ pub struct Entries<'a> {
     low: &'a [f64],
     high: &'a [f64],
     fraction: f64,
-    /// Fraction of the interval, not beyond the table.
+    /// Fraction of the interval, limited to the table.
     fraction_inside: f64,
 }
 
@@ -145,7 +146,7 @@ impl Entries<'_> {
         self.between(self.fraction_inside, derivative)
     }
 
-    /// Integral of a derivative along α, to which the derivative is constant beyond the table.
+    /// Integral of a derivative along α; beyond the table the derivative is constant.
     #[inline]
     #[must_use]
     pub fn integral(&self, derivative: usize) -> f64 {

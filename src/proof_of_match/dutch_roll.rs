@@ -1,8 +1,9 @@
-//! Dutch roll of a maneuver: of the flight by its own estimates, of a simulator by its model.
+//! Dutch roll of a maneuver: that of the flight by its own estimates, that of a simulator by its
+//! model.
 //!
 //! Period, time to half and damping ratio follow from the same linear equations at the maneuver's
-//! condition ([`crate::qualities`]), so that only the derivatives differ. A maneuver has no free decay
-//! of several cycles from which they could be read.
+//! condition ([`crate::qualities`]), so that only the derivatives differ. A maneuver contains no
+//! free decay over several cycles from which they could be read.
 
 use std::collections::BTreeMap;
 
@@ -50,13 +51,13 @@ impl DutchRoll {
     }
 }
 
-/// Quantity of the Dutch roll that repeat flights' estimates have, to first order.
+/// Quantity of the Dutch roll according to the estimates of repeat flights, to first order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RepeatQuantity {
     pub mean: f64,
     /// Slopes along the deviations, in their order.
     pub slopes: Vec<f64>,
-    /// Standard deviation by the errors of the estimates.
+    /// Standard deviation from the errors of the estimates.
     pub error: f64,
 }
 
@@ -64,7 +65,7 @@ pub struct RepeatQuantity {
 #[derive(Clone, Debug)]
 pub struct LateralModes {
     linear: LinearModel,
-    /// Derivatives of the equations, by their place in the build-up.
+    /// Derivatives of the equations, by their index in the build-up.
     derivatives: Vec<usize>,
     /// The maneuver's own values.
     own: DVector<f64>,
@@ -77,7 +78,7 @@ pub struct LateralModes {
 }
 
 impl LateralModes {
-    /// Equations of a maneuver; `None` where a derivative has no value or there is no oscillation.
+    /// Equations of a maneuver; `None` if a derivative has no value or there is no oscillation.
     #[must_use]
     pub fn new(
         (aircraft, buildup, tunnel): (&Aircraft, &Buildup, &WindTunnel),
@@ -141,8 +142,9 @@ impl LateralModes {
         DVector::from_iterator(self.own.len(), values)
     }
 
-    /// Quantity that the estimates of repeat flights have, about the mean of a posterior; `deviations` are
-    /// places in the build-up and standard deviations. `None` where the Dutch roll does not oscillate.
+    /// Quantity according to the estimates of repeat flights, about the mean of a posterior;
+    /// `deviations` are indices in the build-up and standard deviations. `None` if the Dutch roll
+    /// does not oscillate.
     #[must_use]
     pub fn of_repeats(
         &self,
@@ -175,8 +177,8 @@ impl LateralModes {
         })
     }
 
-    /// Dutch roll that a repeat flight's estimates have: those of an aircraft that deviates from a
-    /// model, with errors of their own.
+    /// Dutch roll according to a repeat flight's estimates: those of an aircraft that deviates from
+    /// a model, with errors of their own.
     #[must_use]
     pub fn of_repeat(
         &self,
@@ -192,7 +194,7 @@ impl LateralModes {
         self.as_estimated(values)
     }
 
-    /// Dutch roll of a repeat flight's values. What the maneuver holds stays.
+    /// Dutch roll of a repeat flight's values. Values that the maneuver holds are kept.
     fn as_estimated(&self, mut values: DVector<f64>) -> Option<DutchRoll> {
         for ((value, own), is_estimated) in values.iter_mut().zip(&self.own).zip(&self.estimated) {
             if !is_estimated {
@@ -242,7 +244,7 @@ fn nothing_by_surface() -> BTreeMap<String, BTreeMap<String, f64>> {
     BTreeMap::new()
 }
 
-/// Dutch roll of the equations at values of their derivatives; `None` where it does not oscillate.
+/// Dutch roll of the equations at values of their derivatives; `None` if it does not oscillate.
 fn dutch_roll(linear: &LinearModel, values: &DVector<f64>) -> Option<DutchRoll> {
     let found = linear.quantities(Axis::Lateral, values, Differentiation::ValuesAlone)?;
     let value = |quantity: FlyingQuality| {

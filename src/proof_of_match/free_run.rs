@@ -1,5 +1,5 @@
-//! Free run: the rigid body flies from a start with the recorded surfaces, thrust and mass, and nothing
-//! else of the record.
+//! Free run: the rigid body flies from a start, with nothing of the record but the surfaces, thrust
+//! and mass.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use super::aerodynamics::{AboutTrim, Aerodynamics, COEFFICIENTS, Flow, Trim};
@@ -13,7 +13,7 @@ use crate::units::DEG;
 use nalgebra::{Quaternion, Vector3};
 use pulp::{Arch, Simd, WithSimd};
 
-/// Angle of attack beyond which the aircraft has departed, deg: no build-up has a meaning there.
+/// Angle of attack beyond which the aircraft has departed, deg: no build-up is valid there.
 const DEPARTURE_DEG: f64 = 90.0;
 
 /// Number of states at the start.
@@ -22,19 +22,22 @@ pub const STATES: usize = 8;
 /// Velocities and rates among the states of the body.
 const STATES_OF_BODY: usize = 6;
 
-/// State and balance from which a simulation starts. Heading and place over the ground decide nothing.
+/// State and balance from which a simulation starts. Heading and position over the ground have no
+/// effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Start {
     /// α, β, airspeed, p, q, r, pitch attitude, bank; rad, ft/s, rad/s.
     pub state: [f64; STATES],
     pub altitude_ft: f64,
-    /// Dynamic pressure as measured over that of the standard atmosphere: the density of the day.
+    /// Ratio of the measured dynamic pressure to that in the standard atmosphere: the density of
+    /// the day.
     pub density_ratio: f64,
     pub trim: Trim,
 }
 
 impl Start {
-    /// The start with one of its states, or after them trim coefficients, changed.
+    /// The start with one parameter changed: a state, or one of the trim coefficients, which follow
+    /// the states.
     #[must_use]
     pub fn moved(&self, parameter: usize, by: f64) -> Start {
         let mut start = self.clone();
@@ -121,7 +124,7 @@ impl Simulation<'_> {
         self.fly_with(start, (samples, stride), &mut Alone)
     }
 
-    /// As [`Simulation::fly`], with a companion.
+    /// As [`Simulation::fly`], with computations beside the run.
     pub fn fly_with(
         &self,
         start: &Start,
@@ -174,16 +177,16 @@ impl Simulation<'_> {
     }
 }
 
-/// Computation beside a run, at its instants.
+/// Computation beside a run, at the instants of its stages.
 pub trait Companion {
-    /// Takes the instant of a stage, with the equations and the point of the recording. The first stage of a
-    /// step is at its sample.
+    /// Called at each stage, with the equations and the point of the recording. The first stage of
+    /// a step is at its sample.
     fn at_stage(&mut self, stage: usize, instant: &Instant, at: (&mut RunEquations, usize));
 
-    /// Follows the first stage of a sample, whether a step starts there or not.
+    /// Called after the first stage of a sample, even if no step starts there.
     fn at_sample(&mut self, instant: &Instant);
 
-    /// Follows all stages of a step; its end is not yet normalised.
+    /// Called after all stages of a step; its end is not yet normalised.
     fn after_step(&mut self, end: &BodyState);
 }
 
@@ -196,8 +199,8 @@ impl Companion for Alone {
     fn after_step(&mut self, _: &BodyState) {}
 }
 
-/// Readings of the sensors, compiled for the processor at hand: without its fused multiplication the vanes'
-/// angles take as long as the motion.
+/// Readings of the sensors, compiled for the processor at hand. Without its fused multiplication
+/// the vanes' angles take as long to compute as the motion.
 struct Sensing<'a> {
     instant: &'a Instant,
     aircraft: &'a Aircraft,
@@ -255,13 +258,13 @@ impl RunEquations<'_> {
         (loads, slopes.by_derivative)
     }
 
-    /// Coefficients by their change from the trim.
+    /// Coefficients from their change relative to the trim.
     fn coefficients(&self, change: [f64; COEFFICIENTS]) -> [f64; COEFFICIENTS] {
         let level = self.start.trim.coefficients;
         std::array::from_fn(|i| level[i] + change[i])
     }
 
-    /// Motion where the loads see this α̇, rad/s.
+    /// Motion for loads at this α̇, rad/s.
     fn instant_at(&mut self, alpha_rate: f64, state: &BodyState, point: usize) -> Instant {
         let recording = self.simulation.recording;
         let inputs = recording.inputs(point);

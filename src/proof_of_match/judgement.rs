@@ -20,9 +20,10 @@ pub struct Finding {
     pub model_value: Option<f64>,
     pub samples: usize,
     pub inside_pct: f64,
-    /// Largest distance beyond the tolerance, with its time; `None` where the simulated aircraft departs.
+    /// Largest distance beyond the tolerance, with its time; `None` if the simulated aircraft
+    /// departs.
     pub largest_excess: Option<(f64, f64)>,
-    /// Minus infinity where the simulated aircraft departs.
+    /// Minus infinity if the simulated aircraft departs.
     pub margin: f64,
 }
 
@@ -60,7 +61,7 @@ impl Judged<'_> {
     }
 }
 
-/// Tolerances of some tests that can be judged: those of the Dutch roll where it is known.
+/// Tolerances of some tests that can be judged; those of the Dutch roll only if it is available.
 #[must_use]
 pub fn judged<'a>(tests: &[&'a Test], has_dutch_roll: bool) -> Vec<Judged<'a>> {
     let of_test = |test: &&'a Test| {
@@ -119,7 +120,7 @@ pub fn judge(
 }
 
 impl Simulated {
-    /// Difference of a quantity of the Dutch roll; `None` where the flight has none.
+    /// Difference of a quantity of the Dutch roll; `None` if the flight has none.
     fn difference(&self, tolerance: &Tolerance) -> Option<Difference> {
         let flight = self.flight?.value(tolerance.quantity)?;
         let model = self.model.and_then(|model| model.value(tolerance.quantity));
@@ -184,7 +185,7 @@ fn largest_excess(differences: &[Difference]) -> Option<(f64, f64)> {
     largest.filter(|(excess, _)| excess.is_finite())
 }
 
-/// Number of samples that may be outside, when a share must be inside.
+/// Number of samples that may be outside, given the share that must be inside.
 #[must_use]
 pub fn allowed_outside(samples: usize, required_pct: f64) -> usize {
     #[expect(
@@ -198,7 +199,7 @@ pub fn allowed_outside(samples: usize, required_pct: f64) -> usize {
     samples.saturating_sub(required)
 }
 
-/// One less the ratio that the required share of samples does not exceed.
+/// One less the smallest ratio that is not exceeded by the required share of samples.
 fn margin(differences: &[Difference], required_pct: f64) -> f64 {
     let mut ratios: Vec<f64> = differences.iter().map(Difference::ratio).collect();
     ratios.sort_by(f64::total_cmp);

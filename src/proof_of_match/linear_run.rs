@@ -22,9 +22,10 @@ use crate::rigid_body::{
 /// Parameter of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Parameter {
-    /// Place among the states of the start, and after them the coefficients at its trim.
+    /// Index among the states of the start; after the states, the coefficients at its trim.
     Start(usize),
-    /// Place of a derivative in the build-up; it is raised alike at every angle of attack.
+    /// Index of a derivative in the build-up; it is raised by the same amount at every angle of
+    /// attack.
     Derivative(usize),
 }
 
@@ -58,16 +59,16 @@ impl Simulation<'_> {
     }
 }
 
-/// Slopes along a run, as far as it has come.
+/// Slopes along a run, up to the present step.
 struct RunSlopes<'a> {
     simulation: &'a Simulation<'a>,
     parameters: &'a [Parameter],
-    /// Coefficient that each parameter changes by itself.
+    /// Coefficient that each parameter changes directly.
     coefficients: Vec<Option<usize>>,
     step_s: f64,
     stages: [Option<StageSlopes>; STAGES],
-    /// Change of the coefficients by the parameters themselves at each stage: coefficient by coefficient, each
-    /// parameter.
+    /// Direct change of the coefficients by the parameters at each stage: coefficient by
+    /// coefficient, each parameter.
     own: [AlignedBuffer; STAGES],
     /// Slopes of the state: state by state, each parameter.
     states: AlignedBuffer,

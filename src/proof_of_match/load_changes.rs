@@ -34,7 +34,7 @@ pub struct LoadSlopes {
     lag: Option<Lag>,
 }
 
-/// Slopes of α̇ where the loads depend on it, so that it depends on itself.
+/// Slopes of α̇ for loads that depend on it, so that α̇ depends on itself.
 #[derive(Clone, Copy, Debug)]
 struct Lag {
     by_velocity: [f64; 3],
@@ -46,7 +46,7 @@ struct Lag {
 }
 
 impl LoadSlopes {
-    /// Slopes of the loads by the coefficients and their slopes along the flow.
+    /// Slopes of the loads from the coefficients and their slopes along the flow.
     #[must_use]
     pub fn new(
         aerodynamics: &Aerodynamics,
@@ -75,7 +75,7 @@ impl LoadSlopes {
         slopes
     }
 
-    /// α̇ = (u ẇ − w u̇)/(u² + w²), in which ẇ and u̇ are straight lines in α̇.
+    /// α̇ = (u ẇ − w u̇)/(u² + w²), where ẇ and u̇ are linear in α̇.
     fn lag(&self, instant: &Instant) -> Lag {
         let along = |i: usize| self.coefficients[i][Flow::ALPHA_RATE];
         let force: [f64; 3] = from_fn(|i| self.force_by_own[i] * along(FORCE[i].0));
@@ -98,7 +98,7 @@ impl LoadSlopes {
         }
     }
 
-    /// Change of the loads with the state, and with the coefficients themselves.
+    /// Change of the loads with the state, and with direct changes of the coefficients.
     #[inline(always)]
     pub fn change<S: Simd>(
         &self,

@@ -20,7 +20,7 @@ use crate::maneuver::{Maneuver, Means};
 use crate::model::LocalPosterior;
 use crate::tables::{History, HistoryOutput, MatchRow, MatchVerdict, MatchVerdictRow, ModelSource};
 
-/// Time after the last input at which open-loop surfaces rest, s: that of an actuator.
+/// Time after the last input until surfaces without feedback are at rest, s: that of an actuator.
 const SETTLED_S: f64 = 0.5;
 
 /// Movement by which a surface counts as moved by feedback, deg: beyond noise and resolution.
@@ -84,7 +84,8 @@ pub fn fly_again(basis: &ProofInputs, flown: &Flown) -> Matched {
     }
 }
 
-/// Finds the difference that decides whether a repeat flight passes, when the first model predicts it.
+/// Finds the difference that decides whether a repeat flight passes the prediction of the first
+/// model.
 ///
 /// # Errors
 /// The reason why there is none.
@@ -106,10 +107,10 @@ fn dutch_roll(
     LateralModes::new(model, (maneuver, means), estimates)
 }
 
-/// Dutch roll of a model beside that of repeat flights about the posterior's mean.
+/// Dutch roll of a model, with that of repeat flights about the posterior's mean.
 ///
 /// # Errors
-/// A sentence where the model does not oscillate: no repeat flight passes then.
+/// A sentence if the model does not oscillate: no repeat flight passes then.
 fn predicted_dutch_roll<'a>(
     modes: &'a LateralModes,
     posterior: &'a Simulation,
@@ -123,7 +124,7 @@ fn predicted_dutch_roll<'a>(
     })
 }
 
-/// Rows of a maneuver that is not flown again.
+/// Rows of a maneuver that cannot be flown again.
 #[must_use]
 pub fn not_flown(basis: &ProofInputs, maneuver: &Maneuver, reason: &str) -> Matched {
     let row = |model: &ModelSource| MatchVerdictRow {
@@ -136,7 +137,7 @@ pub fn not_flown(basis: &ProofInputs, maneuver: &Maneuver, reason: &str) -> Matc
     }
 }
 
-/// Verdict without a flight.
+/// Verdict of a maneuver before it is flown.
 fn verdict_row(maneuver: &Maneuver, model: ModelSource) -> MatchVerdictRow {
     MatchVerdictRow {
         maneuver_id: maneuver.maneuver_id.clone(),
@@ -201,7 +202,7 @@ impl<'a> Flight<'a> {
         })
     }
 
-    /// Difference that decides whether a repeat flight passes, when the first model predicts it.
+    /// Difference that decides whether a repeat flight passes the prediction of the first model.
     fn decisive_difference(&self) -> Result<DecisiveDifference, String> {
         let basis = self.basis;
         let (model, database) = basis.models.first().ok_or("no model is given")?;
@@ -359,7 +360,7 @@ impl<'a> Flight<'a> {
         }
     }
 
-    /// One where a surface moves after the last input; `None` where the maneuver ends before that.
+    /// One if a surface moves after the last input; `None` if the maneuver ends before that.
     fn closed_loop(&self) -> Option<usize> {
         let settled_s = self.maneuver.recognised.last_input_s? + SETTLED_S;
         let has_moved = self.recording.movement_after(settled_s) > MOVED_DEG;

@@ -1,11 +1,13 @@
-//! Proof of match: does the simulator still match the aircraft? Each maneuver is flown again by a body
-//! with six degrees of freedom, and judged by the tolerances of a standard.
+//! Proof of match: does the simulator still match the aircraft? Each maneuver is flown again by a
+//! body with six degrees of freedom, and judged by the tolerances of a standard.
 //!
 //! [`recording`] is the maneuver as recorded: inputs and outputs. [`derivative_table`] and
-//! [`aerodynamics`] are the model that flies it, [`free_run`] the flight, [`linear_run`] the slopes of its
-//! outputs, and [`start`] its initial state and trim. [`specification`] has the tolerances, which are the analyst's data; [`judgement`]
-//! compares, and [`dutch_roll`] adds the modes of the flight's own estimates; [`repeat_flight`] adds the probability that a repeat flight passes,
-//! and [`mod@decisive_difference`] what decides it, as a linear function of the derivatives.
+//! [`aerodynamics`] are the model that flies it, [`free_run`] the flight, [`linear_run`] the slopes
+//! of its outputs, and [`start`] its initial state and trim. [`specification`] has the tolerances,
+//! which are the analyst's data; [`judgement`] compares, and [`dutch_roll`] adds the modes of the
+//! flight's own estimates; [`repeat_flight`] adds the probability that a repeat flight passes, and
+//! [`mod@decisive_difference`] the difference that decides it, as a linear function of the
+//! derivatives.
 
 mod specification;
 mod outputs;

@@ -4,7 +4,7 @@ use crate::aero::WindTunnel;
 use crate::aero::wind_tunnel::TunnelPoint;
 use crate::tables::{PosteriorRow, TrendRow};
 
-/// Posterior as a database, read as the tunnel.
+/// Posterior as a database, in the form of a wind tunnel's.
 #[must_use]
 pub fn of_posterior(rows: &[PosteriorRow], tunnel: &WindTunnel) -> WindTunnel {
     let mut database = WindTunnel::new(tunnel.settings().clone());
@@ -18,7 +18,8 @@ pub fn of_posterior(rows: &[PosteriorRow], tunnel: &WindTunnel) -> WindTunnel {
     database
 }
 
-/// Trends as a database: of each derivative its first group in the table, which is flight's value.
+/// Trends as a database: for each derivative its first group in the table, which counts as flight's
+/// value.
 #[must_use]
 pub fn of_trends(rows: &[TrendRow], groups: &[&str], tunnel: &WindTunnel) -> WindTunnel {
     let mut database = WindTunnel::new(tunnel.settings().clone());

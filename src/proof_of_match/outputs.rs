@@ -24,7 +24,7 @@ pub const MATCHED: [MatchedQuantity; 11] = [
 /// Values of the outputs at one sample.
 pub type Outputs = [f64; COUNT];
 
-/// Place of a quantity among the outputs; `None` for one that is no time history.
+/// Index of a quantity among the outputs; `None` for one that is no time history.
 #[must_use]
 pub fn place(quantity: MatchedQuantity) -> Option<usize> {
     MATCHED.iter().position(|own| *own == quantity)

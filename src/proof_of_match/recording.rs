@@ -19,8 +19,8 @@ const FEWEST_SAMPLES: usize = 20;
 /// tenth of a degree per second squared.
 const LEAST_TRIM_S: f64 = 0.5;
 
-/// Standard deviations below which a recorder's noise is not taken, in the order of the outputs:
-/// finer than any resolution.
+/// Least noise of each output, standard deviation, in the order of the outputs: finer than any
+/// resolution.
 const LEAST_NOISE: Outputs = [
     1e-3, 1e-3, 1e-2, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-4,
 ];

@@ -1,10 +1,11 @@
 //! Probability that a repeat flight passes: the posterior's uncertainty, the start and the sensors'
-//! noise carried to the differences between aircraft and simulator.
+//! noise are propagated to the differences between aircraft and simulator.
 //!
-//! A repeat flight is flown by an aircraft of the posterior with the same surfaces. To first order its
-//! outputs differ from those at the mean by the effects of the derivatives' deviations; the simulator's
-//! differ by those of the errors of its matched start. Both follow from the slopes of one free run. The
-//! noise of the sensors is white and independent, so its part of the probability is exact for each draw.
+//! A repeat flight is flown by an aircraft of the posterior with the same surfaces. To first order
+//! its outputs differ from those at the mean by the effects of the derivatives' deviations. Those
+//! of the simulator differ by the effects of the errors of its matched start. Both follow from the
+//! slopes of one free run. The noise of the sensors is white and independent, so its part of the
+//! probability is exact for each draw.
 
 use nalgebra::DMatrix;
 use pulp::Arch;
@@ -30,7 +31,7 @@ const SEED: u64 = 60;
 /// Longest step of the run with slopes, s. Probabilities differ by 0.2 % rms from those of steps of a quarter.
 const LONGEST_STEP_S: f64 = 0.1;
 
-/// Distance from the limit beyond which noise decides nothing, standard deviations.
+/// Distance from the limit beyond which noise has no effect, standard deviations.
 const CERTAIN: f64 = 5.0;
 
 /// Repeat flights about the mean of a posterior, at every `stride`-th sample.
@@ -50,7 +51,7 @@ pub struct Repeats {
 struct Draw {
     /// Deviations of the derivatives and of the start's parameters.
     deviations: Vec<f64>,
-    /// Dutch roll by the estimates of the repeat flight.
+    /// Dutch roll according to the estimates of the repeat flight.
     dutch_roll: Option<DutchRoll>,
 }
 
@@ -62,7 +63,7 @@ pub struct Probabilities {
 }
 
 impl Probabilities {
-    /// Without the rounding errors of the sums.
+    /// The probabilities within 0 and 1, without the rounding errors of the sums.
     fn clamped(mut self) -> Probabilities {
         for probability in self.tolerances.iter_mut().chain([&mut self.whole]) {
             *probability = probability.clamp(0.0, 1.0);
@@ -78,14 +79,14 @@ pub struct MeanRun {
     pub run: FreeRun,
     /// Slopes along the derivatives, and after them along the start's own parameters.
     slopes: Vec<Histories>,
-    /// Places of the derivatives, among the values of the posterior and in the build-up.
+    /// Indices of the derivatives, among the values of the posterior and in the build-up.
     pub derivatives: Vec<(usize, usize)>,
     /// Covariance of the start's own parameters.
     pub start_covariance: DMatrix<f64>,
 }
 
 impl MeanRun {
-    /// Flies the mean of a posterior; `None` where its start is not determined.
+    /// Flies the mean of a posterior; `None` if its start is not determined.
     #[must_use]
     pub fn of(
         (simulation, start): (&Simulation, &MatchedStart),
@@ -125,8 +126,8 @@ fn stride(recording: &Recording) -> usize {
         .max(1)
 }
 
-/// Draws repeat flights about the mean of a posterior, whose run in short steps is `mean`; `None` where the start
-/// is not determined or nothing is known of the axis.
+/// Draws repeat flights about the mean of a posterior, whose run in short steps is `mean`; `None`
+/// if the start is not determined or the axis has no posterior.
 #[must_use]
 pub fn repeats(
     (simulation, start): (&Simulation, &MatchedStart),
@@ -169,7 +170,8 @@ pub fn repeats(
     })
 }
 
-/// Places of the derivatives that move a simulation, among the values of a posterior and in the build-up.
+/// Indices of the derivatives that affect a simulation, among the values of a posterior and in the
+/// build-up.
 #[must_use]
 pub fn moving(posterior: &LocalPosterior, buildup: &Buildup) -> Vec<(usize, usize)> {
     let index = |value: &LocalValue| {
@@ -191,14 +193,14 @@ fn start_parameters(axis: Axis) -> [usize; 7] {
     }
 }
 
-/// Covariance of the quantities at some places.
+/// Covariance of the quantities at some indices.
 fn of_places(covariance: &DMatrix<f64>, places: &[usize]) -> DMatrix<f64> {
     covariance.select_rows(places).select_columns(places)
 }
 
 impl Repeats {
-    /// Probabilities that a repeat flight meets the tolerances, when a model's simulation predicts it. A
-    /// run that departs meets none.
+    /// Probabilities that a repeat flight meets the tolerances of a model's prediction. A run that
+    /// departs meets none.
     #[must_use]
     pub fn probabilities(
         &self,
@@ -263,7 +265,7 @@ impl Repeats {
     }
 }
 
-/// Repeat flights that one model's simulation predicts.
+/// Repeat flights compared with one model's simulation.
 struct Repeat<'a> {
     repeats: &'a Repeats,
     judged: &'a [Judged<'a>],
@@ -294,7 +296,7 @@ impl Repeat<'_> {
         Probabilities { tolerances, whole }
     }
 
-    /// `true` where the model's Dutch roll is within the tolerance of a repeat flight's.
+    /// `true` if the model's Dutch roll is within the tolerance of a repeat flight's.
     fn meets(&self, repeat: Option<DutchRoll>, tolerance: &Tolerance) -> bool {
         let value = |own: Option<DutchRoll>| own?.value(tolerance.quantity);
         let (repeat, model) = (value(repeat), value(self.simulated.model));
@@ -315,7 +317,7 @@ struct SampleLimits {
 /// Limit at one sample.
 struct SampleLimit {
     width: f64,
-    /// Samples of the effects around this one, and its share of the way between them.
+    /// Samples of the effects on either side of this one, and its fractional position between them.
     between: [usize; 2],
     share: f64,
 }

@@ -37,14 +37,14 @@ pub struct Test {
     pub subject: String,
     /// Set of equations whose maneuvers it judges.
     pub axis: Axis,
-    /// Classes that it judges; all of the axis unless given.
+    /// Classes that it judges; if not given, all of the axis.
     #[serde(default)]
     pub classes: Option<Vec<String>>,
     /// Requirements, all of which must be met.
     pub all_of: Vec<Requirement>,
 }
 
-/// Tolerances of which one must be met.
+/// Alternative tolerances, one of which must be met.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Requirement {
@@ -74,7 +74,7 @@ impl Test {
 }
 
 impl Tolerance {
-    /// Width either way at a measured value.
+    /// Width on either side of a measured value.
     #[must_use]
     pub fn width(&self, measured: f64) -> f64 {
         let absolute = self.within.unwrap_or(0.0);

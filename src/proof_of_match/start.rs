@@ -1,9 +1,9 @@
 //! Start of a free run: initial state and trim, matched over the first samples of a maneuver.
 //!
-//! As in a qualification test guide, the simulator is trimmed to the aircraft before it runs free. The
-//! initial state and the six coefficients at trim are those with which the simulation fits all outputs
-//! best, weighted by their noise, up to the first input. What moves the coefficients from there is the
-//! model's alone.
+//! As in a qualification test guide, the simulator is trimmed to the aircraft before it runs free.
+//! The initial state and the six coefficients at trim are those with which the simulation fits all
+//! outputs best, weighted by their noise, up to the first input. After that the model alone changes
+//! the coefficients.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -20,15 +20,15 @@ use crate::units::DEG;
 /// Number of parameters of a start.
 pub const PARAMETERS: usize = STATES + COEFFICIENTS;
 
-/// Iterations of Gauss and Newton with the slopes of the first: a second of flight is nearly linear in
-/// its start.
+/// Number of Gauss-Newton iterations, all with the slopes of the first: a second of flight is
+/// nearly linear in its start.
 const ITERATIONS: usize = 3;
 
 /// Matched start with the covariance of its parameters.
 #[derive(Clone, Debug)]
 pub struct MatchedStart {
     pub start: Start,
-    /// `None` where the samples do not determine all parameters.
+    /// `None` if the samples do not determine all parameters.
     pub covariance: Option<DMatrix<f64>>,
 }
 
@@ -68,8 +68,8 @@ struct Slopes {
 }
 
 impl Slopes {
-    /// Slopes, with the run at the start; `None` where the simulated aircraft departs or the samples do not
-    /// determine all parameters.
+    /// Slopes, with the run at the start; `None` if the simulated aircraft departs or the samples
+    /// do not determine all parameters.
     fn of(simulation: &Simulation, start: &Start) -> Option<(Slopes, FreeRun)> {
         let recording = simulation.recording;
         let parameters: [Parameter; PARAMETERS] = std::array::from_fn(Parameter::Start);
@@ -92,7 +92,7 @@ impl Slopes {
         Some((Slopes { rows, covariance }, run))
     }
 
-    /// Step of Gauss and Newton; `None` where the aircraft departs or the step is not finite.
+    /// Gauss-Newton step; `None` if the aircraft departs or the step is not finite.
     fn step(&self, recording: &Recording, computed: &FreeRun) -> Option<DVector<f64>> {
         if computed.has_departed {
             return None;
@@ -108,7 +108,7 @@ impl Slopes {
     }
 }
 
-/// State on straight lines through the measured one, and coefficients that the measured motion
+/// State on straight lines through the measured states, and coefficients that the measured motion
 /// implies.
 fn as_measured(simulation: &Simulation) -> Start {
     let recording = simulation.recording;

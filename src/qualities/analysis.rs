@@ -22,14 +22,15 @@ use crate::tables::{
     Airframe, DeviationBasis, FlyingQuality, Level, LevelRow, QualityRow, RootRow,
 };
 
-/// Seed of the draws. All angles of attack take the same random numbers, so probabilities are as
+/// Seed of the draws. All angles of attack use the same random numbers, so probabilities are as
 /// smooth over α as the posterior.
 const SEED: u64 = 21;
 
-/// Share of draws with another pattern of modes from which the draws give the standard deviation.
+/// Share of draws with another pattern of modes, above which the standard deviation is taken from
+/// the draws.
 const COALESCED: f64 = 0.01;
 
-/// Paragraph of the worst level of all.
+/// Name of the row for the worst level of all paragraphs.
 const ALL: &str = "all";
 
 /// Rows of one airframe at one angle of attack.
@@ -48,7 +49,7 @@ pub struct AxisAnalysis {
     pub covariance: DMatrix<f64>,
     /// Values of each draw.
     pub draws: Vec<BTreeMap<FlyingQuality, f64>>,
-    /// Share of draws whose modes have another pattern than at the mean.
+    /// Share of draws whose modes have another pattern than those at the mean.
     pub coalesced: f64,
 }
 
@@ -203,7 +204,7 @@ pub fn linearised(
     (linear, posterior)
 }
 
-/// Airframe and steady flight that rows are about.
+/// Airframe and steady flight to which the rows apply.
 struct Place<'a> {
     airframe: Airframe,
     trim: &'a Trim,
@@ -249,8 +250,8 @@ impl Place<'_> {
         analysis.mean.modes.roots.iter().map(row).collect()
     }
 
-    /// Levels of each paragraph, then of all. Axes are independent, so a draw of one goes with any of
-    /// the other.
+    /// Levels of each paragraph, then of all. Axes are independent, so draws of the two may be
+    /// paired at random.
     fn level_rows(&self, axes: &[AxisAnalysis], specification: &Specification) -> Vec<LevelRow> {
         let draws = axes.iter().map(|a| a.draws.len()).min().unwrap_or(0);
         let mean = levels_of(

@@ -20,13 +20,13 @@ pub struct JudgedQuantity {
     pub value: f64,
     /// Slopes along the values of the posterior.
     pub slopes: Vec<(LocalValue, f64)>,
-    /// Ascending values at which its level changes. One that rises with another quantity is that at the
-    /// other's mean.
+    /// Ascending values at which the level changes. A limit that rises with another quantity is
+    /// taken at the other's mean.
     pub limits: Vec<f64>,
 }
 
-/// Quantity of an airframe in the steady flight of an angle of attack; `None` where it was not flown,
-/// the mode does not exist or the quantity is not finite.
+/// Quantity of an airframe in steady flight at an angle of attack; `None` if the angle was not
+/// flown, the mode does not exist or the quantity is not finite.
 #[must_use]
 pub fn judged_quantity(
     basis: &JudgedAircraft,

@@ -6,9 +6,9 @@ use crate::tables::{FlyingQuality, Level};
 /// Values of the modes that exist.
 pub type Values = [(FlyingQuality, f64)];
 
-/// Best level whose limits the values meet, of one requirement.
+/// Best level of one requirement whose limits the values meet.
 ///
-/// A mode that does not exist has no limit. A quantity that is not a number meets none.
+/// A mode that does not exist has no limit. A quantity that is not a number meets no limit.
 #[must_use]
 pub fn level(specification: &Specification, requirement: &Requirement, values: &Values) -> Level {
     let levels = [Level::One, Level::Two, Level::Three];
@@ -19,7 +19,7 @@ pub fn level(specification: &Specification, requirement: &Requirement, values: &
     levels.into_iter().find(is_met).unwrap_or(Level::Worse)
 }
 
-/// `true` where values are within the limit of a level.
+/// `true` if values are within the limit of a level.
 #[must_use]
 pub fn meets(limit: &LevelLimit, level: Level, values: &Values) -> bool {
     let Some(value) = value_of(values, limit.quantity) else {
@@ -39,7 +39,7 @@ pub fn meets(limit: &LevelLimit, level: Level, values: &Values) -> bool {
         && range.max.is_none_or(|max| value <= max)
 }
 
-/// Value of a quantity; `None` where the mode does not exist.
+/// Value of a quantity; `None` if the mode does not exist.
 #[must_use]
 pub fn value_of(values: &Values, quantity: FlyingQuality) -> Option<f64> {
     let found = values.iter().find(|(other, _)| *other == quantity);

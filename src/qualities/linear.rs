@@ -28,7 +28,7 @@ pub struct LinearModel {
     pub rigid: Matrix,
     pub slopes: Vec<Matrix>,
     pub control_slopes: Vec<Vector>,
-    /// `None` where no derivative is along α̇.
+    /// `None` if no derivative is along α̇.
     pub lag: Option<Lag>,
     pub velocity: f64,
     pub gravity: f64,
@@ -37,7 +37,7 @@ pub struct LinearModel {
 /// Effect of α̇ on the rates of the states.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lag {
-    /// Place of α among the states.
+    /// Index of α among the states.
     pub alpha: usize,
     /// Slopes of m.
     pub slopes: Vec<Vector>,
@@ -48,7 +48,7 @@ pub struct Lag {
 pub struct Solved {
     pub matrix: Matrix,
     pub control: Vector,
-    /// Slopes of A and B along each value; empty where they are not asked for.
+    /// Slopes of A and B along each value; empty unless they are requested.
     pub slopes: Vec<Matrix>,
     pub control_slopes: Vec<Vector>,
 }
@@ -114,7 +114,7 @@ pub enum Differentiation {
 /// Effect of one value of the posterior on its coefficient.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Effect {
-    /// Place of the coefficient in its axis.
+    /// Index of the coefficient in its axis.
     pub coefficient: usize,
     /// Change of the coefficient with each state.
     pub by_state: [f64; STATES],
@@ -148,13 +148,13 @@ impl Effect {
 /// State that a regressor is proportional to, and the factor of proportion.
 pub type RegressorState<'a> = &'a dyn Fn(&Regressor) -> Option<(usize, f64)>;
 
-/// States of an axis as its effects need them.
+/// States of an axis, as the computation of effects needs them.
 #[derive(Clone, Copy)]
 pub struct AxisStates<'a> {
     pub of_regressor: RegressorState<'a>,
-    /// Place of the velocity, where it is a state.
+    /// Index of the velocity, if it is a state.
     pub velocity: Option<usize>,
-    /// Names of the states that feedback may use, with their places.
+    /// Names of the states that feedback may use, with their indices.
     pub feedback: &'a [(&'a str, usize)],
 }
 
@@ -176,7 +176,8 @@ pub struct Flight<'a> {
 }
 
 impl Flight<'_> {
-    /// Effects of the values of a posterior. A value without a derivative in the model has none.
+    /// Effects of the values of a posterior. A value without a derivative in the model has no
+    /// effect.
     #[must_use]
     pub fn effects(&self, posterior: &LocalPosterior, states: &AxisStates) -> Vec<Effect> {
         let values = posterior.values.iter();
@@ -293,7 +294,7 @@ impl Flight<'_> {
     }
 }
 
-/// `true` where a sum has the place of a coefficient's constant and slope over α.
+/// `true` if a sum replaces a coefficient's constant and slope over α.
 fn has_sum(posterior: &LocalPosterior, coefficient: Coefficient) -> bool {
     let mut values = posterior.values.iter();
     values.any(|v| v.coefficient == coefficient && v.kind == LocalKind::Sum)

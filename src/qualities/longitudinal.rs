@@ -1,12 +1,13 @@
 //! Longitudinal equations about steady flight: states velocity, α, q, θ.
 //!
-//! The rows of α, q and θ are the equations that are estimated ([`crate::dynamics::Longitudinal`]) with
-//! their own slopes. They take the velocity as measured; here it is a state, at constant thrust and
-//! density:
+//! The rows of α, q and θ are the equations that are estimated ([`crate::dynamics::Longitudinal`])
+//! with their own slopes. They take the velocity as measured; here it is a state, at constant
+//! thrust and density:
 //!
 //! m V̇ = T_x cos α + T_z sin α − q̄S (CA cos α + CN sin α) − m g sin γ,  q̄ ~ V².
 //!
-//! The pitch control balances the moment M of the thrust, which does not grow with V as its own does.
+//! The pitch control balances the moment M of the thrust. Unlike the moment of the control, that of
+//! the thrust does not grow with V.
 
 use super::linear::{AxisStates, ByCoefficient, Flight, Lag, LinearModel, Matrix, Vector};
 use super::trim::Trim;
@@ -19,11 +20,11 @@ const ALPHA: usize = 1;
 const Q: usize = 2;
 const THETA: usize = 3;
 
-/// States that feedback may use, with their places.
+/// States that feedback may use, with their indices.
 pub const FEEDBACK: [(&str, usize); 3] =
     [("alpha_deg", ALPHA), ("q_deg_s", Q), ("theta_deg", THETA)];
 
-/// Places of the coefficients.
+/// Indices of the coefficients.
 const NORMAL: usize = 0;
 const AXIAL: usize = 2;
 

@@ -1,7 +1,7 @@
-//! Roots of linear equations, their slopes along the derivatives, and the modes that they make.
+//! Roots of linear equations, their slopes along the derivatives, and the modes that they form.
 //!
-//! A mode of two roots has their sum and product, which are smooth where the two become real. Modes
-//! are told apart by the magnitude of their roots.
+//! A mode of two roots is described by their sum and product, which stay smooth where the two
+//! become real. Modes are distinguished by the magnitude of their roots.
 
 use nalgebra::linalg::Schur;
 use nalgebra::{Complex, SMatrix, SVector};
@@ -16,7 +16,8 @@ const MOST_ITERATIONS: usize = 500;
 /// Imaginary part over magnitude below which a root is real.
 const REAL: f64 = 1e-9;
 
-/// Distance from the root at which inverse iteration begins, over the largest entry of the matrix.
+/// Distance from the root at which inverse iteration begins, relative to the largest entry of the
+/// matrix.
 const SHIFT: f64 = 1e-10;
 
 type ComplexVector = SVector<Complex<f64>, STATES>;
@@ -52,7 +53,7 @@ impl Root {
     }
 }
 
-/// Two roots that make a mode: a complex pair, or two real ones.
+/// Two roots that form a mode: a complex pair, or two real ones.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pair {
     pub sum: Dual,
@@ -73,7 +74,7 @@ impl Pair {
         }
     }
 
-    /// Undamped natural frequency; not a number where one root diverges.
+    /// Undamped natural frequency; NaN if one root diverges.
     #[must_use]
     pub fn frequency(&self) -> Dual {
         self.product.clone().sqrt()
@@ -97,11 +98,11 @@ impl Pair {
 pub struct Modes {
     /// By falling magnitude.
     pub roots: Vec<Root>,
-    /// Places of the faster mode's roots: short period, or Dutch roll.
+    /// Indices of the faster mode's roots: short period, or Dutch roll.
     pub fast: [usize; 2],
-    /// Places of the other two: phugoid, or roll mode and spiral.
+    /// Indices of the other two: phugoid, or roll mode and spiral.
     pub slow: [usize; 2],
-    /// Way in which the roots make the modes; modes that coalesce change it.
+    /// Code of the way in which the roots form modes; it changes when modes coalesce.
     pub pattern: u8,
 }
 
@@ -133,7 +134,7 @@ impl Modes {
         Pair::new(&self.roots[self.slow[0]], &self.roots[self.slow[1]])
     }
 
-    /// `true` where the slower two roots are an oscillation.
+    /// `true` if the slower two roots are an oscillation.
     #[must_use]
     pub fn is_slow_oscillation(&self) -> bool {
         self.roots[self.slow[0]].is_complex()
@@ -157,8 +158,8 @@ fn longitudinal(roots: &[Root]) -> Roles {
     }
 }
 
-/// The fastest oscillation is the Dutch roll; of two real roots the larger is the roll mode. Of four
-/// real roots the two in the middle stand for the Dutch roll.
+/// The fastest oscillation is the Dutch roll; of two real roots the larger is the roll mode. Of
+/// four real roots the two in the middle take the place of the Dutch roll.
 fn lateral(roots: &[Root]) -> Roles {
     // A root and its conjugate stand together.
     let first = roots.iter().position(Root::is_complex).unwrap_or(1);

@@ -67,12 +67,12 @@ pub struct Requirement {
 #[serde(deny_unknown_fields)]
 pub struct LevelLimit {
     pub quantity: FlyingQuality,
-    /// Categories and classes to which the limit applies; all unless given.
+    /// Categories and classes to which the limit applies; if not given, all.
     #[serde(default)]
     pub categories: Option<Vec<Category>>,
     #[serde(default)]
     pub classes: Option<Vec<AirplaneClass>>,
-    /// No limit where a level has none.
+    /// `None` for a level without limit.
     #[serde(default)]
     pub level_1: Range,
     #[serde(default)]

@@ -1,8 +1,9 @@
 //! Steady flight at an angle of attack, in the conditions that were flown there.
 //!
-//! Between the flown angles of attack conditions are linear. The path is as flown: pitch attitude less
-//! angle of attack. Normal force and the thrust's part down carry the weight; the thrust's part forward
-//! balances axial force and weight; the pitch control balances the moment.
+//! Between the flown angles of attack conditions are interpolated linearly. The flight-path angle
+//! is as flown: pitch attitude less angle of attack. Normal force and the downward part of the
+//! thrust carry the weight. The forward part of the thrust balances axial force and weight. The
+//! pitch control balances the moment.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -89,7 +90,7 @@ impl Trim {
 #[derive(Clone, Debug, PartialEq)]
 struct Flown {
     alpha_deg: f64,
-    /// By signal; the tunnel's third variable where it has one.
+    /// By signal; includes the tunnel's third variable, if it has one.
     quantities: BTreeMap<&'static str, f64>,
     /// By channel.
     surfaces_deg: BTreeMap<String, f64>,
@@ -165,7 +166,7 @@ impl Flown {
         }
     }
 
-    /// Mean of several; `None` of none.
+    /// Mean of several; `None` for an empty list.
     fn mean(group: &[Flown]) -> Option<Flown> {
         Some(Flown {
             alpha_deg: finite_mean(group.iter().map(|own| own.alpha_deg))?,
@@ -189,8 +190,8 @@ impl Flown {
         }
     }
 
-    /// Steady flight at an angle of attack near this condition's. The path is as flown, so pitch
-    /// attitude follows the angle of attack.
+    /// Steady flight at an angle of attack near this condition's. The flight-path angle is as
+    /// flown, so pitch attitude follows the angle of attack.
     fn trim(&self, alpha_deg: f64, aircraft: &Aircraft) -> Option<Trim> {
         let get = |name: &str| self.quantities.get(name).copied();
         let theta_deg = get(signal::THETA)? - self.alpha_deg + alpha_deg;
@@ -232,7 +233,7 @@ fn mean_of<'a, K: Ord + Clone + 'a>(
         .collect()
 }
 
-/// Values a share of the way; a value that one of them lacks is the other's.
+/// Values interpolated at a fraction; a value that one of them lacks is taken from the other.
 fn between<K: Ord + Clone>(
     lower: &BTreeMap<K, f64>,
     upper: &BTreeMap<K, f64>,

@@ -4,18 +4,19 @@ use super::error_series::{ErrorSample, ErrorSeries};
 use crate::numerics::random_effects::{Observation, RandomEffects};
 use crate::numerics::student;
 
-/// Fewest flights with a common error: with fewer the scatter is not known to its size.
+/// Least number of flights with a common error: with fewer, the scatter is less certain than its
+/// own size.
 const FEWEST_FLIGHTS: usize = 4;
 
-/// Probability by chance, over the flights of a series, below which a flight is far from the others.
-/// Some fifty series are examined.
+/// Probability of the distance by chance, over the flights of a series, below which a flight counts
+/// as far from the others. It is low because some fifty series are examined.
 const FAR_PROBABILITY: f64 = 1e-4;
 
 /// Mean and scatter of an error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CommonError {
     pub mean: f64,
-    /// Standard deviation of the mean, with what all flights have alike.
+    /// Standard deviation of the mean, including the error that all flights share.
     pub bound: f64,
     /// Standard deviation between flights.
     pub scatter: f64,
@@ -64,7 +65,8 @@ impl CommonError {
     }
 }
 
-/// Error of the mean by what all flights have alike: the flights' own, with the weights of the mean.
+/// Error of the mean from the errors that all flights share: the flights' own, with the weights of
+/// the mean.
 fn systematic(samples: &[&ErrorSample], pooled: &RandomEffects<1>) -> f64 {
     let weight = |s: &ErrorSample| (s.bound * s.bound + pooled.scatter_variance).recip();
     let moment: f64 = samples.iter().map(|s| weight(s) * s.systematic).sum();
@@ -79,8 +81,8 @@ fn observations(samples: &[&ErrorSample]) -> Vec<Observation> {
     samples.iter().map(observation).collect()
 }
 
-/// Flight that is farthest from the others, if chance does not explain it and no ordinary error is as
-/// large.
+/// The flight farthest from the others, if neither chance nor an ordinary error explains its
+/// distance.
 fn farthest(samples: &[&ErrorSample], ordinary: f64) -> Option<usize> {
     let all = observations(samples);
     let probability = |i: usize| {

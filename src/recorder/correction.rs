@@ -1,7 +1,8 @@
-//! Corrections of flights that the other flights decide.
+//! Corrections of flights by the errors of the other flights.
 //!
-//! A flight that determines an error by itself keeps its own. One that does not takes the posterior of
-//! its weak evidence and the errors of the others. An error far from the others' corrects nothing.
+//! A flight that determines an error by itself keeps its own estimate. Another flight gets the
+//! posterior from its weak evidence and the errors of the others. An error far from that of the
+//! others corrects nothing.
 
 use std::collections::BTreeSet;
 
@@ -12,15 +13,16 @@ use crate::flight::Correction;
 use crate::ingest::Compatibility;
 use crate::tables::{InstrumentError, InstrumentRow, InstrumentVerdict};
 
-/// Largest bound of a completed error, in ordinary sizes: with a larger one the other flights say as
-/// little as the flight itself.
+/// Largest bound of a completed error, in ordinary sizes: with a larger one the other flights have
+/// as little information as the flight itself.
 const MOST_OF_ORDINARY: f64 = 0.7;
 
-/// Steps of the grid of completed errors in a bound. A further flight that moves an error by less leaves
-/// the estimates as they are, and rounding is a twentieth of the bound.
+/// Number of grid steps per bound, for completed errors. A further flight that moves an error by
+/// less than a step leaves the estimates as they are; rounding to the grid is a twentieth of the
+/// bound.
 const STEPS_IN_BOUND: f64 = 8.0;
 
-/// Corrections of a flight's record, in place of those that the flight alone gives.
+/// Corrections of a flight's record that replace those from the flight alone.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FlightCorrections {
     pub flight_id: String,
@@ -28,7 +30,7 @@ pub struct FlightCorrections {
 }
 
 /// Completes the rows of the flights by the errors that the flights have in common. Returns the
-/// corrections of the flights that are corrected otherwise than before.
+/// corrections of flights whose corrections change.
 pub fn correct_flights(
     rows: &mut [InstrumentRow],
     findings: &mut Findings,
@@ -54,8 +56,8 @@ pub fn correct_flights(
 }
 
 impl Findings {
-    /// Completes the errors of an instrument that its flight does not determine, and withdraws the
-    /// corrections by errors far from the other flights'.
+    /// Completes the errors of an instrument that its flight does not determine, and withdraws
+    /// corrections by errors that are far from those of the other flights.
     fn complete(&mut self, row: &mut InstrumentRow, settings: &Compatibility) {
         for (one, trend) in self.examined.iter().zip(&mut self.rows) {
             let (series, error) = (&one.series, one.series.error);
@@ -93,7 +95,7 @@ fn on_grid(value: f64, bound: f64) -> f64 {
     step * (value / step).round()
 }
 
-/// Correction by the errors of a row; `None` where it applies none.
+/// Correction by the errors of a row; `None` if none is applied.
 fn correction(row: &InstrumentRow) -> Option<Correction> {
     let applied = |error| {
         let value = row.error(error).filter(|_| row.is_applied(error));

@@ -14,7 +14,7 @@ pub struct ErrorSample {
     pub value: f64,
     /// Standard deviation.
     pub bound: f64,
-    /// Standard deviation of what all flights have alike, such as the error of the equations.
+    /// Standard deviation of the part that all flights share, such as the error of the equations.
     pub systematic: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Rows of the table `instrument_trends`, and problems that only several flights show.
+//! Rows of the table `instrument_trends`, and problems that only several flights together show.
 
 use super::common_error::CommonError;
 use super::error_series::ErrorSeries;
@@ -11,11 +11,11 @@ use crate::tables::{
 /// Probability of any false alarm about the history of all series.
 const ALARM_PROBABILITY: f64 = 0.01;
 
-/// Number of standard deviations from which an error common to all flights is sure.
+/// Number of standard deviations above which an error common to all flights is certain.
 const SURELY: f64 = 4.0;
 
-/// Number of ordinary sizes from which an error common to all flights is named: chance leaves one
-/// healthy instrument in twenty beyond them.
+/// Number of ordinary sizes above which an error common to all flights is named: one healthy
+/// instrument in twenty exceeds it by chance.
 const LARGEST_ORDINARY: f64 = 2.0;
 
 /// A series with its common error and its change over the flights.
@@ -63,7 +63,7 @@ impl ExaminedSeries {
         self.common.as_ref().map_or(&[], |common| &common.far)
     }
 
-    /// `true` where what corrections leave of the mean is surely no ordinary error.
+    /// `true` if the part of the mean that corrections leave is certainly no ordinary error.
     fn is_wrong_in_every_flight(&self) -> bool {
         self.common.as_ref().is_some_and(|common| {
             let size = (common.mean - self.series.corrected).abs();
@@ -82,7 +82,8 @@ impl ExaminedSeries {
         }
     }
 
-    /// Row of the series; `alarm` is the probability below which a change is no chance.
+    /// Row of the series; `alarm` is the probability below which a change is not attributed to
+    /// chance.
     fn row(&self, alarm: f64) -> InstrumentTrendRow {
         let series = &self.series;
         let common = self.common.as_ref();

@@ -16,7 +16,7 @@ const FEWEST_BESIDE: usize = 2;
 /// Fewest flights with a history.
 const FEWEST_FLIGHTS: usize = 6;
 
-/// Way in which an error changes.
+/// Kind of an error's change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
     Step,
@@ -33,7 +33,7 @@ pub struct Change {
     pub size: f64,
     /// Standard deviation of the size.
     pub bound: f64,
-    /// Probability of so large a change by chance.
+    /// Probability of a change of this size by chance.
     pub probability: f64,
 }
 

@@ -1,14 +1,14 @@
 //! Errors that the flights of one recorder have in common.
 //!
 //! The flights draw the error of an instrument from one distribution: a mean that belongs to the
-//! recorder, and a scatter between flights. A flight that hardly determines the error takes it from the
-//! others; a flight far from the others is named and never corrected by that error.
+//! recorder, and a scatter between flights. A flight that hardly determines the error takes it from
+//! the others; a flight far from the others is reported and never corrected by that error.
 //!
 //! 1. [`error_series`]: one error of one instrument over the flights.
 //! 2. [`common_error`]: mean, scatter, and flights far from the others.
 //! 3. [`history`]: steps and drifts in the order of the flights.
 //! 4. [`findings`]: rows of the table `instrument_trends`, and problems.
-//! 5. [`correction`]: corrections of flights that the others decide.
+//! 5. [`correction`]: corrections of flights by the errors of the others.
 
 mod error_series;
 mod common_error;

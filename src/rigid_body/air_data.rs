@@ -37,8 +37,8 @@ impl AirData {
         (u * rate.z - w * rate.x) / (u * u + w * w).max(f64::MIN_POSITIVE)
     }
 
-    /// α̇, rad/s, where the loads depend on it: `implied` is the α̇ of the motion under the loads at another
-    /// one, on a straight line.
+    /// α̇, rad/s, of loads that depend on it. `implied` returns the α̇ of the motion under the
+    /// loads at a given α̇, and is linear.
     #[must_use]
     pub fn alpha_rate_in_balance(mut implied: impl FnMut(f64) -> f64) -> f64 {
         let at_zero = implied(0.0);

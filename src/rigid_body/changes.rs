@@ -1,5 +1,6 @@
-//! Changes of a body's motion to first order: of its air data and of the rate of its state, exactly by the
-//! slopes of the equations at an instant. Several changes stand side by side in the lanes of vectors.
+//! First-order changes of a body's motion: of its air data and of the rate of its state, by the
+//! exact slopes of the equations at an instant. Several changes are computed together in the lanes
+//! of vectors.
 #![expect(
     clippy::inline_always,
     reason = "compiled into free runs for the processor at hand"
@@ -22,8 +23,8 @@ pub(crate) const CHANGING: usize = 11;
 /// Vector of the body axes.
 type Three<S> = [Lanes<S>; 3];
 
-/// Change of a state or of its rate: velocity, rates, attitude quaternion i j k w, and height. The place
-/// over the ground changes nothing.
+/// Change of a state or of its rate: velocity, rates, attitude quaternion i j k w, and height. The
+/// position over the ground has no effect.
 #[derive(Clone, Copy)]
 pub(crate) struct StateChange<S: Simd>(pub [Lanes<S>; CHANGING]);
 
@@ -66,7 +67,7 @@ impl<S: Simd> StateChange<S> {
         self.0[10]
     }
 
-    /// Change of the state whose attitude is brought back to unit length from `attitude`.
+    /// Change of the state after the attitude is normalised from `attitude` to unit length.
     #[inline(always)]
     pub fn normalised(mut self, attitude: &[f64; 4]) -> StateChange<S> {
         let per_length = 1.0 / attitude.iter().map(|a| a * a).sum::<f64>().sqrt();

@@ -1,4 +1,4 @@
-//! Changes of the sensors' readings to first order, exactly by their slopes at an instant.
+//! First-order changes of the sensors' readings, by their exact slopes at an instant.
 #![expect(
     clippy::inline_always,
     reason = "compiled into free runs for the processor at hand"
@@ -105,8 +105,8 @@ impl ReadingSlopes {
 }
 
 impl VaneSlopes {
-    /// The angle stays where speed and rates grow by the same factor, so its slope along the speed follows from
-    /// those along the rates.
+    /// Slopes of a vane. Its angle does not change if speed and rates grow by the same factor, so
+    /// its slope along the speed follows from those along the rates.
     fn new(reading: &Reading, flow: &Flow) -> VaneSlopes {
         let by_rates = reading.by_rates;
         let along: f64 = by_rates

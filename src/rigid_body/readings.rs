@@ -15,7 +15,7 @@ use super::loading::Loading;
 use crate::aircraft::{Aircraft, Flow, Position};
 use crate::units::{DEG, G0_FT_S2};
 
-/// Motion at one instant, as sensors feel it.
+/// Motion at one instant, as the sensors measure it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instant {
     pub state: BodyState,
@@ -44,7 +44,7 @@ pub struct Readings {
 }
 
 impl Instant {
-    /// Flow that the vanes meet.
+    /// Flow at the vanes.
     #[inline(always)]
     pub(super) fn flow(&self) -> Flow {
         Flow {

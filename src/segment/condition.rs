@@ -32,7 +32,7 @@ pub(super) const SIGNALS: &[&str] = &[
 /// with its quality. Without `recognised` it is one that the analyst gave.
 ///
 /// # Errors
-/// The reason why the flight condition is not known, in words.
+/// The reason why the flight condition cannot be computed, in words.
 pub(super) fn maneuver(
     record: &Record,
     aircraft: &Aircraft,

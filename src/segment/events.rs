@@ -14,8 +14,8 @@ use super::{condition, problems};
 /// for times that are read from a strip chart.
 const AGREEMENT_S: f64 = 1.0;
 
-/// Share of the shorter window from which an event replaces a maneuver, also one of the other axis:
-/// windows close together share what is between them, which is less than half of either.
+/// Share of the shorter window above which an event replaces a maneuver, also one of the other
+/// axis. Neighbouring windows share the time between them, which is less than half of either.
 const REPLACING_SHARE: f64 = 0.5;
 
 /// Replaces maneuvers by the events given for this flight that cover more than half of one, lie in one
@@ -87,8 +87,8 @@ fn in_order<'a>(events: &'a [Event], flight_id: &str) -> Vec<&'a Event> {
     own
 }
 
-/// Returns the class of an event if no event before it, in the order of their starts, has samples of it: an
-/// axis's samples count once.
+/// Returns the class of an event if no earlier event has samples of it. Samples of an axis count
+/// once.
 ///
 /// # Errors
 /// The event that has them, in words.
@@ -124,7 +124,7 @@ fn replaces(given: &Maneuver, found: &Maneuver, step_s: f64) -> bool {
     shares_most || given.axis == found.axis && has_input
 }
 
-/// True for excitation of no class of which the analyst's maneuver has more than half.
+/// True if the analyst's maneuver covers more than half of an excitation that fits no class.
 fn explains(given: &Maneuver, unknown: &Unknown) -> bool {
     let lasting_s = unknown.end_s - unknown.start_s;
     overlap_s(given, unknown.start_s, unknown.end_s) > REPLACING_SHARE * lasting_s

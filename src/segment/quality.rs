@@ -14,20 +14,20 @@ use crate::numerics::order_statistics::upper_median_in_place;
 use crate::numerics::sample_count::nearest;
 use crate::units::RAD;
 
-/// Time before the first input that is left out of the lead-in, s: the detector places a step within
-/// a few samples of the input's begin.
+/// Time before the first input that is excluded from the lead-in, s: the detected time of a step is
+/// within a few samples of the input's begin.
 const CLEAR_OF_INPUT_S: f64 = 0.1;
 
-/// Share of a surface's travel within which it counts as at its stop: larger than a sensor's error
-/// there, smaller than the margin of a commanded deflection.
+/// Share of a surface's travel within which it counts as at its stop: larger than the sensor's
+/// error there, smaller than the margin that commands leave.
 const AT_STOP: f64 = 0.01;
 
-/// Share of an actuator's rate from which it counts as at its full rate: it leaves room for the noise
-/// of a difference between two samples.
+/// Share of an actuator's rate above which it counts as at its full rate: it leaves room for the
+/// noise of a difference between two samples.
 const AT_FULL_RATE: f64 = 0.9;
 
-/// Half the time over which a rate is differentiated, s: short beside the aircraft's motion, long enough
-/// that the noise of a gyro makes little of the acceleration.
+/// Half the time over which a rate is differentiated, s: short compared with the aircraft's motion,
+/// but long enough that gyro noise contributes little to the acceleration.
 const HALF_SPAN_S: f64 = 0.1;
 
 /// Fewest samples of a mean square about a line: two determine the line.
@@ -35,7 +35,7 @@ const FEWEST_SAMPLES: f64 = 3.0;
 
 /// Measures the quality of a maneuver and judges it by the limits.
 ///
-/// A maneuver that the analyst gave is accepted whatever its quality: it was inspected.
+/// A maneuver that the analyst gave is always accepted, since it was inspected.
 pub(super) fn measure(
     record: &Record,
     class: &Class,
@@ -104,12 +104,12 @@ fn rates(axis: Axis) -> &'static [&'static str] {
     }
 }
 
-/// Angular accelerations that the motion of the other axis makes, over all those of the axis, root mean
-/// squares about their means.
+/// Ratio of the angular accelerations caused by the motion of the other axis to all those of the
+/// axis; root mean squares about their means.
 ///
-/// Euler's equations couple the axes by products of rates: q̇ by p r, ṗ by q r, ṙ by p q. The moments of
-/// inertia weigh a product by at most 1 (triangle inequality), here taken as 1. Gusts roll an aircraft
-/// without much yaw and so make small products.
+/// Euler's equations couple the axes by products of rates: q̇ by p r, ṗ by q r, ṙ by p q. The
+/// moments of inertia weigh a product by at most 1 (triangle inequality), here taken as 1. Gusts
+/// roll an aircraft without much yaw, so their products are small.
 fn coupling(record: &Record, axis: Axis, part: &RangeInclusive<usize>) -> Option<f64> {
     let products: &[(&str, &str)] = match axis {
         Axis::Longitudinal => &[(signal::P, signal::R)],
@@ -132,7 +132,7 @@ fn coupling(record: &Record, axis: Axis, part: &RangeInclusive<usize>) -> Option
     ratio(coupled.map(f64::sqrt), all.map(f64::sqrt))
 }
 
-/// A measure, its upper limit, and the reason for which a value beyond it rejects.
+/// A measure, its upper limit, and the function that returns the reason for a rejection.
 type UpperLimit = (Option<f64>, f64, fn(f64) -> String);
 
 /// The reason for each measure beyond its limit, in words.
@@ -232,10 +232,10 @@ fn mean_square(values: &[f64], about: About) -> Option<f64> {
     Some(finite.iter().map(|v| residual(v).powi(2)).sum::<f64>() / n)
 }
 
-/// The largest ratio of signal to noise among some signals.
+/// The largest signal-to-noise ratio among some signals.
 ///
-/// Noise is taken from the median of second differences from sample to sample, to which motion at
-/// the aircraft's frequencies contributes almost nothing.
+/// The noise follows from the median of second differences from sample to sample, to which motion
+/// at the aircraft's frequencies contributes almost nothing.
 fn signal_to_noise(record: &Record, signals: &[&str], part: &RangeInclusive<usize>) -> Option<f64> {
     let of_signal = |name: &&str| -> Option<f64> {
         let values = record.values(name)?.get(part.clone())?;
@@ -253,7 +253,7 @@ fn signal_to_noise(record: &Record, signals: &[&str], part: &RangeInclusive<usiz
     signals.iter().filter_map(of_signal).max_by(f64::total_cmp)
 }
 
-/// The largest share of samples of a surface for which a condition holds.
+/// The largest share, over some surfaces, of samples that satisfy a condition.
 fn largest_share(
     record: &Record,
     limits: &QualityLimits,
@@ -290,8 +290,8 @@ fn is_at_full_rate(actuator: &Actuator, values: &[f64], step_s: f64) -> bool {
         .all(|w| (w[1] - w[0]).abs() >= AT_FULL_RATE * actuator.rate_deg_s * step_s)
 }
 
-/// Share of marked samples among those of the axis's outputs and the class's inputs that are
-/// recorded.
+/// Share of flagged samples in the recorded signals among the axis's outputs and the class's
+/// inputs.
 fn marked_share(record: &Record, class: &Class, maneuver: &Maneuver) -> Option<f64> {
     let outputs = class.axis.outputs();
     let names = outputs

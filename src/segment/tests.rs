@@ -1,4 +1,5 @@
-//! Segment on synthetic records: each kind of maneuver, what is none, and the analyst's events.
+//! Segment on synthetic records: each kind of maneuver, excitation that is no maneuver, and the
+//! analyst's events.
 
 use std::collections::BTreeMap;
 

@@ -125,7 +125,7 @@ impl ArtefactName {
 /// Most bytes of an item in a name: file systems allow 255 for a whole name.
 const LONGEST_ITEM: usize = 160;
 
-/// An item's name, of which a long one ends in a hash of the whole.
+/// An item's name; a long one is cut and ends in a hash of the whole.
 fn bounded(item: String) -> String {
     if item.len() <= LONGEST_ITEM {
         return item;

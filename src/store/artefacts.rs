@@ -21,23 +21,24 @@ use super::regular;
 use super::shared::Shared;
 use crate::error::{Error, Result};
 
-/// An opened store with the record of what this run requires and has made.
+/// An opened store, with the artefacts that this run requires and has made.
 #[derive(Debug)]
 pub struct Store {
     folder: PathBuf,
     _lock: Option<Lock>,
     shared: Option<Shared>,
-    /// Artefacts of the folder that the object store lacks: a killed run made them.
+    /// Artefacts in the folder that the object store lacks, because the run that made them was
+    /// killed.
     unsent: Mutex<BTreeSet<ArtefactName>>,
     /// First failure to read from the object store.
     transfer_error: Mutex<Option<Error>>,
     /// One lock for each record being fetched: concurrent readers of a record fetch it once.
     fetching: Mutex<BTreeMap<ArtefactName, Arc<Mutex<()>>>>,
-    /// Artefacts behind this run's results.
+    /// Artefacts from which this run's results are made.
     required: Mutex<BTreeSet<ArtefactName>>,
     /// Number of artefacts that this run made.
     made: Mutex<usize>,
-    /// Flights in work, of a store that this run holds alone.
+    /// Flights being processed, of a store that this run holds alone.
     in_work: Option<InWorkList>,
 }
 
@@ -84,7 +85,7 @@ impl Store {
         })
     }
 
-    /// A store to read without a lock; it need not exist.
+    /// A store for reading without a lock; it need not exist.
     #[must_use]
     pub fn look(folder: &Path) -> Store {
         Store {
@@ -100,7 +101,7 @@ impl Store {
         }
     }
 
-    /// Lists a flight as in work until the returned value is dropped.
+    /// Lists a flight as being processed until the returned value is dropped.
     pub fn list_in_work<'a>(&'a self, flight_id: &'a str) -> Option<Listed<'a>> {
         self.in_work.as_ref().map(|list| list.add(flight_id))
     }
@@ -157,7 +158,8 @@ impl Store {
         self.path(name).exists()
     }
 
-    /// Reads an artefact. A damaged one, or another's, counts as absent and is made again.
+    /// Reads an artefact. A damaged one, or one stored under another's name, counts as absent and
+    /// is made again.
     #[must_use]
     pub fn load<T: DeserializeOwned>(&self, name: &ArtefactName) -> Option<T> {
         let parse = |bytes: &[u8]| serde_json::from_slice(unsealed(name.as_str(), bytes)?).ok();
@@ -265,8 +267,8 @@ impl Store {
         }
     }
 
-    /// Notes that this run's results are made of an artefact. The night's manifest lists it, and it
-    /// stays as long as the night.
+    /// Notes that this run's results depend on an artefact. The night's manifest lists it, and it
+    /// is kept as long as the night.
     pub fn require(&self, name: &ArtefactName) {
         locked(&self.required).insert(name.clone());
     }
@@ -298,7 +300,7 @@ impl Store {
             .is_some_and(is_sealed)
     }
 
-    /// `true` if the folder has a record as it was written, or only the object store has it, with this
+    /// `true` if the folder has a record unchanged, or if only the object store has it, with this
     /// size; then [`Store::fetch`] checks its digest.
     #[must_use]
     pub fn has_record(

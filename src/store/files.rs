@@ -238,7 +238,7 @@ fn fault(error: &csv::DeserializeError, value: &str) -> String {
     }
 }
 
-/// Form of a text that is no CSV, in words; `None` for a CSV.
+/// Format of a text that is no CSV, in words; `None` for a CSV.
 fn other_form(text: &str) -> Option<&'static str> {
     let header = text.lines().find(|line| !line.trim().is_empty());
     let Some(header) = header else {
@@ -271,7 +271,7 @@ pub(super) fn written(path: &Path) -> Result<String> {
     Ok(content)
 }
 
-/// Message for a header that lacks a column.
+/// Message for columns that a header lacks.
 fn lacking(header: &csv::StringRecord, columns: &[&str]) -> Option<String> {
     let column = columns
         .iter()

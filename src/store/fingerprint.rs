@@ -83,8 +83,8 @@ impl Digest {
 /// Digits of the fingerprint that ends a sealed text.
 const SEAL: usize = 16;
 
-/// Seals a text under a name: appends a fingerprint of both as a last line, which reveals damage and a
-/// text under another's name.
+/// Seals a text under a name: appends a fingerprint of both as a last line. It reveals damage, and
+/// a text stored under another name.
 pub(super) fn sealed(name: &str, mut text: Vec<u8>) -> Vec<u8> {
     let seal = seal(name, &text);
     text.extend_from_slice(seal.as_bytes());

@@ -1,6 +1,7 @@
-//! List of the flights in work, a file of the store that `harvest status` reads while a run goes on.
+//! List of the flights being processed, a file of the store that `harvest status` reads during a
+//! run.
 //!
-//! The list is a courtesy: it is not synced, and a failure to write it stops no run.
+//! The list is only information: it is not synced, and a failure to write it stops no run.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,7 +15,7 @@ use super::regular;
 /// File of the list.
 const FILE: &str = "in_work.json";
 
-/// Flights in work and the times of day since when.
+/// Flights being processed, each with the time of day at which it began.
 pub type InWork = BTreeMap<String, String>;
 
 /// The list of a run.
@@ -74,7 +75,7 @@ impl Drop for Listed<'_> {
     }
 }
 
-/// Flights that another run has in work; none if no run holds the store.
+/// Flights that another run is processing; empty if no run holds the store.
 #[must_use]
 pub fn in_work(folder: &Path) -> InWork {
     let list = regular::read(&folder.join(FILE));

@@ -23,7 +23,7 @@ use crate::error::Result;
 
 /// Shortest time between the last change of a file and its reading, for its digest to be
 /// remembered. Clocks of file systems tick every two seconds or faster; the rest allows for the
-/// different clock of a file server.
+/// clock of a file server.
 const SETTLED: Duration = Duration::from_secs(10);
 
 /// Name under which the digests are sealed.
@@ -48,7 +48,7 @@ pub struct InputDigests {
 }
 
 impl InputDigests {
-    /// Loads the digests saved at `path`; none from a missing or damaged file.
+    /// Loads the digests saved at `path`; empty for a missing or damaged file.
     #[must_use]
     pub fn load(path: &Path) -> InputDigests {
         let remembered = regular::read(path)
@@ -72,8 +72,8 @@ impl InputDigests {
         }
     }
 
-    /// Adds the digests of objects that another machine shared by [`InputDigests::objects`]; none from
-    /// damaged text.
+    /// Adds the digests of objects that another machine shared by [`InputDigests::objects`];
+    /// damaged text adds nothing.
     #[must_use]
     pub fn with_objects(mut self, text: &[u8]) -> InputDigests {
         let shared = unsealed(SEALED_AS, text).and_then(|text| serde_json::from_slice(text).ok());

@@ -1,11 +1,11 @@
 //! Locks for one run at a time or for several shards, with a note of the holder.
 //!
-//! The lock is the operating system's and ends with the process that holds it: a dead process
-//! blocks nobody, whatever the note still names. A shared file system may carry it to other
-//! machines; on one without locks every run goes on. The lock only prevents waste: artefacts are
-//! named by the fingerprint of everything that decides them and appear whole by a rename, so two
-//! runs that make the same artefact make the same bytes. A run whose temporary file another run
-//! sweeps away has to try again.
+//! The lock belongs to the operating system and ends with the process that holds it. A dead process
+//! blocks nobody, even if the note still names it. A shared file system may extend the lock to
+//! other machines; on one without locks every run proceeds. The lock only prevents waste: artefacts
+//! are named by the fingerprint of everything that decides them and appear whole by a rename, so
+//! two runs that make the same artefact make the same bytes. A run whose temporary file another run
+//! removes has to try again.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, Write};

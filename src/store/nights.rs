@@ -52,11 +52,11 @@ pub struct Night {
     pub until: Stage,
     /// The complete night before it, for its changes.
     pub since: Option<String>,
-    /// Names that the report prints and that decide no number, such as the archive's.
+    /// Names that the report prints and that affect no number, such as the archive's.
     pub shown: BTreeMap<String, String>,
     pub lineage: Lineage,
     pub summary: Summary,
-    /// Artefacts behind the night, with their sizes, bytes.
+    /// Artefacts from which the night was made, with their sizes, bytes.
     pub artefacts: BTreeMap<ArtefactName, u64>,
     /// Published files with their digests.
     pub files: BTreeMap<String, Digest>,
@@ -187,13 +187,13 @@ impl Nights {
         names
     }
 
-    /// `true` if all files of a night are as they were published.
+    /// `true` if all files of a night are unchanged since they were published.
     #[must_use]
     pub fn is_whole(&self, night: &Night) -> bool {
         self.damaged(night).is_empty()
     }
 
-    /// Files of a night that are not as they were published.
+    /// Files of a night that differ from what was published.
     #[must_use]
     pub fn damaged(&self, night: &Night) -> Vec<String> {
         let folder = self.folder(&night.name);
@@ -259,8 +259,8 @@ impl Nights {
         Ok(night)
     }
 
-    /// Restores the damaged files of a night from tonight's folder, which was made of the same lineage.
-    /// `None` if tonight's files are others: what was published is never replaced.
+    /// Restores the damaged files of a night from tonight's folder, which was made of the same
+    /// lineage. `None` if tonight's files differ: published files are never replaced by others.
     ///
     /// # Errors
     /// [`Error::Io`] when the disk fails.
@@ -354,7 +354,7 @@ impl Nights {
     }
 }
 
-/// Names that a night's name may mean: as written, and with leading zeros.
+/// Spellings that a night's name may have: as written, and with leading zeros.
 fn spellings(name: &str) -> [String; 2] {
     [name.to_owned(), format!("{name:0>4}")]
 }
@@ -392,7 +392,7 @@ mod link {
         Some(fs::read_link(path).ok()?.to_string_lossy().into_owned())
     }
 
-    /// Places a link by one rename, whatever was there.
+    /// Places a link by one rename, replacing any file or link of that name.
     pub fn place(path: &Path, target: &str) -> Result<()> {
         let folder = path.parent().unwrap_or(Path::new("."));
         let beside = folder.join(format!("{}link", atomic::TEMPORARY));

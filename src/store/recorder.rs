@@ -33,7 +33,7 @@ pub fn bytes(columns: &BTreeMap<String, RawColumn>) -> Result<Vec<u8>, String> {
 }
 
 /// Encodes columns of one length, one of them the clock, as the bytes of a tall Parquet file: time,
-/// name and value, in the order of time and name. A value that is no number has no row.
+/// name and value, in the order of time and name. A value that is not finite has no row.
 ///
 /// # Errors
 /// The reason.
@@ -84,7 +84,7 @@ pub(super) fn schema<'a>(columns: impl Iterator<Item = (&'a str, Option<&'a str>
     Arc::new(Schema::new(columns.map(field).collect::<Vec<_>>()))
 }
 
-/// Values as a column; what is no finite number is a null.
+/// Values as a column; a value that is not finite is a null.
 pub(super) fn array(values: &[f64]) -> ArrayRef {
     let values = values.iter().map(|v| v.is_finite().then_some(*v));
     Arc::new(values.collect::<Float64Array>())

@@ -1,4 +1,4 @@
-//! Recordings whose channels nobody has mapped: all columns of numbers.
+//! Recordings without a channel map: all columns of numbers.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -36,7 +36,7 @@ pub fn first_rows(files: &FlightFiles, rows: usize) -> Result<Vec<Recording>> {
     Ok(recordings)
 }
 
-/// Reads the first rows of a file, whose content may stand at another place.
+/// Reads the first rows of a file, whose content may be at another path.
 fn first_rows_of(path: &Path, file: &Path, rows: usize) -> Result<Recording> {
     let refused = |what: String| Error::Archive {
         place: path.to_owned(),
@@ -70,12 +70,12 @@ fn first_rows_of(path: &Path, file: &Path, rows: usize) -> Result<Recording> {
     })
 }
 
-/// Place beside which temporary files are written.
+/// Path beside which temporary files are written.
 fn scratch() -> PathBuf {
     std::env::temp_dir().join("recording")
 }
 
-/// The parts of a tall file with one column a name; none for another file.
+/// The parts of a tall file with one column per name; empty for another file.
 fn widened(path: &Path) -> Result<Vec<Draft>> {
     let refused = |what: String| Error::Archive {
         place: path.to_owned(),

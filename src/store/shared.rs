@@ -1,8 +1,9 @@
 //! Connection to a store in an object store; the folder of [`super::Store`] is its cache.
 //!
-//! There is no lock: it would outlive a killed holder. None is needed: an object appears whole, by
-//! one request, and its name carries the fingerprint of everything that decides it, so two runs
-//! that make the same artefact put the same bytes. No run removes an artefact that another may need.
+//! There is no lock, because it would outlive a killed holder. None is needed. An object appears
+//! whole, by one request. Its name carries the fingerprint of everything that decides it, so two
+//! runs that make the same artefact put the same bytes. No run removes an artefact that another may
+//! need.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

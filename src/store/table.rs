@@ -34,7 +34,8 @@ impl Shelf {
         }
     }
 
-    /// Adds pairs for the key-value metadata of each Parquet file; the CSV beside it stays as it is.
+    /// Adds pairs to the key-value metadata of each Parquet file; the CSV beside it has no
+    /// metadata.
     #[must_use]
     pub fn with(mut self, provenance: Vec<(String, String)>) -> Shelf {
         self.provenance = provenance;
@@ -159,7 +160,7 @@ fn series(column: &Column) -> Series {
     }
 }
 
-/// A column of a CSV: no text of it is a formula.
+/// A column of a CSV, without text that a spreadsheet would take for a formula.
 fn series_of_csv(column: &Column) -> Series {
     match &column.cells {
         Cells::Text(cells) => {
@@ -174,8 +175,8 @@ fn series_of_csv(column: &Column) -> Series {
     }
 }
 
-/// A text that a spreadsheet would take for a formula, behind an apostrophe: then it is text there. The
-/// unit `-`, as every single character, is none.
+/// Text with an apostrophe before it if a spreadsheet would take it for a formula. A single
+/// character, such as the unit `-`, is never one.
 fn no_formula(text: &str) -> Cow<'_, str> {
     if text.len() > 1 && text.starts_with(['=', '+', '-', '@', '\t', '\r']) {
         format!("'{text}").into()

@@ -1,8 +1,9 @@
-//! Texts without characters that no reader sees or that reorder a line.
+//! Texts without characters that are invisible or reorder a line.
 
 use std::borrow::Cow;
 
-/// Text with such characters replaced by underscores. A line break, of which messages have some, stays.
+/// Text with such characters replaced by underscores. Line breaks, which some messages have, are
+/// kept.
 pub fn of(text: &str) -> Cow<'_, str> {
     let deceives = |c: char| c != '\n' && is_invisible(c);
     if text.contains(deceives) {

@@ -1,4 +1,4 @@
-//! Corrections of the surfaces' delays, and what stays unknown of them.
+//! Corrections of the surfaces' delays, and their remaining uncertainty.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,19 +7,19 @@ use super::settings::Settings;
 use crate::flight::Correction;
 use crate::ingest::compatibility::Action;
 
-/// Grid of the corrections, s. They decide every estimate of the campaign, so a further flight that
-/// moves a delay by less leaves all estimates as they are. The rounding is part of what stays
-/// unknown.
+/// Grid of the corrections, s. They affect every estimate of the campaign. On a grid, a further
+/// flight that moves a delay by less than a step leaves all estimates as they are. The rounding is
+/// part of the remaining uncertainty.
 const GRID_S: f64 = 5e-4;
 
-/// Steps of what stays unknown, s, each √2 times the one before: a bound falls with the root of the
-/// number of flights, so a step lasts while the campaign doubles.
+/// Steps of the remaining uncertainty, s, each √2 times the one before. A bound falls with the root
+/// of the number of flights, so a step lasts while the campaign doubles.
 const UNCERTAINTIES_S: [f64; 16] = [
     0.5e-3, 0.7e-3, 1e-3, 1.4e-3, 2e-3, 2.8e-3, 4e-3, 5.6e-3, 8e-3, 11e-3, 16e-3, 23e-3, 32e-3,
     45e-3, 64e-3, 90e-3,
 ];
 
-/// Bound beyond which the campaign does not determine a surface's delay, s: a recorder's usual delay
+/// Bound above which the campaign does not determine a surface's delay, s: a recorder's usual delay
 /// is no larger.
 const UNDETERMINED_S: f64 = 5e-3;
 
@@ -27,9 +27,9 @@ const UNDETERMINED_S: f64 = 5e-3;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DelayCorrection {
     pub surface: String,
-    /// Delay by which the surface is shifted; zero for one that is not sure.
+    /// Delay by which the surface is shifted; zero for a delay that is not certain.
     pub delay_s: f64,
-    /// Standard deviation of the delay that stays.
+    /// Standard deviation of the remaining delay.
     pub uncertainty_s: f64,
 }
 
@@ -47,7 +47,7 @@ impl DelayCorrection {
 }
 
 impl SurfaceDelay {
-    /// `true` where the data determine the delay.
+    /// `true` if the data determine the delay.
     #[must_use]
     pub fn is_determined(&self) -> bool {
         self.bound_s <= UNDETERMINED_S
@@ -82,7 +82,7 @@ fn correction(delay: &SurfaceDelay, settings: &Settings) -> DelayCorrection {
     }
 }
 
-/// The next larger step of what stays unknown.
+/// The next larger step of the remaining uncertainty.
 fn stepped_s(uncertainty_s: f64) -> f64 {
     let steps = UNCERTAINTIES_S.into_iter();
     let larger = steps.clone().find(|step| *step >= uncertainty_s);

@@ -1,13 +1,13 @@
 //! Delays of the surfaces from the evidence of many maneuvers.
 //!
-//! A recorder delays all its channels alike, or each bus by its own: τ_s = μ + d_s, μ and d_s normal
-//! with standard deviations that the data decide, from well below a millisecond to the tens of
-//! milliseconds of a bus. A surface that hardly moves thus has the delay of the others, with a bound
-//! as wide as they differ.
+//! A recorder delays all its channels alike, or each bus by its own delay: τ_s = μ + d_s. μ and d_s
+//! are normal with standard deviations that the data determine, from well below a millisecond to
+//! the tens of milliseconds of a bus. A surface that hardly moves thus gets the delay of the
+//! others, with a bound as wide as they differ.
 //!
-//! Maneuvers weigh by Student's t, since a model that does not fit a maneuver moves its delays. The
-//! bound is the larger of the posterior's and the jackknife's, and at least the error of the
-//! equations' timing.
+//! Maneuvers are weighted by Student's t, since a model that does not fit a maneuver biases its
+//! delays. The bound is the larger of the posterior's and the jackknife's, and at least the error
+//! of the equations' timing.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -15,12 +15,13 @@ use super::evidence::{DelayEvidence, FlightEvidence, SurfaceDelay};
 use crate::numerics::random_effects::{Observation, RandomEffects};
 use crate::numerics::symmetric;
 
-/// Error of the equations in a delay, as a share of the sampling interval: signals are linear
-/// between samples. In simulated campaigns without delay 0.45 ms of 25 ms are found.
+/// Error of the equations in a delay, as a share of the sampling interval, since signals are linear
+/// between samples. In simulated campaigns without delay the estimate is 0.45 ms at a sampling
+/// interval of 25 ms.
 const OF_STEP: f64 = 0.02;
 
-/// Standard deviations that delays may have, in common and by surface, s: each twice the one before,
-/// all as likely as not.
+/// Standard deviations that delays may have, in common and by surface, s: each twice the one
+/// before, all with the same prior probability.
 const SPREADS_S: [f64; 8] = [0.125e-3, 0.25e-3, 0.5e-3, 1e-3, 2e-3, 4e-3, 8e-3, 16e-3];
 
 /// Standard deviation of a maneuver's own delays, s, when its distance from the others is measured.
@@ -32,7 +33,8 @@ const FREEDOM: f64 = 5.0;
 /// Number of times that the weights of the maneuvers are estimated anew.
 const ROUNDS: usize = 8;
 
-/// Fewest flights of which the jackknife leaves out one at a time; of fewer it leaves out maneuvers.
+/// Least number of flights for which the jackknife leaves out one flight at a time; with fewer it
+/// leaves out one maneuver at a time.
 const FEWEST_FLIGHTS: usize = 5;
 
 /// Longest delay, s: at the band's upper end a longer one turns the phase by more than a quarter.
@@ -64,7 +66,7 @@ pub fn of_campaign(flights: &[FlightEvidence]) -> Vec<SurfaceDelay> {
     delays
 }
 
-/// Standard deviation of a surface's delay between flights beyond their bounds.
+/// Scatter of a surface's delay between flights beyond their bounds, standard deviation.
 fn scatter_s<'a>(flights: impl Iterator<Item = &'a SurfaceDelay>) -> f64 {
     let observation = |flight: &SurfaceDelay| Observation {
         value: flight.delay_s,
@@ -129,7 +131,7 @@ impl Information {
         }
     }
 
-    /// Information of a maneuver, whose surfaces are among all.
+    /// Information of a maneuver, extended to the list of all surfaces.
     fn of(evidence: &DelayEvidence, surfaces: &[String]) -> Information {
         let mut information = Information::zero(surfaces.len());
         let place = |surface: &String| surfaces.iter().position(|s| s == surface);
@@ -152,8 +154,8 @@ impl Information {
         self.moment += weight * &other.moment;
     }
 
-    /// Squared distance of the own delays from some, over their degrees of freedom; the own delays
-    /// have a wide prior.
+    /// Squared distance of the own delays from given ones, over their degrees of freedom; the own
+    /// delays have a wide prior.
     fn distance(&self, delays: &DVector<f64>) -> Option<(f64, f64)> {
         let count = delays.len();
         let own = &self.matrix + DMatrix::identity(count, count) * OWN_S.powi(-2);

@@ -1,5 +1,5 @@
-//! Evidence of a maneuver: its information on the surfaces' delays, and the surfaces' effects
-//! against the tunnel's.
+//! Evidence of a maneuver: its information on the surfaces' delays, and the ratio of the surfaces'
+//! effects to the tunnel's.
 
 use nalgebra::{Complex, DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -8,12 +8,12 @@ use super::fourier::Spectrum;
 use super::maneuver_data::{CoefficientData, ManeuverData, TermData};
 use super::weighted_fit::{Prior, WeightedFit};
 
-/// Prior standard deviation of a derivative along a state, in sizes of its table: wide, as the data
-/// decide.
+/// Prior standard deviation of a derivative along a state, in sizes of its table: wide, so that the
+/// data decide.
 const OF_STATES: f64 = 3.0;
 
-/// Prior standard deviation of a derivative along a surface around the tunnel's value, in sizes of
-/// its table, for the delays: it holds surfaces that hardly move.
+/// Prior standard deviation of a derivative along a surface about the tunnel's value, in sizes of
+/// its table, for the delays: it fixes the derivatives of surfaces that hardly move.
 const OF_SURFACES: f64 = 0.5;
 
 /// Standard deviation of the tunnel's values in the comparison of effects, in sizes of the table:
@@ -43,8 +43,8 @@ pub struct SurfaceDelay {
     pub bound_s: f64,
 }
 
-/// Effect of a surface over the effect that the tunnel gives it: one where right, minus one where
-/// its sign is reversed.
+/// Ratio of a surface's effect to the effect that the tunnel predicts: one if correct, minus one if
+/// the sign is reversed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SurfaceEffect {
     pub surface: String,
@@ -68,7 +68,7 @@ pub struct FlightEvidence {
 }
 
 impl ManeuverData {
-    /// Information on the delays, linearised about some, s.
+    /// Information on the delays, linearised about given delays, s.
     pub fn delays(&self, about_s: impl Fn(&str) -> f64) -> Option<DelayEvidence> {
         let count = self.surfaces.len();
         let delays_s: Vec<f64> = self.surfaces.iter().map(|s| about_s(s)).collect();
@@ -114,7 +114,7 @@ impl ManeuverData {
         Some(fit.eliminated(&columns, &by_delay))
     }
 
-    /// Effects of the surfaces against the tunnel's, from derivatives that know nothing of the
+    /// Ratios of the surfaces' effects to the tunnel's, from derivatives estimated without the
     /// tunnel's signs.
     pub fn effects(&self) -> Vec<SurfaceEffect> {
         let mut sums = vec![(0.0, 0.0); self.surfaces.len()];
@@ -172,7 +172,7 @@ fn unsigned_prior(term: &TermData, implied: &Spectrum, column: &Spectrum) -> Pri
     }
 }
 
-/// The deviation, or a wide one where there is none.
+/// The stated deviation, or a wide one if none is stated.
 fn deviation(stated: f64, implied: &Spectrum, column: &Spectrum) -> f64 {
     if stated > 0.0 {
         return stated;

@@ -10,11 +10,11 @@ use crate::recorder::{ErrorSample, ErrorSeries};
 use crate::tables::{ALL_FLIGHTS, InstrumentError, InstrumentRow, InstrumentVerdict};
 use crate::units::Unit;
 
-/// Size, in standard errors, beyond which an effect is surely opposite to the tunnel's. Effects of
-/// healthy surfaces in simulated campaigns are no lower than −0.2.
+/// Size, in standard errors, above which an effect is certainly opposite to the tunnel's. Effects
+/// of healthy surfaces in simulated campaigns are no lower than −0.2.
 const SURELY_REVERSED: f64 = 4.0;
 
-/// Effect of a surface over the tunnel's, from several maneuvers.
+/// Ratio of a surface's effect to the tunnel's, from several maneuvers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct MeanEffect {
     ratio: f64,
@@ -23,7 +23,7 @@ struct MeanEffect {
 }
 
 impl MeanEffect {
-    /// Mean weighted by the bounds, with the scatter of the maneuvers in its own.
+    /// Mean weighted by the bounds; its own bound includes the scatter of the maneuvers.
     fn of<'a>(effects: impl Iterator<Item = &'a SurfaceEffect> + Clone) -> MeanEffect {
         let weights = effects.clone().map(|e| e.bound.powi(-2));
         let information: f64 = weights.clone().sum();
@@ -40,8 +40,8 @@ impl MeanEffect {
         }
     }
 
-    /// `true` where the effect is surely opposite to the tunnel's, and nearer to its opposite than
-    /// to none.
+    /// `true` if the effect is certainly opposite to the tunnel's, and nearer to minus one than to
+    /// zero.
     fn is_reversed(&self) -> bool {
         self.ratio < -0.5 && self.ratio < -SURELY_REVERSED * self.bound
     }
@@ -108,12 +108,12 @@ impl Findings {
     }
 }
 
-/// Size of ordinary delays, s, and the error of the equations in a delay: 0.45 ms are found in simulated
-/// campaigns without delay.
+/// Size of ordinary delays, s, and the error of the equations in a delay: the estimate in simulated
+/// campaigns without delay is 0.45 ms.
 const ORDINARY_S: f64 = 3e-3;
 const MODEL_S: f64 = 0.5e-3;
 
-/// Delays of the surfaces over the flights, each from its flight alone.
+/// Delays of the surfaces over the flights, each estimated from its flight alone.
 #[must_use]
 pub fn delay_series(
     flights: &[FlightEvidence],

@@ -1,4 +1,4 @@
-//! Evidence of a flight: that of its maneuvers, linearised about the delays that they give together.
+//! Evidence of a flight: that of its maneuvers, linearised about their common delays.
 
 use super::delays;
 use super::evidence::{FlightEvidence, SurfaceDelay};
@@ -12,7 +12,7 @@ const STEPS: usize = 6;
 /// Largest change of a delay at which the fit is settled, s.
 const SETTLED_S: f64 = 1e-5;
 
-/// Evidence of a flight's maneuvers, each with the part of the record that holds it.
+/// Evidence of a flight's maneuvers, each with its part of the record.
 #[must_use]
 pub fn flight_evidence(
     flight_id: &str,

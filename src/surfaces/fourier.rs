@@ -1,8 +1,8 @@
 //! Fourier sums of tapered series within a band of frequencies.
 //!
-//! The taper keeps the noise of other frequencies out of the band: without it, the gyros' noise,
-//! which rises with frequency once differentiated, leaks downwards. A linear equation between series
-//! holds between their Fourier sums, too, as long as all are tapered alike.
+//! The taper keeps the noise of other frequencies out of the band. Without it, the gyros' noise,
+//! which after differentiation rises with frequency, would leak to lower frequencies. A linear
+//! equation between series also holds between their Fourier sums if all have the same taper.
 
 use std::f64::consts::PI;
 
@@ -20,7 +20,7 @@ const LOWEST_HZ: f64 = 0.1;
 /// and up to 5 Hz the delays of simulated campaigns change by less than 0.1 ms.
 const HIGHEST_HZ: f64 = 2.5;
 
-/// Largest share of the sampling rate: the slope of the rates keeps its phase below it.
+/// Largest share of the sampling rate, below which the slope of the rates keeps its phase.
 const OF_RATE: f64 = 0.125;
 
 /// Share of the samples at either end over which the taper rises.
@@ -40,7 +40,7 @@ pub struct Band {
 }
 
 impl Band {
-    /// Band of series of so many samples; `None` where they are too short.
+    /// Band of series of this number of samples; `None` if they are too short.
     pub fn new(samples: usize, step_s: f64) -> Option<Band> {
         let length_s = samples as f64 * step_s;
         let band_hz = LOWEST_HZ..=HIGHEST_HZ.min(OF_RATE / step_s);
@@ -86,7 +86,8 @@ impl Band {
         .collect()
     }
 
-    /// Fourier sums of series, each a spectrum; all at once, which fills the processor's vectors.
+    /// Fourier sums of series, a spectrum for each; computed together, which fills the processor's
+    /// vectors.
     fn sums(&self, series: &[Vec<f64>]) -> Vec<Spectrum> {
         let (sums, count) = (self.harmonics.sums(series), self.harmonics.len());
         let spectrum = |column: usize| {
@@ -120,10 +121,10 @@ fn taper(sample: usize, samples: usize) -> (f64, f64) {
     (0.5 * (1.0 - angle.cos()), signed)
 }
 
-/// Series of a surface and its spectra, for shifts in time.
+/// Series of a surface and its spectra, prepared for shifts in time.
 ///
-/// With w the taper, y(t + τ) has the spectrum e^(jωτ) ∫ w(t − τ) y(t) e^(−jωt) dt, and
-/// w(t − τ) ≈ w(t) − τ w'(t) as the taper rises over seconds.
+/// With w the taper, y(t + τ) has the spectrum e^(jωτ) ∫ w(t − τ) y(t) e^(−jωt) dt. Since the taper
+/// rises over seconds, w(t − τ) ≈ w(t) − τ w'(t).
 #[derive(Clone, Debug)]
 pub struct Shifted {
     spectrum: Spectrum,

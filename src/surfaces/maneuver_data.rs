@@ -1,5 +1,5 @@
-//! A maneuver laid out for equation error in the frequency domain: the spectra of the coefficients
-//! that the measured motion implies, and of their regressors.
+//! A maneuver in the form for equation error in the frequency domain: the spectra of the
+//! coefficients that the measured motion implies, and of their regressors.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -53,7 +53,7 @@ pub struct AircraftModel<'a> {
 }
 
 impl ManeuverData {
-    /// Lays out a maneuver; `None` where it is too short or a signal is missing.
+    /// Prepares a maneuver; `None` if it is too short or a signal is missing.
     pub fn new(record: &Record, maneuver: &Maneuver, basis: AircraftModel) -> Option<ManeuverData> {
         match maneuver.axis {
             Axis::Longitudinal => Self::of_axis::<3, Longitudinal>(record, maneuver, basis),
@@ -166,8 +166,8 @@ fn surface_index(derivative: &Derivative, surfaces: &[String]) -> Option<usize> 
     surfaces.iter().position(|s| s == surface)
 }
 
-/// Response of the local straight line's slope, over that of the exact derivative: real, since the
-/// line is symmetric about its sample, so it turns no phase.
+/// Ratio of the response of the local straight line's slope to that of the exact derivative. It is
+/// real, since the line is symmetric about its sample, so it changes no phase.
 fn slope_response(frequencies_hz: &[f64], step_s: f64) -> Vec<f64> {
     let reach = slope_reach(step_s);
     let response = |frequency_hz: &f64| {

@@ -1,18 +1,19 @@
-//! Delays and signs of the surfaces, which no kinematic equation has.
+//! Delays and signs of the surfaces, which appear in no kinematic equation.
 //!
-//! The equations of motion have them: a surface that is recorded late by τ turns its phase by ω τ
-//! against the accelerations that it causes, and one of reversed sign acts against the wind tunnel.
-//! Both follow from equation error in the frequency domain, which is linear and integrates nothing.
+//! They follow from the equations of motion. A surface that is recorded late by τ has its phase
+//! turned by ω τ relative to the accelerations that it causes. A surface of reversed sign has
+//! effects opposite to the wind tunnel's. Both are estimated by equation error in the frequency
+//! domain, which is linear and needs no integration.
 //!
 //! 1. [`fourier`] transforms the tapered series of a maneuver within a band of frequencies.
-//! 2. [`maneuver_data`] lays out a maneuver: implied coefficients and regressors.
+//! 2. [`maneuver_data`] prepares a maneuver: implied coefficients and regressors.
 //! 3. [`weighted_fit`] fits derivatives with the residuals' own spectrum as weights.
-//! 4. [`evidence`] is what a maneuver contributes: its information on the delays, and its surfaces'
-//!    effects against the tunnel's.
-//! 5. [`delays`] combines maneuvers of a flight, and flights of a campaign; [`flight`] repeats it, as
-//!    the phases are linearised about the delays.
-//! 6. [`correction`] decides which delays are corrected, and what stays unknown.
-//! 7. [`findings`] makes rows of the table `instruments`, and names reversed signs.
+//! 4. [`evidence`] is the contribution of a maneuver: its information on the delays, and the ratio
+//!    of its surfaces' effects to the tunnel's.
+//! 5. [`delays`] combines maneuvers of a flight, and flights of a campaign; [`flight`] repeats it,
+//!    as the phases are linearised about the delays.
+//! 6. [`correction`] decides which delays are corrected, and with which remaining uncertainty.
+//! 7. [`findings`] makes rows of the table `instruments`, and reports reversed signs.
 
 mod settings;
 mod fourier;

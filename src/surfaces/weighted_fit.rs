@@ -6,14 +6,15 @@ use nalgebra::{Complex, DMatrix, DVector};
 use super::fourier::Spectrum;
 use crate::numerics::symmetric;
 
-/// Distance over which the residuals' power is averaged, Hz either way: turbulence and sensor noise
-/// change little over it, and a maneuver of 15 s has 15 frequencies in it.
+/// Distance over which the residuals' power is averaged, Hz on either side: turbulence and sensor
+/// noise change little over it, and a maneuver of 15 s has 15 frequencies in it.
 const SMOOTHED_HZ: f64 = 0.5;
 
 /// Number of times that the weights are estimated anew.
 const ROUNDS: usize = 3;
 
-/// Least residual power, as a share of the mean power of the coefficient: rounding of the sums.
+/// Least residual power, as a share of the mean power of the coefficient: rounding errors of the
+/// sums.
 const ROUNDING: f64 = 1e-16;
 
 /// Prior of a derivative: value and standard deviation.
@@ -35,7 +36,7 @@ pub struct WeightedFit {
 }
 
 impl WeightedFit {
-    /// Fits `implied` by the columns; `None` where the normal matrix is not positive definite.
+    /// Fits `implied` by the columns; `None` unless the normal matrix is positive definite.
     pub fn new(
         frequencies_hz: &[f64],
         implied: &Spectrum,

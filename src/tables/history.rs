@@ -27,7 +27,7 @@ pub struct HistoryOutput {
     pub marked: Vec<bool>,
 }
 
-/// Reads numbers of which some are null: JSON has no NaN.
+/// Reads numbers that may be null: JSON has no NaN.
 fn null_as_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
     let values = Vec::<Option<f64>>::deserialize(deserializer)?;
     Ok(values.into_iter().map(|v| v.unwrap_or(f64::NAN)).collect())

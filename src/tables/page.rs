@@ -128,7 +128,7 @@ fn section(page: &mut String, name: &str, per: &str, meaning: &str) {
     }
 }
 
-/// The table of the columns, and below it the words that they hold.
+/// Writes the table of the columns, and the words of each below it.
 fn rows(page: &mut String, columns: &[Column]) {
     line(page, "\n| column | unit | meaning |\n|---|---|---|");
     for column in columns {

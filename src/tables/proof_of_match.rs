@@ -51,7 +51,7 @@ words! {
 }
 
 impl MatchedQuantity {
-    /// `true` for a quantity of the Dutch roll, which is one number a maneuver.
+    /// `true` for a quantity of the Dutch roll, which is one number per maneuver.
     #[must_use]
     pub fn is_of_dutch_roll(self) -> bool {
         matches!(

@@ -1,4 +1,4 @@
-//! Columns of published tables that are read back: an earlier campaign's or another night's.
+//! Columns of published tables that are read back, from an earlier campaign or another night.
 
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -10,7 +10,7 @@ fn empty_as_nan<'de, D: Deserializer<'de>>(field: D) -> Result<f64, D::Error> {
     Ok(Option::<f64>::deserialize(field)?.unwrap_or(f64::NAN))
 }
 
-/// The columns of published `trends` that campaigns and nights are compared by.
+/// The columns of published `trends` by which campaigns and nights are compared.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PublishedTrend {
     pub derivative: String,
@@ -36,7 +36,7 @@ impl From<&TrendRow> for PublishedTrend {
     }
 }
 
-/// The columns of published `comparison` that nights are compared by.
+/// The columns of published `comparison` by which nights are compared.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PublishedVerdict {
     pub derivative: String,

@@ -9,7 +9,7 @@ pub(super) struct Basis {
     /// The range of the data, deg.
     range: (f64, f64),
     order: usize,
-    /// Inside the range, ascending, deg; none for a polynomial.
+    /// Knots inside the range, ascending, deg; empty for a polynomial.
     knots: Vec<f64>,
 }
 

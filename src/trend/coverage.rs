@@ -62,8 +62,8 @@ fn stall(a: f64) -> f64 {
     0.08 - 0.07 / (1.0 + (-(a - 22.0) / 4.0).exp()) + 3e-4 * a
 }
 
-/// Studies with the least coverage of the band. A stall within 15° bends more than test points 5°
-/// apart resolve: there the coverage is below the nominal one.
+/// Studies with the least coverage of the band. A stall within 15° has a sharper bend than test
+/// points 5° apart resolve: there the coverage is below the nominal one.
 const STUDIES: [(Study, f64); 9] = [
     (
         Study {

@@ -3,29 +3,30 @@
 //!
 //! Maneuver i has the estimate yᵢ at αᵢ with the bound bᵢ. The model is yᵢ = Σ cⱼ Pⱼ(αᵢ) +
 //! maneuver's own deviation + error, with the functions of [`Basis`], deviations of standard
-//! deviation τ, errors of standard deviation bᵢ. Weights are 1/(bᵢ² + τ²). τ² is the value at which
-//! the weighted residuals come out as large as their degrees of freedom, Σ r²/(b² + τ²) = Σ (1 −
-//! hᵢ) (Paule and Mandel 1982), or zero where they are smaller already; hᵢ is the
-//! leverage of an estimate on its own trend; the sum is n − p over all maneuvers. A class of
-//! `OWN_SCATTER` maneuvers has a τ of its own. So a class with wrong values, say because a derivative
-//! is held at a wrong one, keeps its scatter to itself.
+//! deviation τ, errors of standard deviation bᵢ. Weights are 1/(bᵢ² + τ²). τ² is the value for
+//! which the weighted sum of squared residuals equals their degrees of freedom, Σ r²/(b² + τ²) = Σ
+//! (1 − hᵢ) (Paule and Mandel 1982), or zero if the sum is smaller without τ². hᵢ is the leverage
+//! of an estimate on its own trend; Σ (1 − hᵢ) is n − p over all maneuvers. A class of
+//! `OWN_SCATTER` maneuvers has a τ of its own. The scatter of a class with wrong values, for
+//! example because of a wrong held value, thus does not affect the others.
 //!
-//! One outlier must bend neither the trend nor τ: [`RobustSolution`] has the weights, and the
-//! covariance of the coefficients. No bound counts as less than the share `BOUND_FLOOR` of the group's
-//! median bound: bounds are themselves uncertain by a factor of a few. The interval takes Student's t
-//! with n − p degrees of freedom (Hartung and Knapp 2001). It is never narrower than the bounds alone
-//! give.
+//! One outlier must not distort the trend or τ: [`RobustSolution`] has the weights, and the
+//! covariance of the coefficients. A bound smaller than the share `BOUND_FLOOR` of the group's
+//! median bound is raised to it, since bounds themselves are uncertain by a factor of a few. The
+//! interval takes Student's t with n − p degrees of freedom (Hartung and Knapp 2001). It is never
+//! narrower than the interval from the bounds alone.
 //!
-//! A trend of few coefficients may not follow the derivative. Maneuvers of one flown α differ by their
-//! own deviations alone; their mean residuals differ from α to α also by lack of fit, λ (Paule and
-//! Mandel's equation for the means). Lack of fit does not average out: λ² counts in the variance of the
-//! trend at every α. Where no α was flown twice, all that the bounds leave is lack of fit.
+//! A trend of few coefficients may not follow the derivative. Maneuvers of one flown α differ by
+//! their own deviations only. Their mean residuals also differ from α to α by lack of fit, λ (Paule
+//! and Mandel's equation for the means). Lack of fit does not average out: λ² is part of the
+//! variance of the trend at every α. If no α was flown twice, all scatter beyond the bounds is lack
+//! of fit.
 //!
-//! A criterion chooses the order, and its choice is uncertain. The other orders count in the
+//! A criterion chooses the order, and its choice is uncertain. The other orders contribute to the
 //! variance with their Akaike weights, exp(−Δ/2) (Burnham and Anderson's unconditional variance),
-//! each with its own variance and its distance from the chosen trend. A criterion also smooths: it
-//! leaves a bias as large as the errors. So no standard error is smaller than that of one
-//! coefficient more (undersmoothing, Hall 1992).
+//! each with its own variance and its distance from the chosen trend. A criterion also smooths,
+//! which leaves a bias as large as the errors. Therefore no standard error is smaller than that
+//! with one more coefficient (undersmoothing, Hall 1992).
 
 use nalgebra::{DMatrix, DVector};
 
@@ -53,7 +54,8 @@ pub(super) struct TrendFit {
     lack_of_fit2: f64,
     /// τ² of each point, in the points' order.
     scatter2: Vec<f64>,
-    /// Standard deviation by the median maneuver's bound and the maneuvers' own deviations.
+    /// Standard deviation of one more estimate, from the median maneuver's bound and the maneuvers'
+    /// own deviations.
     deviation_of_one_more: f64,
     degrees_of_freedom: usize,
     criterion: f64,
@@ -70,8 +72,8 @@ pub(super) struct Trend {
 }
 
 impl Trend {
-    /// The trend through points sorted by α: the lower order on a tie; `None` where no order has
-    /// a solution.
+    /// The trend through points sorted by α: the lower order on a tie; `None` if no order has a
+    /// solution.
     pub(super) fn through(
         points: &[Point],
         settings: &Settings,
@@ -117,7 +119,7 @@ impl Trend {
         (value, averaged.max(self.error_of_next_order(alpha_deg)))
     }
 
-    /// The standard error of the fit with one coefficient more; zero where the data allow none.
+    /// The standard error of the fit with one more coefficient; zero if the data allow none.
     fn error_of_next_order(&self, alpha_deg: f64) -> f64 {
         let size = self.best.basis.size() + 1;
         let next = self.orders.iter().find(|(_, fit)| fit.basis.size() == size);
@@ -128,11 +130,11 @@ impl Trend {
 impl TrendFit {
     /// The fits of every order that the data allow. Points are sorted by α.
     ///
-    /// At least two degrees of freedom are left to the residuals, and there are no more
-    /// coefficients than distinct α: with several maneuvers at each, a trend may run through the
-    /// middle of every cluster, and must be able to where a derivative bends between them. Besides
-    /// polynomials there are splines: between the analyst's knots, with polynomials up to the third
-    /// order; where he gives none, between the flown α, each or every second.
+    /// At least two degrees of freedom remain for the residuals, and there are no more coefficients
+    /// than distinct α. With several maneuvers at each α, a trend may thus pass through the middle
+    /// of every cluster, which it must if a derivative bends between them. Besides polynomials
+    /// there are splines. If the analyst gives knots, they are used, with polynomials up to the
+    /// third order; otherwise the knots are each, or every second, flown α.
     fn all(points: &[Point], settings: &Settings, knots_deg: &[f64]) -> Vec<TrendFit> {
         let (Some(first), Some(last)) = (points.first(), points.last()) else {
             return Vec::new();
@@ -172,7 +174,7 @@ impl TrendFit {
             .collect()
     }
 
-    /// The fit of one basis; `None` where the normal equations have no solution.
+    /// The fit of one basis; `None` if the normal equations have no solution.
     pub(super) fn of(points: &[Point], basis: Basis, criterion: Criterion) -> Option<TrendFit> {
         let (n, p) = (points.len(), basis.size());
         let rows: Vec<_> = points.iter().map(|q| basis.row(q.alpha_deg)).collect();
@@ -237,8 +239,8 @@ impl TrendFit {
     }
 }
 
-/// Minus twice the log-likelihood of one residual, constant for outliers: no order is chosen because
-/// it comes nearer to one.
+/// Minus twice the log-likelihood of one residual. It is constant for outliers, so that no order is
+/// chosen for coming nearer to one.
 fn deviance((residual, variance): (f64, f64)) -> f64 {
     variance.ln() + (residual * residual / variance).min(OUTLYING * OUTLYING)
 }

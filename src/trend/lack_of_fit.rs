@@ -1,4 +1,5 @@
-//! Lack of fit of a trend: what its curve misses at the flown α, beside the maneuvers' own deviations.
+//! Lack of fit of a trend: its systematic error at the flown α, beside the maneuvers' own
+//! deviations.
 
 use nalgebra::DVector;
 
@@ -7,9 +8,9 @@ use super::scatter::scatter_squared;
 
 /// Variance of the residuals beyond the bounds, in two parts.
 pub(super) struct LackOfFit {
-    /// λ², by which the derivative leaves the curve.
+    /// λ², the variance of the derivative about the curve.
     pub lack2: f64,
-    /// Variance of the maneuvers' own deviations, from those of one flown α.
+    /// Variance of the maneuvers' own deviations, from maneuvers of one flown α.
     pub own2: f64,
 }
 
@@ -38,7 +39,7 @@ impl LackOfFit {
 struct AboutMeans {
     /// Residual of each maneuver.
     residuals: DVector<f64>,
-    /// One less its share of the mean, of each maneuver.
+    /// One less each maneuver's share in the mean.
     freedom: Vec<f64>,
     /// Mean residual of each flown α.
     means: Vec<f64>,

@@ -1,9 +1,10 @@
-//! Means of a derivative at the flown angles of attack, where the maneuvers are too few for a trend.
+//! Means of a derivative at the flown angles of attack, where the maneuvers are too few for a
+//! trend.
 //!
 //! The mean of the maneuvers of one flown α has weights 1/(b² + τ²), with b their bounds. τ² is the
-//! value at which the weighted residuals come out as large as their degrees of freedom, as for a
-//! trend; of two maneuvers, ((y₁ − y₂)² − b₁² − b₂²)/2, or zero. The interval is the normal one:
-//! bounds are standard deviations, and no variance is estimated from one or two values alone.
+//! value for which the weighted sum of squared residuals equals their degrees of freedom, as for a
+//! trend. For two maneuvers it is ((y₁ − y₂)² − b₁² − b₂²)/2, or zero. The interval is the normal
+//! one: bounds are standard deviations, and no variance is estimated from one or two values alone.
 
 use super::point::Point;
 

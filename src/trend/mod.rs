@@ -35,7 +35,7 @@ pub use settings::Settings;
 #[cfg(test)]
 pub use settings::TrendGroup;
 
-/// Fewest maneuvers of a trend: from fewer their scatter cannot be estimated.
+/// Least number of maneuvers for a trend: the scatter of fewer cannot be estimated.
 const FEWEST_MANEUVERS: usize = 3;
 
 /// Name of a mean in the column `curve`.
@@ -306,9 +306,9 @@ fn clamp_to_data(points: &[Point], alpha_deg: f64) -> f64 {
 
 /// Standard error of the trend at an α from held values and the instruments' calibration.
 ///
-/// Errors of held values and of instruments are common to the maneuvers, so they do not average out.
-/// The result is the mean over the maneuvers within a step of α, with weights 1/bound²; where none was
-/// flown so near, over the flown α on either side.
+/// Errors of held values and of instruments are common to the maneuvers, so they do not average
+/// out. The result is the mean over the maneuvers within a step of α, with weights 1/bound²; if
+/// there are none, over the flown α on either side.
 fn common_error(members: &[&EstimateRow], alpha_deg: f64, step_deg: f64) -> f64 {
     let nearest = |side: f64| {
         let distances = members.iter().map(|e| side * (e.alpha_deg - alpha_deg));

@@ -1,14 +1,14 @@
-//! Weighted least squares that one outlier bends neither in its coefficients nor in τ.
+//! Weighted least squares in which one outlier distorts neither the coefficients nor τ.
 //!
-//! A residual beyond [`HUBER`] standard deviations counts as if it were just that far: Huber's weights
-//! in the solution, his proposal 2 for τ. The covariance of the coefficients is that of an M-estimate
-//! (Huber 1981, section 7.6),
+//! A residual beyond [`HUBER`] standard deviations counts as if it were at that limit: Huber's
+//! weights in the solution, his proposal 2 for τ. The covariance of the coefficients is that of an
+//! M-estimate (Huber 1981, section 7.6),
 //!
 //! K² · [Σψ²(uᵢ)/(n − p)] / m² · (Xᵀ V⁻¹ X)⁻¹, K = 1 + (p/n)(1 − m)/m,
 //!
-//! with u the residuals over their standard deviations, ψ cutting them at [`HUBER`], m the share that
-//! is not cut and V = b² + τ². The bracket scales the covariance by the residuals as they are, not as
-//! bounds and τ predict them; few data need that.
+//! with u the residuals over their standard deviations, ψ limiting them at [`HUBER`], m the share
+//! that is not limited and V = b² + τ². The bracket scales the covariance by the actual residuals
+//! instead of those that bounds and τ predict, which matters with few data.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -44,7 +44,7 @@ pub(super) struct RobustSolution {
 
 impl RobustSolution {
     /// Solution for points of these values and squared bounds, with one τ for each stratum; `None`
-    /// where the normal equations have none.
+    /// if the normal equations have none.
     pub(super) fn of(
         design: &DMatrix<f64>,
         values: &DVector<f64>,
@@ -140,7 +140,7 @@ fn residual_freedom(
         .collect()
 }
 
-/// x M xᵀ of each row x of the design. Products of so small matrices take the library several times as
+/// x M xᵀ of each row x of the design. For products this small the library takes several times as
 /// long.
 fn spreads(design: &DMatrix<f64>, matrix: &DMatrix<f64>) -> Vec<f64> {
     let (rows, columns_of_rows) = (design.transpose(), matrix.transpose());

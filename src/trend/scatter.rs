@@ -8,8 +8,7 @@ use crate::numerics::order_statistics::upper_median;
 /// Standard deviations beyond which the influence of a residual stays constant: Huber's weights. The
 /// fit then tolerates a quarter of outliers, and loses 4% of efficiency where there are none.
 pub(super) const HUBER: f64 = 1.5;
-/// The mean of min(u², `HUBER`²) for standard normal u, which takes the place of one in the
-/// equation for τ².
+/// The mean of min(u², `HUBER`²) for standard normal u, which replaces one in the equation for τ².
 pub(super) const HUBER_VARIANCE: f64 = 0.778_465;
 /// Least bound, as a share of the median bound: bounds are uncertain by a factor of a few.
 const BOUND_FLOOR: f64 = 0.25;
@@ -23,7 +22,7 @@ pub(super) fn floored_variances(points: &[Point]) -> Vec<f64> {
 }
 
 /// The points of each stratum, a set with one τ: every class with a scatter of its own, then all
-/// points where any is left.
+/// points, if any remain.
 pub(super) fn strata(points: &[Point]) -> Vec<Vec<usize>> {
     let classes = points
         .iter()
@@ -45,7 +44,7 @@ pub(super) fn strata(points: &[Point]) -> Vec<Vec<usize>> {
     strata
 }
 
-/// b² + τ² of each point: τ of its class where that is a stratum, else τ of all.
+/// b² + τ² of each point, with τ of its class if that is a stratum, otherwise τ of all.
 pub(super) fn total_variances(
     residuals: &DVector<f64>,
     variances: &[f64],

@@ -77,7 +77,7 @@ pub enum Criterion {
 }
 
 impl Settings {
-    /// The group of a derivative; `None` where no group names it and none takes the rest.
+    /// The group of a derivative; `None` if no group names it and none takes the rest.
     #[must_use]
     pub fn group_of(&self, derivative: &str) -> Option<&TrendGroup> {
         let names = |g: &&TrendGroup| g.derivatives.iter().any(|d| d == derivative);

@@ -4,8 +4,8 @@ use super::product::UnitProduct;
 use super::unit::{UNITS, Unit, unit};
 
 impl Unit {
-    /// Parses a unit, another spelling of one, or a product of units of a quantity that harvest has:
-    /// `N m-1 s`. Spaces, `^`, `*` and a middle dot do not matter otherwise.
+    /// Parses a unit, another spelling of one, or a product of units of a quantity that harvest
+    /// has: `N m-1 s`. Spaces, `^`, `*` and a middle dot are ignored.
     ///
     /// # Errors
     /// A message with the names of all units, for an unknown unit.

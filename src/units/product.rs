@@ -11,8 +11,8 @@ pub struct UnitProduct {
 }
 
 impl UnitProduct {
-    /// Parses a product of units, also one of a quantity that no signal has. What stands behind a
-    /// slash divides.
+    /// Parses a product of units, also one of a quantity that no signal has. Units after a slash
+    /// divide.
     #[must_use]
     pub fn parse(text: &str) -> Option<UnitProduct> {
         let (mut dimensions, mut factor) = ([0; 6], 1.0);

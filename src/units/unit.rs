@@ -10,8 +10,8 @@ pub struct Unit {
     /// End of a signal's name that stands for this unit; signals are kept in units that have one.
     pub suffix: Option<&'static str>,
     pub quantity: Quantity,
-    /// No channel is taken to be recorded in it by mistake: with every unit there is, some factor of one channel
-    /// explains what another channel's usual mistake does.
+    /// `true` for a unit in which no channel is recorded by mistake. With all units allowed, some
+    /// factor of one channel would explain a usual mistake of another.
     pub is_rare: bool,
     /// Factor from values in this unit to values in the quantity's base unit.
     pub(super) factor: f64,
@@ -260,8 +260,8 @@ impl Unit {
         }
     }
 
-    /// Unit in which the signal of this name is kept: that of the longest suffix that fits, a pure
-    /// number without one.
+    /// Unit in which the signal of this name is kept: that of the longest suffix that fits; a pure
+    /// number without a suffix.
     #[must_use]
     pub fn of_signal(signal: &str) -> Unit {
         let number = unit("-", None, Quantity::Number, 1.0);
@@ -274,7 +274,7 @@ impl Unit {
             .unwrap_or(number)
     }
 
-    /// All units of the same quantity, this one among them.
+    /// All units of the same quantity, this one included.
     pub fn alike(self) -> impl Iterator<Item = Unit> {
         UNITS
             .iter()
@@ -301,7 +301,7 @@ impl Unit {
     }
 }
 
-/// A text without the signs that do not matter in a unit.
+/// A text without the characters that are ignored in a unit.
 pub(super) fn plain(text: &str) -> String {
     let is_sign = |c: &char| matches!(c, ' ' | '^' | '·' | '*' | '.');
     let digit = |c: char| match c {

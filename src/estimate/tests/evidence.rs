@@ -79,7 +79,8 @@ fn put(record: &mut Record, name: &str, values: Vec<f64>) {
     );
 }
 
-/// A tunnel that is a tenth off and says that it may be off by `share` of each derivative.
+/// A tunnel whose values are off by a tenth, with a stated uncertainty of `share` of each
+/// derivative.
 fn tunnel(truth: &[(Derivative, f64)], share: f64) -> WindTunnel {
     let mut tunnel = WindTunnel::default();
     for (derivative, value) in truth.iter().filter(|(_, value)| *value != 0.0) {

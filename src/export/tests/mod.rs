@@ -1,6 +1,6 @@
 //! The export of the shipped model with a few trends: read back as a database, evaluated as a
-//! simulator would, held against DAVE-ML's grammar and against the simulator of this house, which
-//! has the build-up on its own.
+//! simulator would, checked against DAVE-ML's grammar, and compared with harvest's own simulator,
+//! which has an independent build-up.
 
 mod grammar;
 mod jsbsim;

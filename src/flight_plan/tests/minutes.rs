@@ -20,7 +20,7 @@ const LIST: [&[(&str, &[f64])]; 4] = [
 /// Planned flights of a seed; each has this part of the list's minutes.
 const FLIGHTS: usize = 5;
 
-/// Knowledge after some flights.
+/// Uncertainty after some flights.
 #[derive(Clone, Copy, Debug)]
 struct Knowledge {
     minutes: f64,
@@ -60,7 +60,7 @@ impl World {
         of_cards + (high - low) * self.budget(0.0).minutes_per_deg
     }
 
-    /// Knowledge after the flights of the list.
+    /// Uncertainty after the flights of the list.
     fn by_list(&self) -> Knowledge {
         let all = self.candidates();
         let (mut flown, mut minutes) = (vec![], 0.0);
@@ -78,7 +78,7 @@ impl World {
         self.knowledge(&flown, minutes)
     }
 
-    /// Knowledge after each of the planned flights, from the tunnel alone.
+    /// Uncertainty after each of the planned flights, from the tunnel alone.
     fn by_plans(&self, list_minutes: f64) -> Vec<Knowledge> {
         let budget = self.budget(list_minutes / FLIGHTS as f64);
         let (mut flown, mut minutes) = (vec![], 0.0);
@@ -92,7 +92,8 @@ impl World {
     }
 }
 
-/// Share of the list's minutes at which planned flights know as much; `None` where they never do.
+/// Share of the list's minutes after which planned flights have reached the same uncertainty;
+/// `None` if they never do.
 fn share_of_minutes(list: &Knowledge, planned: &[Knowledge]) -> Option<f64> {
     let after = planned
         .iter()

@@ -1,10 +1,10 @@
-//! Study of the bounds: simulated maneuvers with known derivatives are flown and recorded many times
-//! under several conditions, and estimated with the campaign's settings. Errors of the estimates are
-//! compared with their bounds.
+//! Study of the bounds: simulated maneuvers with known derivatives are flown and recorded many
+//! times under several conditions, and estimated with the campaign's settings. Errors of the
+//! estimates are compared with their bounds.
 //!
-//! The conditions of the cards (`study: conditions:`) say what is flown, in which air, and how it is
-//! recorded. Instruments have noise only, and held values are true. Writes the tables `conditions`,
-//! `coverage` and `starts` and a page of the documentation.
+//! The conditions of the cards (`study: conditions:`) state what is flown, in which air, and how it
+//! is recorded. Instruments have noise only, and held values are true. The study writes the tables
+//! `conditions`, `coverage` and `starts` and a page of the documentation.
 
 mod recordings;
 mod coverage;
@@ -43,7 +43,7 @@ pub struct BoundsStudy {
 /// record six times.
 const RECORDS_PER_START: usize = 10;
 
-/// Makes the study, writes its tables into a folder, and its page.
+/// Runs the study, writes its tables into a folder, and its page.
 ///
 /// # Errors
 /// [`crate::error::Error::Io`] or [`crate::error::Error::Store`] naming the file.
@@ -124,7 +124,8 @@ impl BoundsStudy {
         self.coverage.extend(rows);
     }
 
-    /// Estimates maneuvers as the theory assumes them from other starting values.
+    /// Estimates maneuvers under the conditions that the theory assumes, from other starting
+    /// values.
     fn vary_starts(
         &mut self,
         campaign: &SimulatedCampaign,
@@ -151,7 +152,7 @@ impl BoundsStudy {
         }
     }
 
-    /// Notes a problem once.
+    /// Adds a problem, unless it is listed already.
     fn note(&mut self, problem: Problem) {
         if !self.problems.contains(&problem) {
             self.problems.push(problem);
@@ -159,7 +160,8 @@ impl BoundsStudy {
     }
 }
 
-/// Still air and white noise of the outputs, weighted by the tables: what the theory assumes.
+/// Condition that the theory assumes: still air and white noise of the outputs, weighted by the
+/// tables.
 fn assumed_condition() -> StudyCondition {
     StudyCondition {
         name: String::new(),

@@ -1,5 +1,5 @@
-//! Recordings of one maneuver under one condition, each with fresh noise and, where the air is random,
-//! from a flight of its own; and the estimate from each.
+//! Recordings of one maneuver under one condition, and the estimate from each. Each has fresh
+//! noise; if the air is random, each is from a flight of its own.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -24,7 +24,7 @@ pub struct StudyManeuver<'a> {
     surface_delay_s: f64,
     /// Settings of the estimates.
     pub settings: estimate::Settings,
-    /// Flight of all records; `None` where each record has its own.
+    /// Flight of all records; `None` if each record has its own.
     common_flight: Option<FlownManeuver>,
 }
 
@@ -62,7 +62,7 @@ fn settings(campaign: &SimulatedCampaign, condition: &StudyCondition) -> estimat
 }
 
 impl<'a> StudyManeuver<'a> {
-    /// Prepares a card under a condition; flies it where the air is not random.
+    /// Prepares a card under a condition, and flies it unless the air is random.
     ///
     /// # Errors
     /// The card cannot be flown.

@@ -44,9 +44,9 @@ fn start_tables(variant: StartVariant, truth: &[TrueDerivative], buildup: &Build
 /// Minimum reached from other starting values, compared with the minimum from the true values.
 #[derive(Clone, Copy, Debug)]
 struct Reached {
-    /// Reached, possibly from the equation-error start.
+    /// `true` if the same minimum was reached, possibly from the equation-error start.
     same: bool,
-    /// Reached from the given values.
+    /// `true` if it was reached from the given values themselves.
     unaided: bool,
 }
 

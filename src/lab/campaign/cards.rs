@@ -53,7 +53,8 @@ pub struct Cards {
 #[serde(deny_unknown_fields, default)]
 pub struct RecorderCard {
     pub form: Form,
-    /// Formula, of the simulator's signals, of each column that only formulas of the channel map use.
+    /// Formulas, of the simulator's signals, for the columns that only formulas of the channel map
+    /// use.
     pub columns: BTreeMap<String, String>,
     pub slow: SlowColumns,
 }

@@ -10,9 +10,9 @@ use super::test_point::TestPoint;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct NextFlight {
-    /// Altitude of the cards; that of each test point's flight unless given.
+    /// Altitude of the cards; if not given, that of each test point's flight.
     pub altitude_ft: Option<f64>,
-    /// Mass at the cards; that of each test point's flight unless given.
+    /// Mass at the cards; if not given, that of each test point's flight.
     pub mass_slug: Option<f64>,
     /// Time to trim before a card and to recover after it.
     pub settle_s: f64,

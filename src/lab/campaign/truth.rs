@@ -1,4 +1,5 @@
-//! Tables of the truth of a simulated campaign: events, derivatives, instruments, cards not flown.
+//! True values of a simulated campaign as tables: events, derivatives, instruments, cards not
+//! flown.
 
 use std::path::Path;
 

@@ -45,7 +45,7 @@ fn measured(
         .collect()
 }
 
-/// Rows of a combined sum where both its terms have a row.
+/// Rows of a combined sum at the points where both of its terms have a row.
 fn combined_sums(rows: &[TunnelRow], combined: &Combined) -> Vec<TunnelRow> {
     let slopes: Vec<&TunnelRow> = rows
         .iter()

@@ -31,7 +31,7 @@ pub struct FlightCondition {
 }
 
 impl FlightCondition {
-    /// `true` where every flight of a card is another: the air is random.
+    /// `true` if each flight of a card differs from the others because the air is random.
     #[must_use]
     pub fn is_random(&self) -> bool {
         self.turbulence.is_some() || self.discrete_gusts.is_some()

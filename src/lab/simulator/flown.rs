@@ -18,7 +18,8 @@ pub struct FlownManeuver {
     /// Record of perfect instruments at their positions.
     pub record: Record,
     pub maneuver: Maneuver,
-    /// Derivatives at the card's α and Mach number; at the maneuver's means where the tables vary.
+    /// Derivatives at the card's α and Mach number; if the tables vary in the maneuver, at its
+    /// means.
     pub truth: Vec<TrueDerivative>,
 }
 

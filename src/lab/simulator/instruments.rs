@@ -72,7 +72,7 @@ impl Instruments {
         Instruments(self.0.iter().map(draw).collect())
     }
 
-    /// Instruments of a recorder that has these signals late by a further delay.
+    /// Instruments of a recorder that records these signals late by a further delay.
     #[must_use]
     pub fn late<'a>(
         mut self,
@@ -87,7 +87,7 @@ impl Instruments {
         self
     }
 
-    /// Record of these instruments from the record of perfect ones.
+    /// Record as these instruments read it, from the record of perfect ones.
     #[must_use]
     pub fn record(&self, exact: &Record, seed: u64) -> Record {
         let drawn = self.drawn(seed);
@@ -152,7 +152,7 @@ impl Instrument {
         self.with_spikes_and_dropouts(values, step_s, random)
     }
 
-    /// Signal by the delay later.
+    /// Signal delayed by the instrument.
     fn delayed<'a>(&self, exact: &'a [f64], step_s: f64) -> Cow<'a, [f64]> {
         if self.delay_s == 0.0 {
             return exact.into();

@@ -83,7 +83,7 @@ impl Plant {
         at(AirData::alpha_rate_in_balance(implied))
     }
 
-    /// Plant where the loads see this α̇, rad/s.
+    /// Loads and accelerations of the plant at this α̇, rad/s.
     fn evaluate_at(
         &self,
         alpha_rate: f64,

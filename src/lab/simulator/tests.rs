@@ -1,4 +1,5 @@
-//! The simulator against the estimator: the same physics, written down twice, must agree.
+//! The simulator against the estimator: two independent implementations of the same physics must
+//! agree.
 
 use std::fs;
 use std::path::Path;

@@ -20,9 +20,9 @@ use crate::output_error::surface_noise::noisy_surfaces;
 use crate::output_error::{Case, Fit, InitialState, Likelihood, Model, Outcome, cramer_rao};
 use crate::store::files;
 
-/// Tolerance of the iteration relative to the case's `ftol`. Other estimators stop after a step that
-/// lowers the cost by less than `ftol`, harvest before it. A step near the minimum lowers the next
-/// gain by about this factor, so that both end at the same step.
+/// Tolerance of the iteration relative to the case's `ftol`. Other estimators stop after a step
+/// that lowers the cost by less than `ftol`; harvest stops before it. A step near the minimum
+/// lowers the next gain by about this factor, so both end at the same step.
 const TOLERANCE_PER_FTOL: f64 = 0.01;
 
 /// A standard case in memory.
@@ -148,8 +148,8 @@ impl StandardCase {
         })
     }
 
-    /// Signals of the case at the samples, and between them on straight lines, as the programs that
-    /// the case is compared with take them.
+    /// Signals of the case at the samples, with straight lines between them, as in the programs
+    /// with which the case is compared.
     ///
     /// # Errors
     /// The message for a signal that the record lacks.

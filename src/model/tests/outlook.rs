@@ -1,4 +1,4 @@
-//! Outlook on planned maneuvers: the covariance that it leads to is the one after they were flown.
+//! Outlook on planned maneuvers: its covariance is compared with the one after they were flown.
 
 use approx::assert_relative_eq;
 use nalgebra::{Cholesky, DMatrix, DVector};

@@ -39,7 +39,8 @@ impl Causes {
         causes.filter(move |c| (c.origin == Origin::Flight) == is_flight)
     }
 
-    /// Causes of a maneuver's change: its flight, or else the settings and methods of its stages.
+    /// Causes of a maneuver's change: its flight, or otherwise the settings and methods of its
+    /// stages.
     pub fn of_maneuver(&self, flight_id: &str, class: &str) -> String {
         let of_flight: Vec<&Cause> = self
             .of_origin(true)
@@ -53,8 +54,8 @@ impl Causes {
         phrase(causes.iter().map(|c| c.words.as_str()))
     }
 
-    /// Settings and methods as far as the estimate; those of other classes only if there are no
-    /// others.
+    /// Causes by settings and methods up to the estimate; those of other classes only if there are
+    /// no others.
     fn of_settings(&self, class: &str) -> Vec<&Cause> {
         let (of_others, own): (Vec<&Cause>, Vec<&Cause>) = self
             .of_origin(false)
@@ -133,7 +134,7 @@ fn is_of_other_class(cause: &Cause, class: &str) -> bool {
 
 /// Joins causes to one phrase; a long list is cut, [`crate::lineage::Changes::causes`] has all.
 fn phrase<'a>(causes: impl Iterator<Item = &'a str>) -> String {
-    /// Causes in a phrase, so that it fits a line of the report.
+    /// Largest number of causes in a phrase, so that it fits a line of the report.
     const MOST: usize = 4;
     let mut unique: Vec<&str> = Vec::new();
     for cause in causes.flat_map(|c| c.split("; ")) {

@@ -8,14 +8,15 @@ use crate::lineage::Contradiction;
 use crate::night::published_night::NightTables;
 use crate::tables::SelfCheckRow;
 
-/// Share of estimates that belongs inside a 95 % interval.
+/// Expected share of estimates inside a 95 % interval.
 const INSIDE: f64 = 0.95;
 
-/// Probability of as few estimates inside, below which a part of the campaign is contradicted. Some
-/// hundred parts are checked, and their estimates are correlated.
+/// Probability that as few estimates are inside by chance, below which a part of the campaign
+/// counts as contradicted. It is low because some hundred parts are checked, and their estimates
+/// are correlated.
 const LEAST_PROBABILITY: f64 = 1e-5;
 
-/// Parts that are contradicted now and were not in the earlier night.
+/// Parts that are contradicted now, but were not in the earlier night.
 pub fn contradictions(before: &NightTables, now: &NightTables) -> Vec<Contradiction> {
     let known = before.self_check.iter().filter(|row| is_contradicted(row));
     let known: BTreeSet<(&str, &str)> = known.map(place).collect();

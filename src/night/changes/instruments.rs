@@ -6,8 +6,8 @@ use crate::lineage::InstrumentChange;
 use crate::night::published_night::NightTables;
 use crate::tables::{InstrumentError, InstrumentTrend, InstrumentTrendRow};
 
-/// Errors that step or drift now and did not in the earlier night. A step that is found a flight earlier
-/// or later than in the earlier night is no news.
+/// Errors that step or drift now, but did not in the earlier night. A step that is found a flight
+/// earlier or later than before is not reported again.
 pub fn instruments(before: &NightTables, now: &NightTables) -> Vec<InstrumentChange> {
     let known = before.instrument_trends.iter();
     let known: BTreeSet<_> = known.filter_map(place).collect();
@@ -16,7 +16,7 @@ pub fn instruments(before: &NightTables, now: &NightTables) -> Vec<InstrumentCha
     now.filter(is_new).filter_map(change).collect()
 }
 
-/// Error with the way it changes; `None` for a steady one.
+/// Error and the kind of its change; `None` for a steady error.
 fn place(row: &InstrumentTrendRow) -> Option<(&str, InstrumentError, InstrumentTrend)> {
     let changes = matches!(row.verdict, InstrumentTrend::Step | InstrumentTrend::Drift);
     changes.then_some((row.channel.as_str(), row.error, row.verdict))

@@ -30,7 +30,7 @@ struct Night<'a> {
     covariances: BTreeMap<&'a str, BTreeMap<(Point, Point), f64>>,
 }
 
-/// Derivatives of which flight taught something, the most first.
+/// Derivatives on which flight added information, the most first.
 pub fn learnt(before: &NightTables, now: &NightTables) -> Vec<Learnt> {
     let (before, now) = (Night::of(before), Night::of(now));
     let names = now.rows.keys();

@@ -1,9 +1,9 @@
 //! Changes from one published night to the next, with their causes: maneuvers, their derivatives,
 //! trends, verdicts and instruments.
 //!
-//! A number has moved if it differs by more than its uncertainty, the larger of the two nights': the
-//! corrected bound of an estimate, the standard error of a trend. Smaller differences are noise and
-//! are not listed. What the posterior learnt is told in nats.
+//! A number has moved if it differs by more than its uncertainty, the larger of the two nights':
+//! the corrected bound of an estimate, the standard error of a trend. Smaller differences are noise
+//! and are not listed. The information that the posterior gained is given in nats.
 
 mod causes;
 mod contradictions;
@@ -26,8 +26,8 @@ use crate::tables::{
     EstimateRow, FitRow, Outcome, PublishedTrend, PublishedVerdict, TunnelVerdict,
 };
 
-/// Changes since a published night. Tables that cannot be read, say because an older program wrote them
-/// without a column of today's, are an alert.
+/// Changes since a published night. Tables that cannot be read are an alert; an older program may
+/// have written them without one of today's columns.
 #[must_use]
 pub fn since(nights: &Nights, before: &Night, now: &NightTables) -> Changes {
     match PublishedNight::read(nights, before) {
@@ -68,7 +68,7 @@ pub fn between(since: &str, before: &NightTables, now: &NightTables) -> Changes 
     changes
 }
 
-/// `true` if anything changed besides new maneuvers, new trends and what flight taught.
+/// `true` if anything changed besides new maneuvers, new trends and information from flight.
 fn needs_attention(changes: &Changes) -> bool {
     let mut maneuvers = changes.maneuvers.iter();
     !changes.estimates.is_empty()
@@ -200,8 +200,8 @@ fn moved_estimates(before: &NightTables, now: &NightTables, causes: &Causes) -> 
         .collect()
 }
 
-/// Standard deviation of an estimate's move by what other flights have since said of the values that
-/// it holds.
+/// Standard deviation of an estimate's move by new information of other flights about the values
+/// that it holds.
 fn news_of_held(before: &EstimateRow, now: &EstimateRow) -> f64 {
     let [before, now] = [before, now].map(|e| e.bound_held.unwrap_or(0.0));
     (before * before - now * now).max(0.0).sqrt()
@@ -244,8 +244,8 @@ fn moved_trends(before: &NightTables, now: &NightTables, causes: &Causes) -> Vec
     now.trends.iter().filter_map(moved).collect()
 }
 
-/// Verdicts that are no longer what they were. The first verdict on what flight had taught nothing about
-/// is news, but no change.
+/// Verdicts that differ from those of the earlier night. The first verdict after `nothing learnt`
+/// is no change.
 fn changed_verdicts(
     before: &NightTables,
     now: &NightTables,

@@ -1,4 +1,4 @@
-//! Two nights that differ in one thing: that is found, with its cause, and nothing else is.
+//! Two nights that differ in one thing: only that difference is found, with its cause.
 
 use std::collections::BTreeMap;
 

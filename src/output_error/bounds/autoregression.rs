@@ -42,8 +42,8 @@ impl Autoregression {
         best
     }
 
-    /// Extends the process by one order. Returns false, unchanged, where no further autocovariance
-    /// is given or no process can have it.
+    /// Extends the process by one order. Returns false, unchanged, without a further
+    /// autocovariance, or if no process can have it.
     fn lengthen(&mut self, autocovariances: &[f64]) -> bool {
         let a = &mut self.coefficients;
         let Some((next, past)) = autocovariances
@@ -70,8 +70,8 @@ impl Autoregression {
         possible
     }
 
-    /// Log-likelihood that the process gains over white noise of the same variance, less the price of
-    /// its coefficients by the information criterion.
+    /// Log-likelihood that the process gains over white noise of the same variance, less the
+    /// penalty of the information criterion for its coefficients.
     pub fn likelihood_gain(&self, variance: f64, samples: f64) -> f64 {
         0.5 * (Autoregression::white(variance).criterion(samples) - self.criterion(samples))
     }

@@ -31,7 +31,7 @@ pub struct BlockSeries {
     /// Variance of the samples about their block's mean.
     pub(super) fast_variance: f64,
     pub(super) fast_degrees_of_freedom: f64,
-    /// Samples that count, of each block.
+    /// Number of samples that count in each block.
     pub(crate) counts: Vec<f64>,
     /// Summed sensitivities of each block.
     pub(crate) sensitivities: AlignedMatrix,
@@ -95,7 +95,7 @@ impl BlockSeries {
         }
     }
 
-    /// Series among more parameters; `places` has the place of each own parameter.
+    /// Series extended to more parameters; `places` has the index of each own parameter.
     #[must_use]
     pub fn widened(&self, places: &[usize], parameters: usize) -> BlockSeries {
         let mut sensitivities = AlignedMatrix::zeros(self.blocks(), parameters);

@@ -208,7 +208,7 @@ impl<const NX: usize, E: Equations<NX>> Fitted<'_, NX, E> {
     }
 }
 
-/// Name of a signal that is one throughout.
+/// Name of a signal that equals one throughout.
 const ONE: &str = "one";
 
 /// Effects of errors of all surfaces, from one pass. A surface acts through its derivatives alone: its

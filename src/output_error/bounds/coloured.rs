@@ -1,16 +1,15 @@
-//! Covariance of the estimates under coloured residuals (after Morelli and Klein 1997): H⁻¹ [Σ Sᵀ W R
-//! W S] H⁻¹ with R the autocovariance of the noise. Every variance is a sum of squares and has its
-//! degrees of freedom ([`degrees_of_freedom`](super::degrees_of_freedom)).
+//! Covariance of the estimates under coloured residuals (after Morelli and Klein 1997): H⁻¹ [Σ Sᵀ W
+//! R W S] H⁻¹ with R the autocovariance of the noise. Every variance is a sum of squares and has
+//! its degrees of freedom ([`degrees_of_freedom`](super::degrees_of_freedom)).
 //!
-//! Residuals are not the noise: the parameters absorb part of it, most where it is slow. With
-//! C = S H⁻¹ W the change of the estimates with each value, the residuals are (I − S Cᵀ) times the
-//! noise, and their covariance is (I − S Cᵀ) R (I − C Sᵀ). The absorbed part is
-//! R C Sᵀ + S Cᵀ R − S K Sᵀ, with K = Cᵀ R C the parameters' covariance. It is added back in rounds
-//! until R settles. R of each output belongs to an autoregressive process, by which the changes are
-//! filtered.
+//! Residuals are not the noise: the parameters absorb part of it, most where it is slow. With C = S
+//! H⁻¹ W the change of the estimates with each value, the residuals are (I − S Cᵀ) times the noise,
+//! and their covariance is (I − S Cᵀ) R (I − C Sᵀ). The absorbed part is R C Sᵀ + S Cᵀ R − S K Sᵀ,
+//! with K = Cᵀ R C the parameters' covariance. It is added back in rounds until R settles. R of
+//! each output belongs to an autoregressive process, by which the changes are filtered.
 //!
-//! Most outputs are white to the process. Then nothing is filtered: R C Sᵀ is S H⁻¹ Sᵀ times a
-//! number. White noise that has settled stays while that of other outputs goes on.
+//! For most outputs the process is white. Then nothing is filtered: R C Sᵀ is S H⁻¹ Sᵀ times a
+//! number. White noise that has settled is kept while the iteration for other outputs continues.
 
 use std::ops::Range;
 
@@ -23,15 +22,15 @@ use crate::numerics::matrix::AlignedMatrix;
 use crate::numerics::student;
 use crate::output_error::case::blocks::BlockSums;
 
-/// Most rounds of adding the absorbed part back.
+/// Largest number of rounds in which the absorbed part is added back.
 const ROUNDS: usize = 30;
 /// Relative change of an output's long-run variance below which its noise has settled.
 const SETTLED: f64 = 0.01;
-/// Change of the absorbed part, as a share of the variance, below which settled white noise stays. A
-/// bound is known to some hundredths only.
+/// Change of the absorbed part, as a share of the variance, below which settled white noise stays.
+/// A bound is only accurate to some hundredths.
 const UNCHANGED: f64 = 1e-3;
-/// Share of white noise that the parameters must leave for its strength to follow from the residuals
-/// in one round.
+/// Least share of white noise that the parameters leave, for which its variance follows from the
+/// residuals in one round.
 const MOSTLY_LEFT: f64 = 0.95;
 
 /// Noise of each output.
@@ -92,8 +91,8 @@ pub fn residual_noise(inverse: &DMatrix<f64>, outputs: &[BlockSeries]) -> Residu
     ResidualNoise(noise.collect())
 }
 
-/// Variance of white noise as strong as the slowest part of these values, and at least that of the
-/// values. NaN marks values that do not count.
+/// Variance of white noise with the power of the slowest part of these values, and at least the
+/// variance of the values. NaN marks values that do not count.
 #[must_use]
 pub fn slow_noise_level(values: &[f64], step_s: f64) -> f64 {
     let counted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
@@ -107,8 +106,8 @@ pub fn slow_noise_level(values: &[f64], step_s: f64) -> f64 {
     level.max(square / (counted.len() as f64).max(1.0))
 }
 
-/// Log-likelihood that an autoregressive process of these values gains over white noise, less the price of
-/// its coefficients. NaN marks values that do not count.
+/// Log-likelihood that an autoregressive process of these values gains over white noise, less the
+/// penalty for its coefficients. NaN marks values that do not count.
 #[must_use]
 pub fn likelihood_gain(values: &[f64]) -> f64 {
     let finite: Vec<f64> = values
@@ -159,7 +158,8 @@ pub fn gradient_covariance(outputs: &[BlockSeries], noise: &ResidualNoise) -> DM
     covariance.to_dense()
 }
 
-/// Estimates the noise of all outputs: adds back what the parameters absorb until all have settled.
+/// Estimates the noise of all outputs: adds back the part that the parameters absorb until all
+/// outputs have settled.
 fn settle_noise<'a>(
     inverse: &'a AlignedMatrix,
     outputs: &'a [BlockSeries],
@@ -265,8 +265,9 @@ impl<'a> NoiseIteration<'a> {
         self.variance = autocovariances.first().copied().unwrap_or(0.0);
     }
 
-    /// Adds back the part that the parameters, of this covariance, absorb. White noise is set at once
-    /// to the strength that leaves the observed residuals; then only other outputs can change it.
+    /// Adds back the part that the parameters, of this covariance, absorb. White noise is set at
+    /// once to the variance that leaves the observed residuals; then only other outputs can change
+    /// it.
     fn iterate(&mut self, covariance: &AlignedMatrix) {
         let (pairs, length) = (self.pairs[0], self.series.block_length);
         let absorbed_variance = covariance.dot(&self.series.between) / (length * length * pairs);

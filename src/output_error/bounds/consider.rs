@@ -20,7 +20,7 @@ pub struct Considered<'a, const NX: usize, E: Equations<NX>> {
     pub wide: &'a Case<NX, E>,
     /// Value of every parameter of `wide`, by name.
     pub values: BTreeMap<&'a str, f64>,
-    /// Place of each parameter of `case` among those of the fit.
+    /// Index of each parameter of `case` among those of the fit.
     pub places: Vec<usize>,
 }
 
@@ -79,8 +79,8 @@ pub fn consider_together<const NX: usize, E: Equations<NX>, R>(
     fit.covariance_held = Some(held);
 }
 
-/// Shifts of `n` estimates with one standard deviation of each held value; `None` where the integration
-/// with the held values free diverges or the information has no inverse.
+/// Shifts of `n` estimates with one standard deviation of each held value; `None` if the
+/// integration with the held values free diverges or the information has no inverse.
 fn shifts<const NX: usize, E: Equations<NX>>(
     members: &[Considered<NX, E>],
     uncertainties: &BTreeMap<&str, f64>,

@@ -45,7 +45,7 @@ fn estimates_covariance(inverse: &AlignedMatrix, gradient: &DMatrix<f64>) -> DMa
     inverse.sandwich(&gradient).to_dense()
 }
 
-/// Estimates the noise of the outputs from a fit's residuals; `None` where the data do not determine
+/// Estimates the noise of the outputs from a fit's residuals; `None` if the data do not determine
 /// its parameters.
 #[must_use]
 pub fn residual_noise<D: Bounded>(

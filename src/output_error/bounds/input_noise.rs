@@ -1,11 +1,13 @@
-//! Effect of the measured surfaces' noise, and of a slow dynamic pressure's, on the estimates. The
-//! equations take both as exact, so their noise moves the computed aircraft. Through a moment it is integrated to slow errors, which
-//! derivatives follow and residuals hardly show beside the sensors' own noise.
+//! Effect of the noise of measured surfaces and of a slow dynamic pressure on the estimates. The
+//! equations take both as exact, so their noise moves the computed aircraft. Through a moment it is
+//! integrated to slow errors. Derivatives follow these, but they are hardly visible in the
+//! residuals beside the sensors' own noise.
 //!
-//! An error of one surface sample changes the gradient Σ Sᵀ W v through the outputs at once and
-//! through the later states. An adjoint λ = ∂(gradient)/∂(state), integrated backwards, has both.
-//! White noise of variance σ² adds σ² Σ_k g_k g_kᵀ to the gradient's covariance. Surfaces act through
-//! three coefficients, so three vectors g per sample suffice for any number of surfaces.
+//! An error of one surface sample changes the gradient Σ Sᵀ W v directly through the outputs and
+//! indirectly through the later states. An adjoint λ = ∂(gradient)/∂(state), integrated backwards,
+//! contains both. White noise of variance σ² adds σ² Σ_k g_k g_kᵀ to the gradient's covariance.
+//! Surfaces act through three coefficients, so three vectors g per sample suffice for any number of
+//! surfaces.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 #![expect(
     clippy::needless_range_loop,

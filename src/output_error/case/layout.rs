@@ -1,18 +1,18 @@
-//! Places of the parameters in the lanes of the processor's vectors. Derivatives and initial states,
-//! which the integration depends on, lie side by side. A bias shifts an output and needs no lane of
-//! the integration.
+//! Places of the parameters in the lanes of the processor's vectors. Derivatives and initial
+//! states, which the integration depends on, lie side by side. A bias shifts an output and needs no
+//! lane of the integration.
 //!
 //! The derivatives of one coefficient form a group of whole vectors, so one coefficient's slope
 //! serves all lanes of a vector. Derivatives along a state come first, in the order of the states,
 //! then those along products of a state: the same lanes of each group. All groups are equally long.
-//! Parameters without a regressor, such as initial states, are the last group. Two spare lanes hold the
-//! residual and a one while sums are taken.
+//! Parameters without a regressor, such as initial states, are the last group. Two spare lanes hold
+//! the residual and a one while sums are taken.
 //!
 //! Regressors stand in rows, point by point. Where the columns of all coefficients fit into the
 //! widest group, all groups read the same part of a row: most derivatives come three at a time, one
 //! of each coefficient, along the same surface. Lanes without a parameter are computed and ignored.
-//! In a dense layout each group has regressors of its own, zero in the lanes that no derivative takes;
-//! there other parameters stand.
+//! In a dense layout each group has regressors of its own, zero in the lanes that no derivative
+//! takes; the other parameters take these lanes.
 
 use std::collections::BTreeSet;
 use std::ops::Range;

@@ -79,8 +79,8 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         Case::of_motion(motion, aircraft, window, measurements, model)
     }
 
-    /// Prepares the same maneuver with another model. `window` may have other surfaces than this case's,
-    /// but the same motion.
+    /// Prepares the same maneuver with another model. `window` may have other surfaces than the
+    /// window of this case, but the same motion.
     #[must_use]
     pub fn with_model(&self, aircraft: &Aircraft, window: &Window, model: &Model) -> Self {
         let measurements = self.measurements.clone();
@@ -93,8 +93,8 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         )
     }
 
-    /// Prepares the same maneuver as another recorder would have recorded it. `windows` are the case's own
-    /// one and that of the other recorder.
+    /// Prepares the same maneuver as recorded by another recorder. `windows` are that of the case
+    /// and that of the other recorder.
     #[must_use]
     pub fn as_recorded(
         &self,
@@ -260,7 +260,7 @@ fn ranges_by_coefficient(terms: &[Term]) -> [Range<usize>; COEFFICIENTS] {
     std::array::from_fn(|k| first_of(k)..first_of(k + 1))
 }
 
-/// Samples from which the initial state is averaged: the maneuver is still trimmed there.
+/// Number of samples over which the initial state is averaged: the aircraft is still trimmed there.
 const TRIMMED_SAMPLES: usize = 10;
 
 fn mean<'a, const NX: usize>(

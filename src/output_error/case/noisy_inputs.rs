@@ -1,4 +1,4 @@
-//! Inputs whose white noise the equations take for motion.
+//! Inputs whose white noise the equations interpret as motion.
 
 use super::surface_noise::NoisySurface;
 
@@ -11,7 +11,7 @@ pub struct NoisyInputs {
 }
 
 impl NoisyInputs {
-    /// True where no input has noise.
+    /// True if no input has noise.
     #[must_use]
     pub fn are_exact(&self) -> bool {
         self.surfaces.is_empty() && self.pressure_variance == 0.0

@@ -1,18 +1,20 @@
 //! Noise of a dynamic pressure that is recorded more slowly than the other signals.
 //!
-//! Between two recorded values it is on the line through them, so the error of one lasts over the
-//! samples on either side. Every coefficient acts in proportion to the dynamic pressure.
+//! Between two recorded values the signal is on the line through them, so the error of a value
+//! lasts over the samples on either side. Every coefficient acts in proportion to the dynamic
+//! pressure.
 
 use std::ops::Range;
 
 use super::surface_noise::white_variance;
 use crate::flight::{Mark, Record, signal};
 
-/// Variance, relative to the dynamic pressure squared, of white noise with the effect of a slow
-/// dynamic pressure's on slow motion. Zero where it is recorded at full rate.
+/// Variance, relative to the dynamic pressure squared, of white noise that has the same effect on
+/// slow motion as the noise of a slow dynamic pressure. Zero for one recorded at full rate.
 ///
-/// On lines through values at every nth sample, each value counts n samples in all. Its variance σ²
-/// adds n² σ² to a sum over them, and white noise of variance n σ² does the same.
+/// On lines through values at every nth sample, each value counts n times in a sum over the
+/// samples. Its variance σ² adds n² σ² to the sum's variance, as n samples of white noise of
+/// variance n σ² do.
 #[must_use]
 pub fn relative_variance(record: &Record, range: Range<usize>) -> f64 {
     let Some(series) = record.signals.get(signal::QBAR) else {

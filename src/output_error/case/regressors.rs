@@ -229,7 +229,8 @@ fn product(mut first: Vec<f64>, second: &[f64]) -> Vec<f64> {
     first
 }
 
-/// Equality of two derivatives' columns: the same regressor, but a vane's moment is not its force.
+/// `true` if two derivatives have the same column: the same regressor, except that a vane's moment
+/// is not its force.
 fn have_same_column(a: &Derivative, b: &Derivative) -> bool {
     a.regressor == b.regressor && is_vane_moment(a) == is_vane_moment(b)
 }

@@ -94,7 +94,7 @@ fn samples_of(window: &Window, name: &str) -> Vec<f64> {
     window.signal(name).iter().step_by(2).copied().collect()
 }
 
-/// Variance of the white noise on a signal that is otherwise smooth but for few steps.
+/// Variance of the white noise on a signal that is otherwise smooth except for a few steps.
 ///
 /// The median size of third differences ignores the steps.
 #[must_use]

@@ -105,8 +105,8 @@ pub fn collinearity(
     })
 }
 
-/// Share of an undetermined direction's unit square from which a parameter takes part: above
-/// rounding. With any part in it, its variance has no bound.
+/// Share of an undetermined direction's unit square above which a parameter takes part: more than
+/// rounding. A parameter with any part in it has no bounded variance.
 const UNDETERMINED_SHARE: f64 = 1e-6;
 
 /// Eigenvalues and directions of the scaled information matrix.

@@ -36,10 +36,10 @@ pub struct HoldingCandidates {
     max_condition_number: f64,
 }
 
-/// Reason to hold a parameter, all others being as they are.
+/// Reason to hold a parameter while the others stay free or held as they are.
 #[derive(Clone, Debug, PartialEq)]
 pub enum HoldingReason {
-    /// Its regressor did not move: the data do not depend on it.
+    /// Its regressor did not move, so the data do not depend on the parameter.
     NotExcited,
     /// Free, it would take part in a direction that the data do not determine, with these others.
     NotSeparable(Vec<usize>),
@@ -52,8 +52,8 @@ pub enum HoldingReason {
     },
 }
 
-/// Share of an undetermined direction's unit square from which a parameter takes part. Holding one
-/// with a smaller part would hardly determine the direction.
+/// Share of an undetermined direction's unit square above which a parameter takes part. Holding a
+/// parameter with a smaller share would hardly determine the direction.
 const DIRECTION_SHARE: f64 = 0.01;
 
 /// Identifiability of a set of free parameters.
@@ -94,8 +94,8 @@ impl HoldingCandidates {
         })
     }
 
-    /// Holds parameters besides `held` until the data determine the rest, as far as they may be
-    /// held.
+    /// Holds parameters besides `held` until the data determine the rest, as far as this is
+    /// possible.
     #[must_use]
     pub fn hold_undetermined(&self, mut held: Vec<bool>) -> Vec<bool> {
         while let Some(lost) = self.first_undetermined(&held) {
@@ -246,7 +246,7 @@ fn submatrix(matrix: &DMatrix<f64>, places: &[usize]) -> DMatrix<f64> {
     })
 }
 
-/// Free parameters once a held one is freed, and its place among them.
+/// Free parameters once a held one is freed, and its index among them.
 fn freed_set(held: &[bool], parameter: usize) -> Option<(Vec<usize>, usize)> {
     let mut held = held.to_vec();
     held[parameter] = false;

@@ -72,7 +72,7 @@ impl<const NX: usize> ChunkBuildUp<NX> {
         values
     }
 
-    /// Total slopes along the states: those at constant coefficients and those through the
+    /// Total slopes along the states: those at constant coefficients plus those through the
     /// coefficients. `places` are the entries of `by_coefficient` that can differ from zero.
     #[inline(always)]
     pub fn total_slopes<E: Equations<NX>, const N: usize>(

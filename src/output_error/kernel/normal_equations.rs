@@ -1,11 +1,11 @@
-//! Sums of the normal equations, output by output: Σ s sᵀ, Σ s v, Σ s and Σ v² over the samples that
-//! count, with sensitivities s and residual v. Weights (1.4, 1.5) are applied afterwards, so other
-//! weights need no other pass.
+//! Sums of the normal equations, output by output: Σ s sᵀ, Σ s v, Σ s and Σ v² over the samples
+//! that count, with sensitivities s and residual v. Weights (1.4, 1.5) are applied afterwards, so
+//! other weights need no other pass.
 //!
-//! The residual and a one stand beside the sensitivities in a sample's row, so all sums of an output
-//! are one symmetric matrix. A coarse pass leaves out samples; its sums count the others as many
-//! times. A whole pass also adds its rows up over blocks of samples, from which the corrected bounds
-//! are computed without a pass of their own.
+//! A sample's row holds the sensitivities, the residual and a one, so all sums of an output are one
+//! symmetric matrix. A coarse pass skips samples; its sums count the remaining ones as many times.
+//! A whole pass also sums its rows over blocks of samples, from which the corrected bounds are
+//! computed without another pass.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -44,8 +44,8 @@ pub(crate) struct NormalSums {
     biased_outputs: Vec<usize>,
 }
 
-/// Place of a parameter's sums: its lane, and for a bias the only output that it shifts. All biases
-/// have the lane of the ones.
+/// Place of a parameter in the sums: its lane, and for a bias the only output that it shifts. All
+/// biases share the lane of the ones.
 #[derive(Clone, Copy)]
 struct ParameterPlace {
     lane: usize,
@@ -253,7 +253,8 @@ impl Sink for NormalAccumulator<'_> {
 
 impl NormalSums {
     /// Writes residual and one into the rows of a chunk's samples that count, and clears the other
-    /// rows. `residual` is that of a sample and output, `None` where it does not count.
+    /// rows. `residual` returns that of a sample and output, or `None` if the sample does not
+    /// count.
     #[inline(always)]
     pub fn complete_rows(
         &mut self,

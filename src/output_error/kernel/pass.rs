@@ -33,7 +33,7 @@ use crate::output_error::case::chunking::{CHUNK, POINTS, Strided, WIDEST_STRIDE}
 use crate::output_error::case::layout::LaneLayout;
 use crate::output_error::case::{Case, InitialState};
 
-/// End of an integration whose state left all bounds: the parameters describe no flight.
+/// End of an integration whose state left its bounds: no flight has these parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Diverged {
     pub sample: usize,
@@ -215,14 +215,15 @@ fn initial_sensitivities<const NX: usize>(
     sensitivities
 }
 
-/// Correction of the states by the measurements between a sample's outputs and the step that follows.
+/// Correction of the states by the measurements, between a sample's outputs and the next step.
 pub(crate) trait Correction<const NX: usize> {
-    /// Returns the factors of the first vector's regressors in the outputs, where they are not those
-    /// of the step's first stage.
+    /// Returns the factors of the first vector's regressors in the outputs, if they differ from
+    /// those of the step's first stage.
     fn output_factors(&self, k: usize) -> Option<&[f64; VECTOR]>;
 
-    /// Corrects the sensitivities `s` of the states in the vectors at some lanes, after those of the
-    /// outputs, `y`, were taken at the chunk's sample k. `y` becomes what the sink receives.
+    /// Corrects the sensitivities `s` of the states in the vectors at some lanes, after those of
+    /// the outputs, `y`, were computed at the chunk's sample k. Changes `y` to the sensitivities
+    /// that the sink receives.
     fn correct<S: Simd, const N: usize>(
         &self,
         simd: S,

@@ -1,4 +1,5 @@
-//! The pass in plain scalar code: what the kernel computes, without vectors or shared regressors.
+//! The pass in plain scalar code: the same results as the kernel, without vectors or shared
+//! regressors.
 //!
 //! Read this first. The tests compare the kernel with it on both axes, and `cargo bench --bench
 //! kernel` times the two side by side.
@@ -272,8 +273,8 @@ mod tests {
         Noise, SAMPLES, TABLE, biases, measure, nothing_measured, truth, window, with_products,
     };
 
-    /// Compares kernel and reference off the truth: noise on the measurements, samples that do not
-    /// count, one derivative held, biases and initial states free.
+    /// Compares kernel and reference away from the true parameters, with noise on the measurements,
+    /// samples that do not count, one held derivative, and free biases and initial states.
     fn assert_kernel_matches_reference<const NX: usize, E: Equations<NX>>(
         truth: &[(Derivative, f64)],
     ) {

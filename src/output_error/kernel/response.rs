@@ -23,8 +23,8 @@ pub struct Response {
 /// Resolution of a response.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Detail {
-    /// Steps of about [`COARSE_STEP_S`], compared at their ends only: near the minimum, at a
-    /// fraction of the work.
+    /// Steps of about [`COARSE_STEP_S`], compared with the measurements at their ends only: near
+    /// the minimum, at a fraction of the work.
     Coarse,
     /// Every sample.
     Whole,
@@ -98,7 +98,7 @@ impl Sink for SensitivityRecorder<'_> {
 }
 
 impl Response {
-    /// Response of known outputs, without sums.
+    /// Response with given outputs, without sums.
     #[must_use]
     pub fn of_outputs(outputs: Vec<[f64; OUTPUTS]>) -> Response {
         Response {
@@ -124,7 +124,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         }
     }
 
-    /// Computes the response to these parameters.
+    /// Computes the response in some detail. Of a coarse response only the sums are valid.
     ///
     /// # Errors
     /// [`Diverged`] when the state leaves its bounds or is not a number.

@@ -19,7 +19,8 @@ use crate::numerics::simd::VECTOR;
 use crate::output_error::case::Case;
 use crate::output_error::case::chunking::{CHUNK, Strided};
 
-/// Bound of a state, rad or rad/s. No flight reaches it, and numbers do not overflow below it.
+/// Limit of a state, rad or rad/s: beyond any flight, but small enough that numbers do not
+/// overflow.
 pub(crate) const STATE_BOUND: f64 = 50.0;
 
 /// States and slopes of a chunk at every stage: entry by entry, sample after sample.
@@ -63,7 +64,7 @@ pub(crate) struct Trajectory<'a, const NX: usize, E: Equations<NX>> {
     x: SVector<f64, NX>,
     /// State at the stage.
     at: SVector<f64, NX>,
-    /// State at the next sample, as far as the stages so far determine it.
+    /// State at the next sample, as far as the stages computed so far determine it.
     next: SVector<f64, NX>,
     points: Strided,
     sample: usize,
@@ -142,8 +143,8 @@ impl<'a, const NX: usize, E: Equations<NX>> Trajectory<'a, NX, E> {
         self.x
     }
 
-    /// Enters a stage at its state. The state is written while it is in registers: to read it back
-    /// at once in another width would stall (store forwarding) and hold up the chain.
+    /// Begins a stage at its state. The state is stored while it is in registers. Reading it back
+    /// at once with another width would cause a store-forwarding stall and delay the chain.
     #[inline(always)]
     fn enter_stage(&mut self, at: SVector<f64, NX>) {
         self.at = at;

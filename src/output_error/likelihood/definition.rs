@@ -1,4 +1,4 @@
-//! The likelihood as Newton-Raphson (1.3) sees it, of one maneuver or of several.
+//! Interface between the likelihood, of one maneuver or of several, and Newton-Raphson (1.3).
 
 use super::cost::{self, Sums};
 use crate::dynamics::{Equations, OUTPUTS};

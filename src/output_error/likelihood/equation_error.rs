@@ -1,16 +1,16 @@
 //! Equation error: derivatives by linear least squares on the coefficients that the measured
 //! accelerations imply.
 //!
-//! It needs no integration and so cannot diverge, whatever the airframe's stability, and a gust is
-//! no error to it where the vane measures it. So it serves as a start for output error and, with
+//! It needs no integration, so it cannot diverge even if the airframe is unstable. A gust that the
+//! vane measures is no error in it. It therefore serves as a start for output error and, with
 //! bounds, as a second opinion ([`regression`]).
 //!
 //! The regression is in the frequency domain (Morelli; Klein and Morelli 2006, chapter 7). Fourier
 //! sums over the maneuver are linear: the equation between a coefficient and its regressors holds
-//! for their sums as it holds for their samples. Harmonics from 0.1 to 2.5 Hz hold the airframe's
-//! motion; drift below and noise above are left out. The measured angular accelerations are slopes of
-//! local straight lines through the rates: accelerations averaged by a short window. All other terms
-//! are averaged by the same window, so that the equation still holds.
+//! for their sums as it holds for their samples. Harmonics from 0.1 to 2.5 Hz contain the
+//! airframe's motion; drift below and noise above are left out. The measured angular accelerations
+//! are slopes of local straight lines through the rates: accelerations averaged by a short window.
+//! All other terms are averaged by the same window, so that the equation still holds.
 //!
 //! Noise of the regressors remains: it attenuates derivatives by its share of the regressor's
 //! variance inside the band.
@@ -29,8 +29,8 @@ use crate::numerics::symmetric::{scale, scaled};
 use crate::output_error::case::build_up::Term;
 use crate::output_error::case::{Case, Measurements};
 
-/// Weight of the prior values against the data, at unit diagonal: small, but enough to hold what
-/// the data do not determine.
+/// Weight of the prior values relative to the data, at unit diagonal: small, but enough to fix
+/// directions that the data do not determine.
 const PRIOR_WEIGHT: f64 = 1e-4;
 /// Band of the harmonics, Hz: the rigid airframe's modes (Klein and Morelli 2006, section 7.3).
 const BAND_HZ: [f64; 2] = [0.1, 2.5];
@@ -39,12 +39,12 @@ const BAND_HZ: [f64; 2] = [0.1, 2.5];
 const SMOOTHING_HZ: f64 = 0.6;
 /// Longest gap that counts as bridged: a quarter of the band's shortest period.
 const LONGEST_BRIDGE_S: f64 = 0.1;
-/// Range of a regressor against its size below which it is constant.
+/// Ratio of a regressor's range to its size below which it counts as constant.
 const STILL: f64 = 1e-9;
 
-/// Starting values with the derivatives from equation error: by [`regression`], and the constant
-/// from the mean; where that has no result, by least squares in time. Derivatives that the data do
-/// not determine stay near `prior`, as do biases and initial states.
+/// Starting values with the derivatives from equation error: by [`regression`], with the constant
+/// from the mean; if that has no result, by least squares in time. Derivatives that the data do not
+/// determine stay near `prior`, as do biases and initial states.
 #[must_use]
 pub fn start<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>, prior: &[f64]) -> Vec<f64> {
     let mut values = prior.to_vec();
@@ -140,11 +140,11 @@ fn regress_coefficient<const NX: usize, E: Equations<NX>>(
 /// Derivatives by equation error, with the covariance of their errors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Regression {
-    /// In the order of the case's parameters. `None` for biases, initial states and constants, which
-    /// no harmonic has; for regressors that do not move; and for a coefficient with proportional
-    /// regressors or too few harmonics.
+    /// In the order of the case's parameters. `None` for biases, initial states and constants,
+    /// which appear in no harmonic; for regressors that do not move; and for a coefficient with
+    /// proportional regressors or too few harmonics.
     pub values: Vec<Option<f64>>,
-    /// Zero for parameters without a value. It counts the residuals' spectrum and the uncertainty
+    /// Zero for parameters without a value. It contains the residuals' spectrum and the uncertainty
     /// of held values, but no errors of calibration.
     pub covariance: DMatrix<f64>,
 }
@@ -202,7 +202,7 @@ pub fn regression<const NX: usize, E: Equations<NX>>(
 struct Spectra<'a> {
     /// Columns: the implied coefficients less their held parts, then the distinct regressors.
     sums: DMatrix<f64>,
-    /// Column of the regressor of each derivative that acts; `None` where it does not move.
+    /// Column of the regressor of each derivative that acts; `None` if the regressor does not move.
     regressors: BTreeMap<&'a str, Option<usize>>,
     /// Half width of the smoothing triangle, in harmonics.
     smoothing: f64,
@@ -263,8 +263,8 @@ impl<'a> Spectra<'a> {
     }
 }
 
-/// Histories of each coefficient that the measured motion implies less its held part, without what
-/// depends on the angular accelerations.
+/// Histories of each coefficient that the measured motion implies, less its held part and the part
+/// that depends on the angular accelerations.
 fn implied_without_accelerations<const NX: usize, E: Equations<NX>>(
     case: &Case<NX, E>,
 ) -> Vec<Vec<f64>> {
@@ -369,8 +369,8 @@ fn kept_samples(measurements: &Measurements, step_s: f64) -> Vec<bool> {
     kept
 }
 
-/// Straight line over the samples that count. It is taken off every series alike, so that the
-/// equations hold as before; a drift would leak into all harmonics.
+/// Straight line over the samples that count. It is removed from every series alike, so that the
+/// equations still hold; a drift would leak into all harmonics.
 struct Trend<'a> {
     kept: &'a [bool],
     samples: f64,
@@ -406,7 +406,7 @@ impl Trend<'_> {
             .sum()
     }
 
-    /// Takes the straight line off a series; samples that do not count become zero.
+    /// Removes the straight line from a series; samples that do not count become zero.
     fn remove(&self, series: &mut [f64]) {
         let mean = self.sum(|n| series[n]) / self.samples;
         let slope = self.sum(|n| self.offset(n) * series[n]) / self.spread;

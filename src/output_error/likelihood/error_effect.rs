@@ -1,4 +1,5 @@
-//! Effects of errors that several maneuvers share: of the values they hold, and of calibration.
+//! Effects of errors that several maneuvers share: errors of held values, and errors of
+//! calibration.
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -13,7 +14,7 @@ pub enum SharedError {
     Scale(String),
     /// Constant error of this signal.
     Bias(String),
-    /// Unknown rest of this surface's delay.
+    /// Remaining error of this surface's delay.
     Delay(String),
 }
 
@@ -23,7 +24,7 @@ pub struct ErrorEffect {
     pub error: SharedError,
     /// Standard deviation of the error: of a held value in its own unit.
     pub deviation: f64,
-    /// Change of each parameter where the true value is above the assumed one by one standard
+    /// Change of each parameter if the true value exceeds the assumed one by one standard
     /// deviation.
     pub change: Vec<f64>,
 }

@@ -19,7 +19,7 @@ pub enum Identification {
     },
 }
 
-/// Share of a direction's unit square from which a parameter is named: the few that matter to a
+/// Share of a direction's unit square above which a parameter is named: the few that matter to a
 /// reader.
 const NAMED_SHARE: f64 = 0.1;
 

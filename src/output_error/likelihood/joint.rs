@@ -87,8 +87,8 @@ impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
 }
 
 impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
-    /// Computes each member's response. The sample of a divergence counts through the members in
-    /// order.
+    /// Computes each member's response. For a divergence, samples are counted through the members
+    /// in order.
     fn respond_each(
         &self,
         response: &mut [Response],

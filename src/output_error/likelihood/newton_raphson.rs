@@ -35,8 +35,8 @@ settings! {
 const FIRST_DAMPING: f64 = 1e-8;
 /// Damping at which no step lowers the cost.
 const MOST_DAMPING: f64 = 1e9;
-/// Share of the coarse cost that a full step must promise to lower for another coarse iteration:
-/// below it, the samples left out matter as much.
+/// Least decrease that a full step must predict for another coarse iteration, as a share of the
+/// coarse cost. With less, the skipped samples matter as much.
 const COARSE_TOLERANCE: f64 = 0.1;
 
 /// Minimises the cost from a start with fixed weights; the fit has no bounds yet.
@@ -67,8 +67,8 @@ struct CoarseFit {
     initial_cost: f64,
 }
 
-/// Approaches the minimum by the coarse response. `None` where there is no coarse response, or where
-/// it diverges or is singular.
+/// Approaches the minimum by the coarse response. `None` without a coarse response, or if it
+/// diverges or is singular.
 fn approach<D: Likelihood>(
     data: &D,
     start: &[f64],
@@ -200,9 +200,9 @@ fn predicted_gain(sums: &Sums, step: &DVector<f64>) -> f64 {
     2.0 * sums.gradient.dot(step) - (&sums.information * step).dot(step)
 }
 
-/// Damping after a step that gained this share of its prediction: less after a good prediction, more
-/// after a poor one. Where residuals stay large, undamped Gauss-Newton steps zigzag across the
-/// minimum.
+/// Damping after a step, by the ratio of its gain to the predicted gain: less after a good
+/// prediction, more after a poor one. With large residuals, undamped Gauss-Newton steps zigzag
+/// across the minimum.
 fn next_damping(damping: f64, kept: f64) -> f64 {
     match kept {
         k if k > 0.75 && damping > FIRST_DAMPING => damping / 10.0,

@@ -26,8 +26,8 @@ pub struct Fit<R = Response> {
     pub condition_number: Option<f64>,
     /// Parameters that take part in the least determined direction, if it is undetermined.
     pub undetermined: Vec<usize>,
-    /// Covariance of the parameters for white residuals, the held values' part included; absent
-    /// where the data determine none.
+    /// Covariance of the parameters for white residuals, the held values' part included; absent if
+    /// the data do not determine it.
     pub covariance: Option<DMatrix<f64>>,
     /// Part of both covariances from the uncertainty of the held values.
     pub covariance_held: Option<DMatrix<f64>>,

@@ -94,7 +94,7 @@ impl OutputAgreement {
         (self.square_measured > 0.0).then(|| 1.0 - left / self.square_measured)
     }
 
-    /// Theil's coefficient of this output; `None` where both are zero throughout.
+    /// Theil's coefficient of this output; `None` if both series are zero throughout.
     #[must_use]
     pub fn theil(&self) -> Option<Theil> {
         theil(&[(*self, 1.0)])
@@ -106,8 +106,8 @@ fn mean(pairs: &[(f64, f64)], value: impl Fn(f64, f64) -> f64) -> f64 {
     sum / pairs.len().max(1) as f64
 }
 
-/// Theil's coefficient of several outputs together, weighted as in the cost; `None` where all are
-/// zero. An exact prediction has no difference to divide: its parts are zero.
+/// Theil's coefficient of several outputs together, weighted as in the cost; `None` if all are
+/// zero. For an exact prediction the parts are zero, since there is no difference to divide.
 #[must_use]
 pub fn theil(outputs: &[(OutputAgreement, f64)]) -> Option<Theil> {
     let (mut parts, mut measured, mut computed) = ([0.0; 3], 0.0, 0.0);

@@ -19,9 +19,10 @@ const ROUNDS: usize = 3;
 const MAX_CONDITION_NUMBER: f64 = 1e10;
 /// Fewest degrees of freedom of the residuals, as for Student's t.
 const FEWEST_FREE: f64 = 3.0;
-/// Smallest spectrum against the response's: rounding of a response that fits to the last digit.
+/// Smallest spectrum, relative to the response's: rounding errors of an exact fit.
 const ROUNDING: f64 = 1e-24;
-/// Largest leverage that the variances allow for: an equation beyond it has no residual of its own.
+/// Largest leverage for which variances are corrected. An equation with a larger one has no
+/// residual of its own.
 const MOST_LEVERAGE: f64 = 0.95;
 
 /// Equations at several frequencies: real parts of all, then imaginary parts.
@@ -31,7 +32,7 @@ pub(super) struct Equations<'a> {
     pub regressors: &'a DMatrix<f64>,
     /// Half width of the triangle that smooths the spectrum, in frequencies.
     pub smoothing: f64,
-    /// Share of the samples that count: so much of the equations is independent.
+    /// Share of the samples that count, and thus of the equations that are independent.
     pub independent: f64,
 }
 
@@ -51,7 +52,7 @@ pub(super) struct Regression {
 }
 
 impl Equations<'_> {
-    /// Parameters of least weighted squares; `None` where the data do not determine them.
+    /// Parameters of least weighted squares; `None` if the data do not determine them.
     pub fn solve(&self) -> Option<Regression> {
         let (equations, parameters) = self.regressors.shape();
         let free = self.independent * equations as f64 - parameters as f64;
@@ -97,8 +98,8 @@ impl Equations<'_> {
         self.response - self.regressors * values
     }
 
-    /// Variance of an equation's residual at each frequency. A fit takes its leverage from the
-    /// residuals: their squares are divided by what it leaves.
+    /// Variance of an equation's residual at each frequency. A fit reduces the residuals by its
+    /// leverage, so their squares are divided by the remaining share.
     fn smoothed_spectrum(&self, fit: &Regression) -> Vec<f64> {
         let residuals = self.residuals(&fit.values);
         let leverages = fit.leverages();

@@ -1,4 +1,4 @@
-//! The coarse response: its gradient, and its effect on the minimum, which must be none.
+//! The coarse response: its gradient, and the check that it does not change the minimum.
 
 use nalgebra::DVector;
 

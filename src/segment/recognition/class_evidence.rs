@@ -1,7 +1,7 @@
-//! Evidence for a class beyond the inputs that it must have, and the confidence that follows.
+//! Evidence for a class besides its required inputs, and the resulting confidence.
 //!
-//! The weights are judgements, multiplied to the confidence. They order classes that fit alike, and
-//! the confidence of a maneuver is published; nothing else depends on them.
+//! The weights are judgements; their product is the confidence. They order classes that fit alike,
+//! and the confidence of a maneuver is published; nothing else depends on them.
 
 use super::patterns;
 use super::segment::Segment;
@@ -10,7 +10,7 @@ use crate::maneuver::{Class, Recognised};
 /// Weight of a flag that contradicts the class: flags may be stuck, missing or late.
 const FLAG_CONTRADICTS: f64 = 0.8;
 
-/// Weight of a flag that is not recorded: less than half as bad as one that contradicts.
+/// Weight of a flag that is not recorded: it counts less than half as much as a contradiction.
 const FLAG_NOT_RECORDED: f64 = 0.95;
 
 /// Weight of a signal whose motion is neither clear nor absent, or is not recorded.
@@ -19,7 +19,7 @@ const MOTION_UNCLEAR: f64 = 0.9;
 /// Weight of a record without pilot controls.
 const PILOT_NOT_RECORDED: f64 = 0.9;
 
-/// Weight that pulses lose when they deviate by the whole tolerance.
+/// Loss of weight of pulses that deviate by the whole tolerance.
 const PULSES_AT_TOLERANCE: f64 = 0.5;
 
 /// One finding for or against a class.

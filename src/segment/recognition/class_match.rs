@@ -5,8 +5,8 @@ use super::patterns;
 use super::segment::Segment;
 use crate::maneuver::Class;
 
-/// Most steps of the pilot during a maneuver of the on-board system: one correction is a step there
-/// and one back; more is flying.
+/// Most steps of the pilot during a maneuver of the on-board system: a correction is one step and
+/// its return; more is flying.
 const CORRECTION_STEPS: usize = 2;
 
 /// True where every condition of a class holds in a segment.
@@ -14,7 +14,7 @@ pub(super) fn fits(segment: &Segment, class: &Class) -> bool {
     mismatches(segment, class).is_empty()
 }
 
-/// The conditions of a class that fail in a segment; none where it fits.
+/// The conditions of a class that fail in a segment; empty if it fits.
 pub(super) fn mismatches(segment: &Segment, class: &Class) -> Vec<Mismatch> {
     let mut mismatches = step_mismatches(segment, class);
     for (signal, pulses) in &class.recognition.pulses {
@@ -53,8 +53,8 @@ fn step_mismatches(segment: &Segment, class: &Class) -> Vec<Mismatch> {
     mismatches
 }
 
-/// The reason why steps of surfaces are not attributed to the on-board system. Without recorded pilot
-/// controls they stand for the pilot's steps, and nothing contradicts.
+/// The reason why steps of surfaces are not attributed to the on-board system. Without recorded
+/// pilot controls the steps of surfaces represent the pilot's, and there is no such reason.
 fn pilot_mismatch(segment: &Segment) -> Option<Mismatch> {
     let detections = segment.detections;
     let n = detections.count_pilot_steps(segment.from_s, segment.to_s);

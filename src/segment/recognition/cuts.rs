@@ -14,8 +14,8 @@ use super::sequences::{SequenceStep, StepSequence};
 use crate::maneuver::Class;
 use crate::segment::steps::step::TRIM_SHARE;
 
-/// Most pauses within one maneuver: the limit keeps the search linear in a flight's length. It is
-/// three times the steps of the longest maneuvers, so it excludes none.
+/// Most pauses within one maneuver: the limit keeps the time of the search linear in a flight's
+/// length. It is three times the number of steps of the longest maneuvers, so it excludes none.
 const MOST_PAUSES: usize = 64;
 
 /// Most steps in a gap of the flag within a maneuver: one may be feedback. A flag with more steps in
@@ -30,13 +30,13 @@ pub(super) struct Part {
     pub is_maneuver: bool,
 }
 
-/// The best cut of a sequence as far as some pause.
+/// The best cut of a sequence up to some pause.
 #[derive(Clone, Copy, Debug, Default)]
 struct Cut<'a> {
     penalties: Penalties,
     /// The burst at which the last part begins.
     from: usize,
-    /// The class of the last part; `None` where it is no maneuver.
+    /// The class of the last part; `None` if it is no maneuver.
     class: Option<&'a Class>,
 }
 
@@ -135,8 +135,8 @@ impl<'s, 'a> CutSearch<'s, 'a> {
         chosen
     }
 
-    /// Explains a segment by the class that leaves the fewest steps unexplained; `None` where it
-    /// fits no class.
+    /// Explains a segment by the class that leaves the fewest steps unexplained; `None` if it fits
+    /// no class.
     fn explain(&self, steps: (usize, usize)) -> Option<Explanation<'a>> {
         let segment = self.segment(steps);
         self.classes
@@ -228,8 +228,8 @@ impl<'s, 'a> CutSearch<'s, 'a> {
         }
     }
 
-    /// The order in which the inputs of a class step in a segment, and how often each steps before
-    /// another does.
+    /// The order in which the inputs of a class step in a segment, and the number of times that
+    /// each steps before another does.
     fn order_of_inputs(&self, class: &Class, steps: (usize, usize)) -> Vec<(&str, usize)> {
         let inputs = self.segment(steps).inputs(class);
         let signals: Vec<&str> = self
@@ -256,7 +256,7 @@ fn changes_of(signal: &str, steps: &[SequenceStep]) -> Vec<f64> {
         .collect()
 }
 
-/// True for a signal that does not end near where it began, by those of its changes that stand out
+/// True for a signal that does not end near its beginning, by those of its changes that stand out
 /// from feedback.
 fn ends_away(changes: &[f64], outstanding_share: f64) -> bool {
     let largest = changes.iter().map(|c| c.abs()).fold(0.0, f64::max);

@@ -1,9 +1,9 @@
 //! Detections in a record: steps, deflections, uncommanded steps of surfaces, excitation flag.
 //!
 //! The on-board excitation system moves surfaces while the pilot's controls rest. A surface that
-//! steps while a control moves is geared to it. One that steps soon after the pilot answers him
-//! through feedback. The other steps of surfaces are uncommanded by the pilot: they tell excitation
-//! from ordinary flying without any flag.
+//! steps while a control moves is geared to it. A surface that steps soon after the pilot responds
+//! through feedback. The other steps of surfaces are uncommanded by the pilot: they distinguish
+//! excitation from ordinary flying without any flag.
 
 use crate::flight::Record;
 use crate::segment::settings::Settings;
@@ -14,7 +14,7 @@ use crate::segment::steps::step::{SignalSteps, Steps};
 /// Value of a flag signal, 0 or 1, above which it is up.
 const FLAG_UP: f64 = 0.5;
 
-/// Detections in one record, with the record and the settings they come from.
+/// Detections in one record, with the record and the settings used.
 #[derive(Clone, Debug)]
 pub(in crate::segment) struct Detections<'a> {
     pub record: &'a Record,
@@ -25,13 +25,13 @@ pub(in crate::segment) struct Detections<'a> {
     pub deflections: Steps,
     /// The steps of surfaces that no pilot control explains.
     pub uncommanded: Steps,
-    /// True where one of the pilot's controls is recorded. Without any, nothing separates the
-    /// pilot's inputs from the system's.
+    /// True if one of the pilot's controls is recorded. Otherwise the pilot's inputs cannot be
+    /// separated from the system's.
     pub pilot_is_recorded: bool,
     /// True where the excitation flag is recorded and not stuck.
     flag_varies: bool,
-    /// From when to when a varying flag is down between two times that it is up, for no less than
-    /// the shortest pause.
+    /// Times during which a varying flag is down between two times that it is up, of at least the
+    /// shortest pause.
     pub flag_gaps: Vec<(f64, f64)>,
 }
 
@@ -87,8 +87,8 @@ impl<'a> Detections<'a> {
         self.settings.pilot_controls.iter().any(|c| c == signal)
     }
 
-    /// True where a pilot control moves at a time, or has stepped shortly before it while no flag
-    /// shows the on-board system at work.
+    /// True if a pilot control moves at a time, or has stepped shortly before it while no flag
+    /// indicates that the on-board system is active.
     fn pilot_explains(&self, time_s: f64) -> bool {
         let system_works = self.flag_is_up_at(time_s);
         self.settings.pilot_controls.iter().any(|control| {
@@ -96,14 +96,14 @@ impl<'a> Detections<'a> {
         })
     }
 
-    /// True where a control has stepped so shortly before a time that feedback may answer it then.
+    /// True if a control has stepped so shortly before a time that feedback may still respond.
     fn steps_before(&self, control: &str, time_s: f64) -> bool {
         let settings = self.settings;
         let (from_s, to_s) = (time_s - settings.answer_s, time_s + settings.transit_s);
         !self.steps.between(control, from_s, to_s).is_empty()
     }
 
-    /// True where a control moves at a time by as much as moves a surface that is geared to it.
+    /// True if a control moves at a time by enough to move a surface that is geared to it.
     fn moves_at(&self, control: &str, time_s: f64) -> bool {
         let settings = self.settings;
         let geared_s = (time_s - settings.gearing_s, time_s + settings.transit_s);
@@ -149,7 +149,7 @@ fn varies(flag: &[f64]) -> bool {
     up.next().is_some_and(|first| up.any(|v| v != first))
 }
 
-/// From when to when a flag is down between two times that it is up, for no less than a pause.
+/// Times during which a flag is down between two times that it is up, of at least a pause.
 fn gaps(flag: &[f64], record: &Record, pause_s: f64) -> Vec<(f64, f64)> {
     let finite: Vec<(usize, bool)> = flag
         .iter()

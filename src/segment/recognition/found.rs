@@ -40,10 +40,10 @@ impl<'a> Recognition<'a> {
         self.unknown.extend(more.unknown);
     }
 
-    /// Puts the maneuvers in order of time and removes overlaps.
+    /// Sorts the maneuvers by time and removes overlaps.
     ///
-    /// Keeps the longer of two excitations whose inputs overlap. Excitation of no class goes if it
-    /// overlaps a maneuver, or longer excitation of no class: it is a part of that.
+    /// Of two excitations whose inputs overlap, the longer one is kept. Excitation of no class is
+    /// removed if it overlaps a maneuver, or longer excitation of no class, of which it is a part.
     pub fn remove_overlaps(&mut self) {
         self.found
             .sort_by(|a, b| b.excited_for_s().total_cmp(&a.excited_for_s()));

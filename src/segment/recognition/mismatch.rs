@@ -11,7 +11,7 @@ pub(super) struct Mismatch {
 pub(super) enum MismatchKind {
     /// Too little of something, as where a maneuver is broken off.
     Shortfall,
-    /// Too much of something, or something else than the class has.
+    /// Too much of something, or something that the class does not have.
     Contradiction,
 }
 

@@ -3,8 +3,8 @@
 //! [`detections`] gathers the steps of a record; [`sequences`] (with [`pilot_sequences`]) groups
 //! them; [`cuts`] cuts a sequence into maneuvers by [`penalties`]; [`recognise`] classifies each of
 //! them. A [`segment`] is matched with a class in [`class_match`] (with [`patterns`]), and
-//! [`class_evidence`] weighs what else is recorded. [`sweeps`] are found by their swings. What is
-//! left is [`unclassified`]. [`windows`] adds lead-in and decay.
+//! [`class_evidence`] weighs the other signals. [`sweeps`] are found by their swings. The remaining
+//! excitation is [`unclassified`]. [`windows`] adds lead-in and decay.
 
 mod class_evidence;
 mod class_match;

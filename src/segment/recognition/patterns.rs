@@ -9,12 +9,12 @@ use crate::segment::steps::swings::Swing;
 /// Fewest swings of a sweep: three intervals, one for each third of it.
 const FEWEST_SWINGS: usize = 4;
 
-/// Factor by which an interval between swings may be longer than the one before and still count as
-/// not slower: the swings' times have errors of some samples.
+/// Factor by which an interval between swings may exceed the one before and still count as not
+/// slower: the times of swings have errors of some samples.
 const INTERVAL_TOLERANCE: f64 = 1.1;
 
-/// Smallest share of the intervals that are not slower than the one before: one in five may be
-/// spoiled by a step of feedback.
+/// Smallest share of intervals that are not slower than the one before: a step of feedback may
+/// spoil one in five.
 const STEADY_SHARE: f64 = 0.8;
 
 /// Pulses that fit.

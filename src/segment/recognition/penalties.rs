@@ -22,27 +22,27 @@ use std::ops::Add;
 /// Terms of which more is better are in [`Reverse`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
 pub(super) struct Penalties {
-    /// Steps that are no input of a maneuver: excitation has a purpose, so a cut that explains more
-    /// of it is nearer to what was flown.
+    /// Steps that are no input of a maneuver. Excitation has a purpose, so a cut that explains more
+    /// steps is closer to the flown maneuvers.
     pub unexplained_steps: usize,
-    /// Steps that rules about lengths of pulses explain: lengths in a proportion fit by chance less
-    /// often than counts do.
+    /// Steps that rules about lengths of pulses explain: prescribed lengths fit by chance less
+    /// often than numbers of steps.
     pub steps_in_pulses: Reverse<usize>,
     /// Gaps of the excitation flag within a maneuver: the flag rests between maneuvers.
     pub flag_gaps: usize,
-    /// Maneuvers: what one maneuver explains needs no second.
+    /// Number of maneuvers: steps that one maneuver explains need no second.
     pub maneuvers: usize,
     /// Pauses between maneuvers that are shorter than the decay before and the lead-in after them:
     /// test cards leave room for both.
     pub short_pauses: usize,
-    /// Maneuvers of the class of the one before that do not repeat its steps: what is flown again
-    /// at once is mostly the same.
+    /// Maneuvers of the same class as the one before that do not repeat its steps: an immediate
+    /// repetition mostly has the same steps.
     pub unlike_repeats: usize,
     /// Inputs of a maneuver that do not end where they began, and returns to an input after another
     /// has stepped: a cut in the wrong place makes more of both. The two are one term, for a step
     /// may pass undetected.
     pub loose_ends: usize,
-    /// The pauses between the maneuvers, s: what belongs together follows closely.
+    /// The pauses between the maneuvers, s: inputs of one maneuver follow each other closely.
     pub pauses_s: Reverse<f64>,
 }
 

@@ -1,5 +1,4 @@
-//! Sequences of pilot steps: from the deflection away from trim that begins one to the deflection
-//! back to trim that ends it.
+//! Sequences of pilot steps: from the first deflection away from trim to the last one back to trim.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,12 +6,12 @@ use super::detections::Detections;
 use crate::segment::settings::Settings;
 use crate::segment::steps::step::{Step, TRIM_SHARE};
 
-/// From when to when pilot controls step.
+/// Periods in which pilot controls step.
 ///
-/// A sequence goes on while a control is held away from its trim for no longer than
-/// `longest_hold_s`, or while all rest at trim for no longer than `longest_rest_s`. A step counts
-/// from the smallest step on. A smaller deflection only opens a sequence, as the first half of a
-/// reversal, or closes one, where it brings a control back to trim.
+/// A sequence continues while a control is held away from its trim for no longer than
+/// `longest_hold_s`, or while all rest at trim for no longer than `longest_rest_s`. Steps of at
+/// least the smallest size count. A smaller deflection can only begin a sequence, as the first half
+/// of a reversal, or end one, by returning a control to trim.
 pub(super) fn pilot_sequences(
     detections: &Detections,
     controls: &BTreeSet<String>,
@@ -96,15 +95,15 @@ impl ControlState {
         from_trim.abs() < self.smallest_deflection.max(TRIM_SHARE * self.largest_step)
     }
 
-    /// True where the control's steps cancel, or where its level is back at trim: trim drifts in a
-    /// turn. A whole reversal leads to the other side, whatever the level.
+    /// True if the control's steps cancel, or if its level is back at trim, since trim drifts in a
+    /// turn. A whole reversal leads to the other side at any level.
     fn rests(&self) -> bool {
         let reversed = self.last_step > (1.0 - TRIM_SHARE) * self.largest_step;
         self.is_near_trim(self.moved) || (self.is_near_trim(self.level - self.trim) && !reversed)
     }
 
-    /// True for a step that leads from away to trim, by the sum of the steps or by the level: one
-    /// of the steps may have been too slow to be detected.
+    /// True for a step that returns the control to trim, by the sum of the steps or by the level:
+    /// one of the steps may have been too slow to be detected.
     fn is_return(&self, step: &Step) -> bool {
         let returns =
             |before: f64, after: f64| !self.is_near_trim(before) && self.is_near_trim(after);
@@ -136,12 +135,12 @@ impl<'a> GrowingSequence<'a> {
         };
     }
 
-    /// True where a control that is held away from trim comes back to it with this step.
+    /// True if a control that is held away from trim returns to it with this step.
     fn returns_to_trim(&self, signal: &str, step: &Step) -> bool {
         self.controls.get(signal).is_some_and(|c| c.is_return(step))
     }
 
-    /// Longest pause that the sequence survives in its present state.
+    /// Longest pause after which the sequence still continues in its present state.
     fn longest_pause_s(&self, settings: &Settings) -> f64 {
         if self.controls.values().all(ControlState::rests) {
             settings.longest_rest_s

@@ -16,14 +16,14 @@ use crate::segment::steps::step::Step;
 /// is not recorded, the smallest finding.
 const SAME_CONFIDENCE: f64 = 0.01;
 
-/// Share of `outstanding_share` from which a step before the first one may open the maneuver:
-/// feedback may have halved it.
+/// Size, as a share of `outstanding_share`, above which a step before the first one may begin the
+/// maneuver: feedback may have halved it.
 const OPENING_SHARE: f64 = 0.5;
 
 /// Recognises the maneuvers of a record.
 ///
-/// Two sequences of the same pilot controls are joined where more maneuvers are found in both
-/// together than in each alone.
+/// Two sequences of the same pilot controls are joined if more maneuvers are found in both together
+/// than in each alone.
 pub(in crate::segment) fn recognise<'a>(
     detections: &Detections,
     classes: &'a [Class],
@@ -137,7 +137,7 @@ fn best_classes<'a>(search: &CutSearch<'_, 'a>, segment: &Segment) -> Vec<&'a Cl
         .collect()
 }
 
-/// The maneuver of a class in a segment; `None` where no input of the class steps.
+/// The maneuver of a class in a segment; `None` if no input of the class steps.
 fn maneuver<'a>(
     search: &CutSearch,
     segment: &Segment,

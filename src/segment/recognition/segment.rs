@@ -1,4 +1,4 @@
-//! A segment of a record, from its first step to its last, and what its signals do meanwhile.
+//! A segment of a record, from its first step to its last, and the activity of its signals.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,13 +11,14 @@ use crate::segment::steps::step::Step;
 /// Share of the samples at either end of a signal's range that may be spikes or a short excursion.
 const OUTLYING: f64 = 0.02;
 
-/// Range, in smallest steps, from which a signal moves: from side to side.
+/// Least range, in smallest steps, of a signal that moves: from side to side.
 const MOVES: f64 = 2.0;
 
-/// Range, in smallest steps, up to which a signal rests. Between the two nothing is decided.
+/// Largest range, in smallest steps, of a signal at rest. A signal between the two ranges counts
+/// neither as moving nor as at rest.
 const RESTS: f64 = 0.5;
 
-/// Size, in smallest steps, from which a step is a reversal: from side to side.
+/// Least size, in smallest steps, of a reversal: from side to side.
 const REVERSAL: f64 = 2.0;
 
 /// A segment of a record from its first step to its last.
@@ -56,9 +57,9 @@ impl<'a> Segment<'a> {
         (self.from_s - slack_s, self.to_s + slack_s)
     }
 
-    /// The steps of a signal that stand out from feedback: at least a share of its largest, less
-    /// what turbulence may have taken from them. Of a surface that the on-board system moves only
-    /// the uncommanded steps.
+    /// The steps of a signal that stand out from feedback: at least a share of its largest step,
+    /// reduced by the effect that turbulence may have. For a surface that the on-board system
+    /// moves, only the uncommanded steps.
     pub fn steps_of(&self, signal: &str) -> Vec<&'a Step> {
         let detections = self.detections;
         let steps = if self.is_onboard() && !detections.is_pilot_control(signal) {
@@ -102,8 +103,8 @@ impl<'a> Segment<'a> {
             .fold(0.0, f64::max)
     }
 
-    /// True for a signal that moves, false for one that rests; `None` between the two, and where it
-    /// is not recorded.
+    /// True for a signal that moves, false for one at rest; `None` for a signal in between, or one
+    /// that is not recorded.
     pub fn moves(&self, signal: &str) -> Option<bool> {
         let record = self.detections.record;
         let (first, last) = (record.sample_at(self.from_s), record.sample_at(self.to_s));
@@ -115,13 +116,14 @@ impl<'a> Segment<'a> {
         (moves || range <= RESTS * smallest).then_some(moves)
     }
 
-    /// True where a flag is up for most of the segment; `None` where it is not recorded.
+    /// True if a flag is up for most of the segment; `None` if it is not recorded.
     pub fn flag_is_up(&self, flag: &str) -> Option<bool> {
         self.detections
             .flag_is_mostly_up(flag, (self.from_s, self.to_s))
     }
 
-    /// True for `fewest_steps` steps of a signal to alternating sides with a reversal among them.
+    /// True for `fewest_steps` steps of a signal to alternating sides, at least one of which is a
+    /// reversal.
     pub fn is_excitation(&self, signal: &str) -> bool {
         let steps = self.steps_of(signal);
         let turns = steps.windows(2).filter(|s| s[0].opposes(s[1])).count();
@@ -130,10 +132,10 @@ impl<'a> Segment<'a> {
             && steps.iter().any(|s| s.size() >= reversal)
     }
 
-    /// The signals that make a maneuver of a class here.
+    /// The inputs of a class in this segment.
     ///
-    /// They are those that must step, and of those that may step as often as a doublet the ones that
-    /// are excited. Fewer steps of the latter are feedback.
+    /// They are the signals that must step, and those signals that may step as often as a doublet
+    /// and are excited. Fewer steps of the latter are feedback.
     pub fn inputs<'c>(&self, class: &'c Class) -> BTreeSet<&'c str> {
         let fewest = self.detections.settings.fewest_steps;
         let excited = class
@@ -151,7 +153,7 @@ impl<'a> Segment<'a> {
             .collect()
     }
 
-    /// Times of the first and the last step of a class's inputs; of pilot controls, of the first
+    /// Times of the first and the last step of a class's inputs; for pilot controls, of the first
     /// and the last deflection.
     pub fn excited_s(&self, class: &Class) -> Option<(f64, f64)> {
         if !self.is_onboard() {

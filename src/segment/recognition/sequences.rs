@@ -46,11 +46,10 @@ pub(super) struct StepSequence<'a> {
 }
 
 impl<'a> StepSequence<'a> {
-    /// Joins this sequence with the next where the pilot may have changed from one control to
-    /// another.
+    /// Joins this sequence with the next if the pilot may have changed from one control to another.
     ///
-    /// He then rests no longer than he may hold a control, and steps first with another control
-    /// than the one he stepped last.
+    /// The pause is then no longer than he may hold a control, and his next step is with another
+    /// control than the last one.
     pub fn join(
         &self,
         next: &StepSequence<'a>,
@@ -97,7 +96,7 @@ pub(super) fn sequences<'a>(
     sequences
 }
 
-/// The sequences of uncommanded steps: one as long as no pause is longer than a control may be held
+/// The sequences of uncommanded steps. A sequence ends at a pause longer than a control may be held
 /// away from trim.
 fn onboard_sequences<'a>(detections: &'a Detections) -> Vec<StepSequence<'a>> {
     let always = (f64::NEG_INFINITY, f64::INFINITY);

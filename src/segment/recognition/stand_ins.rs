@@ -1,7 +1,7 @@
-//! Surfaces that stand for pilot controls which a record lacks.
+//! Surfaces in place of pilot controls that a record lacks.
 //!
-//! A surface that is geared to a control steps with it. A class that the pilot flies is then
-//! recognised by the steps of the surfaces whose derivatives it estimates.
+//! A surface that is geared to a control steps with it. A class that the pilot flies can therefore
+//! be recognised by the steps of the surfaces whose derivatives it estimates.
 
 use std::collections::BTreeSet;
 
@@ -10,7 +10,7 @@ use crate::maneuver::class::StepCount;
 use crate::maneuver::{Class, Recognition};
 use crate::segment::settings::Settings;
 
-/// Classes with the surfaces' steps in the place of those of the pilot's controls that the record
+/// Classes with the steps of surfaces in place of those of the pilot's controls that the record
 /// lacks.
 pub(in crate::segment) fn with_surfaces_for_controls(
     record: &Record,

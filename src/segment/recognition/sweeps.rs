@@ -14,7 +14,7 @@ use crate::segment::steps::swings::{Swing, swings};
 /// intervals shrink; the factor leaves room for a swing whose extreme noise has moved.
 const INTERVAL_GROWTH: f64 = 1.5;
 
-/// Finds the maneuvers of a class that is known by a sweep.
+/// Finds the maneuvers of a class that is defined by a sweep.
 pub(super) fn find_sweeps<'a>(detections: &Detections, class: &'a Class) -> Vec<FoundManeuver<'a>> {
     let mut found = Vec::new();
     for (signal, wanted) in &class.recognition.sweep {

@@ -3,15 +3,16 @@
 use super::detections::Detections;
 use super::found::FoundManeuver;
 
-/// Levels after the last input within which a step of the pilot cannot be separated from it: one
-/// after the input's transit, one before the step's.
+/// Number of levels after the last input within which another step of the pilot cannot be separated
+/// from it: one after the input's transit, one before the step's.
 const LEVELS_BETWEEN_STEPS: f64 = 2.0;
 
 /// The windows of maneuvers in order of time.
 ///
-/// A window begins with the lead-in before the first input and ends with the decay after the last,
-/// or where the pilot takes over. Of a pause too short for both, a share is the decay's and the rest
-/// the next maneuver's lead-in. The decay may use the same share of that lead-in.
+/// A window begins with the lead-in before the first input. It ends with the decay after the last
+/// input, or where the pilot takes over. If a pause is too short for both, the decay gets a share
+/// of it and the next maneuver's lead-in the rest. The decay may also use the same share of that
+/// lead-in.
 pub(in crate::segment) fn windows(
     detections: &Detections,
     found: &[FoundManeuver],
@@ -39,8 +40,8 @@ fn whole_window(detections: &Detections, maneuver: &FoundManeuver) -> (f64, f64)
     )
 }
 
-/// Time at which the pilot next steps after the last input, less a step's transit; infinite where
-/// he does not.
+/// Time at which the pilot next steps after the last input, less a step's transit; infinite if he
+/// does not.
 fn take_over_s(detections: &Detections, last_s: f64, end_s: f64) -> f64 {
     let settings = detections.settings;
     let clear_s = last_s + settings.transit_s + LEVELS_BETWEEN_STEPS * settings.level_s;

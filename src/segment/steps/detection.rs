@@ -23,20 +23,21 @@ use crate::segment::settings::Settings;
 /// Share of a recording that is the maneuver in which its inputs rest.
 const QUIET_SHARE: f64 = 0.1;
 
-/// Quantile of the size of normal noise at [`QUIET_SHARE`], standard deviations.
+/// Quantile of the size of normal noise at [`QUIET_SHARE`], in standard deviations.
 const QUIET_DEVIATIONS: f64 = 0.125_661;
 
-/// Share of a run's largest change from which its changes form the near-maximum. The flat top of a
-/// step keeps 5 % of slope and noise; a lower share would shift the middle of a skewed step.
+/// Share of a run's largest change above which its changes form the near-maximum. On the flat top
+/// of a step, slope and noise stay within 5 %; a lower share would shift the middle of a skewed
+/// step.
 const NEAR_MAXIMUM: f64 = 0.95;
 
 /// Detects the steps and the deflections of every signal that has a smallest step.
 ///
 /// The smallest step is the one in the settings, or `steps_over_noise` times the noise of the
-/// signal's own changes where that is larger: feedback moves a surface in turbulence. In a recording
-/// that is the maneuver it is no larger than the share of the largest change below which steps count as
-/// feedback. Deflections are all changes of at least `deflection_share` of the smallest step; every step
-/// is one.
+/// signal's own changes if that is larger, since feedback moves a surface in turbulence. In a
+/// recording that is a single maneuver it is limited to the share of the largest change below which
+/// steps count as feedback. Deflections are all changes of at least `deflection_share` of the
+/// smallest step; every step is one.
 pub(in crate::segment) fn detect(record: &Record, settings: &Settings) -> (Steps, Steps) {
     let window = Window::of(record, settings);
     let (mut steps, mut deflections) = (Steps::default(), Steps::default());
@@ -95,8 +96,9 @@ pub(in crate::segment) fn largest_change(
         .fold(0.0, f64::max)
 }
 
-/// Standard deviation of uncommanded changes, from the median size of all changes: steps are few. In
-/// a recording that is the maneuver they are not, and the rests between the inputs tell the noise.
+/// Standard deviation of uncommanded changes. Steps are few, so it follows from the median size of
+/// all changes. In a recording that is a single maneuver they are not few; there it follows from
+/// the rests between the inputs.
 fn noise(levels: &[f64], window: Window, is_maneuver_alone: bool) -> f64 {
     let mut sizes: Vec<f64> = changes(levels, window)
         .map(|change| change.size())

@@ -1,12 +1,12 @@
 //! Hidden halves of doublets: steps of a surface that turbulence hides.
 //!
-//! Where feedback moves a surface in turbulence, its smallest step is raised above the noise. The
+//! If feedback moves a surface in turbulence, its smallest step is raised above the noise. The
 //! halves of a doublet, away from trim and back to it, may be smaller than that.
 //!
-//! Steps that follow each other closely begin and end with a half. Where the first or last step is
-//! larger than a half beside its neighbour, a deflection to the other side of about half its size
-//! becomes a step. It must exceed the noise clearly where the step may be a half itself. A lone step
-//! near the smallest size and without halves is attributed to a gust.
+//! Steps that follow each other closely begin and end with a half. If the first or last step,
+//! compared with its neighbour, is larger than a half, then a deflection to the other side of about
+//! half its size becomes a step. If that step may be a half itself, the deflection must clearly
+//! exceed the noise. A lone step near the smallest size and without halves is attributed to a gust.
 
 use super::step::{Step, Steps, TRIM_SHARE};
 use crate::segment::settings::Settings;
@@ -14,18 +14,19 @@ use crate::segment::settings::Settings;
 /// A lone step counts as commanded from this many times the smallest step: the size of a reversal.
 const LONE_STEP: f64 = 2.0;
 
-/// Ratio of two neighbouring steps from which the larger is a reversal and the smaller a half.
+/// Ratio of two neighbouring steps above which the larger is a reversal and the smaller a half.
 ///
-/// Equal steps have the ratio 1. A reversal is twice a half, detected as √2 times where the actuator
-/// takes as long as the detector's window. The limit is the geometric mean of 1 and √2, rounded.
+/// Equal steps have the ratio 1. A reversal is twice a half. It is detected as √2 times a half if
+/// the actuator takes as long as the detector's window. The limit is the geometric mean of 1 and
+/// √2, rounded.
 const REVERSAL_OVER_HALF: f64 = 1.2;
 
-/// Noise standard deviations from which turbulence hardly makes a deflection: 0.3 % of normal
-/// changes are larger.
+/// Number of noise standard deviations that turbulence rarely exceeds: 0.3 % of normal changes are
+/// larger.
 const BEYOND_NOISE: f64 = 3.0;
 
-/// Noise standard deviations by which a half may come out smaller than half its reversal: 2 % of
-/// normal changes take more.
+/// Number of noise standard deviations by which a detected half may be smaller than half its
+/// reversal: 2 % of normal changes subtract more.
 const NOISE_ON_HALF: f64 = 2.0;
 
 /// Adds hidden halves to the uncommanded steps of surfaces whose smallest step was raised.
@@ -100,8 +101,8 @@ fn between(deflections: &[Step], (after_s, before_s): (f64, f64)) -> Vec<Step> {
 
 /// The hidden half beside the step at one end of a group.
 ///
-/// It is the largest deflection to the other side that is about half of that step, or less by no
-/// more than [`NOISE_ON_HALF`]. `None` where the step is itself a half beside its neighbour.
+/// It is the largest deflection to the other side that is about half of that step, or smaller by no
+/// more than [`NOISE_ON_HALF`]. `None` if the step itself is a half, compared with its neighbour.
 fn hidden_half(
     deflections: &[Step],
     end: &Step,

@@ -37,7 +37,8 @@ pub(in crate::segment) struct SignalSteps {
     pub steps: Vec<Step>,
     /// The smallest change that counts as a step.
     pub smallest: f64,
-    /// Standard deviation of the signal's own changes where it has raised the smallest step; else 0.
+    /// Standard deviation of the signal's own changes if it has raised the smallest step; otherwise
+    /// 0.
     pub noise: f64,
 }
 
@@ -69,7 +70,7 @@ impl Steps {
             .map_or(f64::INFINITY, |of_signal| of_signal.smallest)
     }
 
-    /// Standard deviation of a signal's own changes where turbulence has raised its smallest step.
+    /// Standard deviation of a signal's own changes if turbulence has raised its smallest step.
     pub fn noise(&self, signal: &str) -> f64 {
         self.by_signal
             .get(signal)

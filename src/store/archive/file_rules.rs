@@ -1,5 +1,5 @@
-//! Rules for the files of an archive: names that are no flights, ids from names, the message for
-//! unreadable files.
+//! Rules for the files of an archive: names that belong to no flight, ids from names, the message
+//! for unreadable files.
 
 use crate::store::visible_text::is_invisible;
 
@@ -13,8 +13,8 @@ pub(super) fn unreadable(e: &dyn std::fmt::Display) -> String {
     format!("not a readable Parquet file (truncated, or another format?): {e}")
 }
 
-/// Id of a flight from the name of its file or folder. Characters that no reader sees or that reorder
-/// a line are replaced. An id that a spreadsheet would take for a formula begins with an underscore.
+/// Id of a flight from the name of its file or folder. Characters that are invisible or reorder a
+/// line are replaced. An id that a spreadsheet would take for a formula begins with an underscore.
 pub(super) fn flight_id(name: &str) -> String {
     let visible = |c: char| if is_invisible(c) { '_' } else { c };
     let id: String = name.chars().map(visible).collect();

@@ -1,4 +1,4 @@
-//! Flights of an archive: which files there are, and which of them are one flight.
+//! Flights of an archive: the list of its files, and the files of each flight.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -49,8 +49,8 @@ pub fn find(archive: &str) -> Result<Vec<FlightFiles>, Error> {
     Ok(flights(files))
 }
 
-/// Adds the files of a glob with `**` at a place: the folders above it are searched as an archive is,
-/// because a glob follows links in circles.
+/// Adds the files of a glob with `**` at a place. The folders above it are searched as an archive
+/// is, because a glob follows circular links.
 fn add_below(archive: &str, at: usize, files: &mut BTreeSet<PathBuf>) -> Result<(), Error> {
     let (above, below) = archive.split_at(at);
     let above = match above.trim_end_matches('/') {

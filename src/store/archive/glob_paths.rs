@@ -1,5 +1,6 @@
-//! Paths that match a glob, found component by component. A folder is read once for each component, whatever links
-//! lead to it: two links of a folder to itself would double the paths with every further `*/`.
+//! Paths that match a glob, found component by component. For each component a folder is read once,
+//! no matter how many links lead to it. Otherwise two links of a folder to itself would double the
+//! paths with every further `*/`.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -47,7 +48,7 @@ pub(super) fn matching(pattern: &str) -> Result<BTreeSet<PathBuf>, Error> {
     Ok(paths)
 }
 
-/// Entries of folders with matching names. What is no folder has none.
+/// Entries of folders with matching names; a path that is no folder has no entries.
 fn below(
     folders: &BTreeSet<PathBuf>,
     names: &Pattern,

@@ -7,7 +7,7 @@ use crate::flight::Channel;
 use crate::store::clock_column::{as_floats, tick_unit};
 use crate::units::{Quantity, Unit};
 
-/// Refuses a column that is neither numbers nor, for a clock, times.
+/// Refuses a column whose type is neither a number nor, for a clock, a time.
 pub(super) fn refuse_other_types(field: &Field, channel: &Channel) -> Result<(), String> {
     let found = field.data_type();
     let fits = found.is_numeric() || *found == DataType::Boolean || *found == DataType::Null;

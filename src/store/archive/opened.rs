@@ -98,7 +98,7 @@ pub fn open(
     }))
 }
 
-/// Opens one file, which is several if it is tall and its names have several clocks.
+/// Opens one file. A tall file becomes several if its names have several clocks.
 ///
 /// # Errors
 /// [`Error::Archive`] for a fault of the file, another one for a fault of the disk.

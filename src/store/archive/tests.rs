@@ -1,4 +1,5 @@
-//! Archives good and bad: what is found, what is read, and what is said about files that cannot be.
+//! Good and bad archives: the files found, the values read, and the messages about unreadable
+//! files.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

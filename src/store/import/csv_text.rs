@@ -108,7 +108,7 @@ fn other_text(head: &[u8]) -> Option<&'static str> {
         .then_some("its lines end with carriage returns alone; save it with line feeds")
 }
 
-/// Fields that are no numbers, in rows of numbers.
+/// Fields in rows of numbers that are no numbers.
 #[derive(Debug, Default)]
 struct Failures {
     fields: usize,
@@ -240,8 +240,8 @@ impl Layout {
         ))
     }
 
-    /// Message for rows of twice as many fields as the line of names above them has: their decimal commas look
-    /// like separators.
+    /// Message for rows that have twice as many fields as the line of names above them: their
+    /// decimal commas look like separators.
     fn decimal_commas_between_commas(&self, lines: &[&str]) -> Option<String> {
         let count = |line: &&str| fields(line, self.delimiter).len();
         let rows = lines.get(self.skipped).map_or(0, count);
@@ -257,7 +257,7 @@ impl Layout {
         })
     }
 
-    /// Appends a row to a batch; what is no number is missing.
+    /// Appends a row to a batch; a field that is no number is missing.
     fn append(
         &self,
         line: &str,

@@ -19,7 +19,7 @@ const BATCH_ROWS: usize = 16_384;
 /// Numbers that are in memory at once: those of 256 columns.
 const BATCH_NUMBERS: usize = BATCH_ROWS << 8;
 
-/// Rows of so many columns that are in memory at once.
+/// Number of rows that are in memory at once, for this number of columns.
 pub fn batch_rows(columns: usize) -> usize {
     (BATCH_NUMBERS / columns.max(1)).min(BATCH_ROWS)
 }

@@ -1,4 +1,4 @@
-//! Contents of an imported file, and the refusal of one that is no recording.
+//! Contents of an imported file, and the refusal of a file that is no recording.
 
 use std::path::{Path, PathBuf};
 
@@ -32,7 +32,7 @@ pub struct ImportedContents {
     pub rows: usize,
     pub columns: Vec<ImportedColumn>,
     pub notes: Vec<String>,
-    /// Folder of the files, where the source became several.
+    /// Folder of the files, if the source became several.
     pub folder: Option<PathBuf>,
 }
 

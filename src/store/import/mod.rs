@@ -1,8 +1,8 @@
-//! Import: recordings in other formats, written as Parquet of the archive with the units of the columns,
-//! and a manifest that names the source of each file.
+//! Import: recordings in other formats, written as Parquet of the archive with the units of the
+//! columns, and a manifest that names the source of each file.
 //!
-//! CSV and tall Parquet pass row by row, in bounded memory. A MATLAB or HDF5 file is in memory whole: its
-//! columns stand one after the other.
+//! CSV and tall Parquet are read row by row, in bounded memory. A MATLAB or HDF5 file is read
+//! whole, since its columns follow one another.
 
 mod imported_contents;
 mod csv_text;

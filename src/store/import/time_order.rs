@@ -1,11 +1,12 @@
-//! Values put in the order of time on the disk: each goes to the span of time that it belongs to, and a span is small
-//! enough to be sorted in memory. The work grows with the values, whatever their order.
+//! Sorting of values by time on the disk: each value is written to its span of time, and a span is
+//! small enough to be sorted in memory. The time taken is proportional to the number of values, for
+//! any order.
 
 use std::fs::File;
 use std::io::{Read, Result, Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// Value of a name at a time: time, place of the name, value.
+/// Value of a name at a time: time, index of the name, value.
 pub type Placed = (f64, usize, f64);
 
 /// Bytes of a value in the file.
@@ -14,7 +15,8 @@ const BYTES: usize = 24;
 /// Bytes of a span that are written at once.
 const BUFFER: usize = 1 << 16;
 
-/// Spans of time in one temporary file that has no name. Each has room for as many values as it was counted.
+/// Spans of time in one temporary file that has no name. Each has room for the number of values
+/// that was counted for it.
 #[derive(Debug)]
 pub struct SpanFile {
     file: File,
@@ -32,7 +34,7 @@ struct Span {
 }
 
 impl SpanFile {
-    /// Creates the file in a folder, for spans with at most so many values.
+    /// Creates the file in a folder, for spans of at most these numbers of values.
     ///
     /// # Errors
     /// The folder has no room for it.
@@ -67,7 +69,8 @@ impl SpanFile {
         Ok(())
     }
 
-    /// Values of a span in the order of time; values of one time as they came.
+    /// Values of a span in the order of time; values of one time stay in the order in which they
+    /// were added.
     ///
     /// # Errors
     /// The disk fails.
@@ -96,7 +99,7 @@ impl SpanFile {
 }
 
 impl Span {
-    /// Writes the values that wait.
+    /// Writes the values not written yet.
     fn write(&mut self, file: &mut File) -> Result<()> {
         file.seek(SeekFrom::Start(self.start + self.written))?;
         file.write_all(&self.waiting)?;

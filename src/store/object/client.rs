@@ -24,8 +24,8 @@ use super::failure::{Failure, ObjectInfo};
 /// Requests in a row without an answer after which the endpoint counts as dead.
 const SILENT_REQUESTS: usize = 3;
 
-/// Time after which a failed request is not repeated. A repetition begun before may take as long
-/// again.
+/// Time after which a failed request is not repeated. A repetition that began earlier may take as
+/// long again.
 const PATIENCE: Duration = Duration::from_secs(25);
 
 const ENDPOINTS: [&str; 3] = ["AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL", "AWS_ENDPOINT"];
@@ -50,7 +50,7 @@ pub struct Client {
     trouble: Mutex<Trouble>,
 }
 
-/// Failures of this run.
+/// Failed requests of this run.
 #[derive(Default)]
 struct Trouble {
     silent: usize,
@@ -387,7 +387,7 @@ impl Client {
         self.written(self.ask(key, upload.complete())?).map(|_| ())
     }
 
-    /// A write fails with `not found` only if the bucket is missing.
+    /// Result of a write: the answer `not found` means that the bucket is missing.
     fn written<T>(&self, answer: Option<T>) -> Result<T, Failure> {
         let what = || {
             format!(

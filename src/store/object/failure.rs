@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::error::Error;
 
-/// Failure of a request, with what to do about it.
+/// Failure of a request, and whether to try again.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Failure {
     /// Another try may succeed: no answer, or the object was replaced meanwhile.
@@ -43,6 +43,6 @@ impl Failure {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ObjectInfo {
     pub bytes: u64,
-    /// ETag, the store's mark of the content. Not every store lists it.
+    /// ETag, the store's tag of the content. Not every store lists it.
     pub tag: Option<String>,
 }

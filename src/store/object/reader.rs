@@ -13,7 +13,8 @@ use super::address::at;
 use super::client::Client;
 use super::failure::{Failure, ObjectInfo};
 
-/// Longest read-ahead of a request, bytes: a request takes as long as some hundred kilobytes.
+/// Longest read-ahead of a request, bytes: the latency of a request equals the transfer of some
+/// hundred kilobytes.
 const AHEAD: u64 = 1 << 20;
 
 /// Reader of an object. Every clone reads the same content, or fails after the object was replaced.

@@ -1,4 +1,4 @@
-//! Header of a record's file: what is known of a record before its samples are read.
+//! Header of a record's file: its metadata, which is read before the samples.
 
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;

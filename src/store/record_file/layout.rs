@@ -1,6 +1,6 @@
 //! Layout of a record's file: names of columns and of metadata, sizes of groups and pages.
 
-/// Suffix of a signal's column of marks.
+/// Suffix of a signal's column of flags.
 pub(super) const MARK: &str = ":mark";
 
 /// Metadata key of the flight's id.

@@ -1,4 +1,4 @@
-//! Records as Parquet files: for each signal a column of values and one of marks, the clock in the
+//! Records as Parquet files: for each signal a column of values and one of flags, the clock in the
 //! file's key-value metadata.
 //!
 //! A record is written row group by row group, the signals of a group in parallel, and read by

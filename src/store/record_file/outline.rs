@@ -1,4 +1,4 @@
-//! Outline of a record for a chart: extremes in the place of samples.
+//! Outline of a record for a chart: extremes in place of samples.
 
 use std::collections::BTreeSet;
 
@@ -9,8 +9,9 @@ use crate::flight::record::Series;
 use crate::flight::{Mark, Record};
 
 impl RecordFile {
-    /// Reads the whole record for a chart. Of more samples than `most`, the smallest and the
-    /// largest of several neighbours are kept in their order. Signals are read one at a time.
+    /// Reads the whole record for a chart. If there are more samples than `most`, only the smallest
+    /// and the largest of several neighbours are kept, in their order. Signals are read one at a
+    /// time.
     ///
     /// # Errors
     /// As [`RecordFile::window`].
@@ -36,7 +37,7 @@ impl RecordFile {
     }
 }
 
-/// Smallest and largest of every `width` samples, in their order, with the mark of a faulty sample
+/// Smallest and largest of every `width` samples, in their order, with the flag of a faulty sample
 /// if there is one.
 fn extremes(series: &Series, width: usize) -> Series {
     let mut outline = Series {

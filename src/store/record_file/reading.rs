@@ -90,7 +90,7 @@ impl RecordFile {
             .sample_at(time_s)
     }
 
-    /// Reads from one time to another with a few samples more on each side, as [`Record::part`]
+    /// Reads from one time to another with some samples more on each side, as [`Record::part`]
     /// does.
     ///
     /// # Errors
@@ -170,7 +170,7 @@ impl RecordFile {
         Ok(record)
     }
 
-    /// Adds the columns of the signals that are wanted to a record of a range of samples.
+    /// Adds the wanted signals' columns to a record of a range of samples.
     fn add_columns(
         &self,
         record: &mut Record,

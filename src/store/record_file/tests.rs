@@ -1,4 +1,4 @@
-//! Records come back to the bit, whole and in windows; what is no record is refused.
+//! Records are read back bit by bit, whole and in windows; a file that is no record is refused.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

@@ -143,7 +143,7 @@ pub struct SignalWriter {
     pending: Series,
 }
 
-/// Encoded part of one signal in a row group: values and marks.
+/// Encoded part of one signal in a row group: values and flags.
 #[expect(missing_debug_implementations, reason = "the columns within have none")]
 pub struct SignalChunk([ArrowColumnChunk; 2]);
 

@@ -243,7 +243,7 @@ impl<'a, 'input> File<'a, 'input> {
         )
     }
 
-    /// Grid of a gridded table, with as many values as its breakpoints demand.
+    /// Grid of a gridded table, with exactly as many values as its breakpoints require.
     fn whole(&self, at: Node, grid: Grid) -> Result<Grid, Wrong> {
         let sizes = grid.axes.iter().map(|(_, points)| points.len());
         let expected = sizes.fold(1, usize::saturating_mul);

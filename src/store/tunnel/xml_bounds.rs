@@ -7,7 +7,8 @@ const LARGEST: usize = 1 << 25;
 /// Most attributes of an element; those of DAVE-ML have some ten.
 const MOST_ATTRIBUTES: usize = 1000;
 
-/// Finds what makes a text no model: its line, counted from 1, and the reason.
+/// Finds the first place at which a text exceeds the bounds: its line, counted from 1, and the
+/// reason.
 pub fn excess(text: &str) -> Option<(Option<usize>, &'static str)> {
     let line = |at: usize| {
         let before = text.get(..at).unwrap_or_default();

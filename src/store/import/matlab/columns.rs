@@ -21,7 +21,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// Text of 16-bit codes, which both kinds of file store as numbers.
+    /// Text from 16-bit codes, which both file formats store as numbers.
     pub fn text_of_codes(codes: &[f64]) -> Value {
         #[expect(
             clippy::cast_possible_truncation,
@@ -45,7 +45,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// Adds a value under the name of what contains it.
+    /// Adds a value under the name of its container.
     pub fn add(&mut self, prefix: &str, name: &str, value: Value) {
         match value {
             Value::Numbers(rows, columns, values) => self.add_numbers(name, rows, columns, values),
@@ -112,7 +112,8 @@ impl Table {
         }
     }
 
-    /// Names the columns of a matrix by a list of as many texts, and gives them units by another.
+    /// Names the columns of a matrix by a list of as many texts, and takes their units from
+    /// another.
     pub fn name_matrix_columns(&mut self) {
         let is_units = |name: &str| name.to_lowercase().contains("unit");
         for (first, width) in self.matrices.clone() {

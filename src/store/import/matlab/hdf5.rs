@@ -13,7 +13,7 @@ use hdf5_reader::{Dataset, Datatype, H5Type, Hdf5File, OpenOptions};
 
 use super::columns::{DEEPEST, Value};
 
-/// Group of what cells refer to. Names of MATLAB's own groups begin with `#`.
+/// Group of the objects that cells refer to. Names of MATLAB's own groups begin with `#`.
 const REFERRED: &str = "#refs#";
 
 /// Attributes of a dataset or group, as MATLAB names them.
@@ -25,11 +25,12 @@ const SPARSE: &str = "MATLAB_sparse";
 /// Attributes in which programs write a unit.
 const UNITS: [&str; 4] = ["unit", "units", "Unit", "Units"];
 
-/// Bytes of a variable over those of its file, at most: the best that its compression can do.
+/// Largest ratio of a variable's bytes to those of its file: the best that its compression can
+/// reach.
 const LARGEST_RATIO: usize = 1100;
 
-/// Most datasets and groups of a file, each counted as often as others refer to it: references may form a tree whose
-/// branches are one dataset.
+/// Largest number of datasets and groups of a file, each counted as often as others refer to it:
+/// references may form a tree whose branches are all one dataset.
 const MOST_MEMBERS: usize = 100_000;
 
 type Result<T> = std::result::Result<T, String>;

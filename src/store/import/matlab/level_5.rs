@@ -8,7 +8,7 @@ use flate2::read::ZlibDecoder;
 
 use super::columns::{DEEPEST, Value};
 
-/// Bytes of a compressed variable when it is unpacked, at most.
+/// Largest size of a compressed variable after unpacking, bytes.
 const LARGEST_VARIABLE: u64 = 4 << 30;
 
 /// Bytes of a file with its byte order.

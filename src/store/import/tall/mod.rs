@@ -1,9 +1,9 @@
-//! Tall Parquet (time, name, value) as one column a name: written by import, and beside its records by
-//! ingest, which then reads it as any flight.
+//! Tall Parquet (time, name, value) converted to one column per name: by import, or by ingest
+//! beside its records, which then reads it like any flight.
 //!
-//! Names whose times are mostly times of the name with the most values are one part, with a value where
-//! they have one. The other names are further parts, one for each set of times: files with clocks of
-//! their own.
+//! Names whose times are mostly those of the name with the most values form one part; missing
+//! values are empty. The other names form further parts, one for each set of times: files with
+//! clocks of their own.
 
 mod ordering;
 mod parts;
@@ -68,8 +68,8 @@ fn folder_of(file: &Path) -> PathBuf {
 }
 
 impl Tall {
-    /// Writes a draft beside `place` for each part that has a name which is wanted, with one column
-    /// for each of these names.
+    /// Writes a draft beside `place` for each part that has a wanted name, with one column for each
+    /// of these names.
     ///
     /// # Errors
     /// [`Error::Archive`] for the file; [`Error::Io`] or [`Error::Store`] for the disk.

@@ -1,4 +1,5 @@
-//! Rows of a tall file in the order of time: of a file in another order they are sorted, a span of time at once.
+//! Rows of a tall file in the order of time. A file in another order is sorted, one span of time
+//! after another.
 
 use std::path::Path;
 
@@ -8,10 +9,11 @@ use crate::error::{Error, Result};
 use crate::store::import::imported_contents::refused;
 use crate::store::import::time_order::SpanFile;
 
-/// Values that are sorted at once where rows are not in the order of time: 32 MB.
+/// Number of values that are sorted at once if rows are not in the order of time: 32 MB.
 const SORTED_AT_ONCE: usize = 1 << 20;
 
-/// Most values that are sorted at once, where a sixteen-thousandth of the time span has so many.
+/// Largest number of values that are sorted at once, if a sixteen-thousandth of the time span has
+/// this many.
 const MOST_AT_ONCE: usize = 20_000_000;
 
 /// Spans of time: the span of each bin, and the number of values of each span.
@@ -21,8 +23,8 @@ struct Spans {
 }
 
 impl Tall {
-    /// Passes the rows of the names that have a place on in the order of time. What is not in that order is put
-    /// into it on the disk, beside `scratch`.
+    /// Passes on, in the order of time, the rows of the names that have a place. Rows in another
+    /// order are first sorted on the disk, beside `scratch`.
     pub(super) fn in_order(
         &self,
         survey: &Survey,

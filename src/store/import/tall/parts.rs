@@ -8,8 +8,8 @@ use super::survey::{Clock, NamedValues, Survey};
 use crate::error::Result;
 
 impl Tall {
-    /// Names of each part: those on the clock of the name with the most values, then the others by
-    /// their clocks. Values are put in order beside `scratch`.
+    /// Names of each part: first those on the clock of the name with the most values, then the
+    /// others by their clocks. Values are sorted beside `scratch`.
     pub(super) fn parts(&self, survey: &Survey, scratch: &Path) -> Result<Vec<BTreeSet<String>>> {
         let names = || survey.names.iter();
         let most = names().max_by_key(|(_, values)| values.count);
@@ -41,7 +41,7 @@ impl Tall {
             .collect())
     }
 
-    /// Number of the times of each name at which another one has a value, too.
+    /// Number of the times of each name at which another name also has a value.
     fn times_shared<'s>(
         &self,
         survey: &'s Survey,

@@ -122,7 +122,7 @@ impl Tall {
         })
     }
 
-    /// `true` where none of the columns but the clock is a channel of its own, and the names are text.
+    /// `true` if no column besides the clock is a mapped channel, and the names are text.
     #[must_use]
     pub fn is_unmapped(&self, is_channel: impl Fn(&str) -> bool) -> bool {
         let field = self.metadata.schema().field_with_name(&self.name).ok();
@@ -176,7 +176,7 @@ impl Tall {
         })
     }
 
-    /// Times; those of a calendar in seconds since its beginning.
+    /// Times, s. Calendar times are in seconds since the calendar's beginning.
     pub(super) fn times(&self, batch: &RecordBatch) -> Result<Vec<f64>> {
         let unit = tick_unit(self.column(batch, &self.time)?.data_type());
         let seconds = |unit: &str| Unit::parse(unit).ok()?.factor_to(Unit::parse("s").ok()?);

@@ -6,7 +6,7 @@ use super::source::{Tall, text};
 use crate::error::Result;
 use crate::store::import::imported_contents::refused;
 
-/// Parts of the time span from which the parts that are sorted at once are composed.
+/// Number of bins of the time span, from which the spans that are sorted at once are composed.
 pub(super) const BINS: usize = 1 << 14;
 
 /// Most names of a file: more than any recorder has channels.
@@ -30,7 +30,7 @@ impl NamedValues {
         }
     }
 
-    /// Set of the times, as far as names are told apart by it.
+    /// Key of the set of times, by which names are compared.
     pub(super) fn clock(&self) -> Clock {
         Clock {
             count: self.count,
@@ -39,7 +39,8 @@ impl NamedValues {
     }
 }
 
-/// Set of times: equal for names that have values at the same times, in any order of the rows.
+/// Key of a set of times: equal for names that have values at the same times, for any order of the
+/// rows.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Clock {
     count: usize,
@@ -74,7 +75,7 @@ impl Survey {
         }
     }
 
-    /// Part of the time span; a time that is no number is in the last one.
+    /// Bin of a time; a time that is no number is in the last bin.
     pub(super) fn bin(&self, time: f64) -> usize {
         let (first, last) = self.span_s;
         let share = (time - first) / (last - first);

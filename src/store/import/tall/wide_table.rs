@@ -1,4 +1,4 @@
-//! Wide tables of the parts: one column a name, one row a time.
+//! Wide tables of the parts: one column per name, one row per time.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -9,10 +9,12 @@ use crate::error::Result;
 use crate::store::import::flight_file::{FlightWriter, batch_rows};
 use crate::store::import::imported_contents::{ImportedColumn, refused};
 
-/// Most files that a tall one becomes: more clocks than a recorder has, and files that a system lets open.
+/// Largest number of files that a tall one becomes: more clocks than a recorder has, and few enough
+/// for a system to keep open.
 const MOST_CLOCKS: usize = 256;
 
-/// Most numbers of a file that a tall one becomes, missing ones as well: those of a file of the archive.
+/// Largest number of values, missing ones included, of a file that a tall one becomes: the same as
+/// for a file of the archive.
 const MOST_NUMBERS: usize = 500_000_000;
 
 /// Place of a name without a column.
@@ -21,11 +23,11 @@ const NO_COLUMN: usize = usize::MAX;
 /// A part being filled: its names, its file, and the rows that are not written yet.
 pub(super) struct PartTable<'p> {
     names: &'p BTreeSet<String>,
-    /// The clock, and the names that are wanted, sorted.
+    /// The clock, and the wanted names, sorted.
     pub columns: Vec<ImportedColumn>,
     rows: Rows,
     pub writer: FlightWriter,
-    /// Values that another one for the same time and name has replaced.
+    /// Number of values that another value for the same time and name has replaced.
     pub replaced: usize,
 }
 
@@ -97,10 +99,10 @@ impl PartTable<'_> {
 }
 
 impl Tall {
-    /// Empty tables of the parts that have a name which is wanted, one column for each of these names.
+    /// Empty tables of the parts that have a wanted name, one column for each of these names.
     ///
     /// # Errors
-    /// They are more files, or larger ones, than a recorder's names make.
+    /// There are more files, or larger ones, than a recorder's names can make.
     pub(super) fn tables<'p>(
         &self,
         survey: &Survey,
@@ -137,7 +139,7 @@ impl Tall {
         parts.into_iter().enumerate().map(table).collect()
     }
 
-    /// The clock, and the names that are wanted, sorted.
+    /// The clock, and the wanted names, sorted.
     fn columns(&self, survey: &Survey, is_wanted: impl Fn(&str) -> bool) -> Vec<ImportedColumn> {
         let time = ImportedColumn {
             name: self.time.clone(),
@@ -163,9 +165,9 @@ impl Tall {
         Err(refused(&self.source, &what))
     }
 
-    /// Fills the tables in one pass, with a row for each time at which any name of a part has a value. A name
-    /// without a column makes a row all the same: the clock is that of all names. Values are put in order beside
-    /// `scratch`.
+    /// Fills the tables in one pass, with a row for each time at which any name of a part has a
+    /// value. Names without a column also make rows, since the clock is that of all names. Values
+    /// are sorted beside `scratch`.
     pub(super) fn filled<'p>(
         &self,
         survey: &Survey,
