@@ -129,8 +129,8 @@ impl Regressor {
         }
     }
 
-    /// Factor of proportion to the first part that has one, from the factors and the measured values of
-    /// the parts; `None` where no part has one.
+    /// Factor of proportion to the first part that has one, from the factors and the measured
+    /// values of the parts; `None` if no part has one.
     pub fn factor(
         &self,
         factor_of: &impl Fn(&Regressor) -> Option<f64>,

@@ -133,7 +133,7 @@ impl Flow {
 /// Error of an angle, rad, below which one more Newton step leaves rounding errors only.
 const CLOSE: f64 = 1e-7;
 
-/// Most steps of Newton's iteration; three are usual.
+/// Largest number of steps of Newton's iteration; three are usual.
 const MOST_STEPS: usize = 8;
 
 impl Vane {

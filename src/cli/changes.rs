@@ -5,7 +5,7 @@ use crate::lineage::{
 };
 use crate::numerics::digits::rounded;
 
-/// Most lines of one kind that are printed.
+/// Largest number of lines of one kind that are printed.
 pub const MOST: usize = 10;
 
 /// Prints what a night changed since the one before.

@@ -26,7 +26,7 @@ Examples:
 
 Exit codes: 0 written; 1 not written, the message says why; 2 written, and something of the campaign was rejected.";
 
-/// Most models drawn at once: their files have four digits.
+/// Largest number of models drawn at once: their files have four digits.
 const MOST_DRAWS: usize = 9999;
 
 #[derive(Args, Debug)]

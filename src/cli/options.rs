@@ -22,7 +22,7 @@ pub const USAGE: u8 = 64;
 /// Exit code of work that another try may complete (`EX_TEMPFAIL`).
 pub const TRY_AGAIN: u8 = 75;
 
-/// Most threads: more than any machine has processors.
+/// Largest number of threads: more than any machine has processors.
 const MOST_THREADS: usize = 4096;
 
 /// Returns `code` if the condition holds, otherwise 0.

@@ -53,7 +53,7 @@ const REPLACED: [(&str, &str); 11] = [
 ];
 
 /// Error for the keys of `pipeline.yaml` that have a new place, with a line for each of them.
-/// `None` where there are none.
+/// `None` if there are none.
 pub(super) fn refusal(pipeline: &Source) -> Option<Error> {
     let written: Value = pipeline.parse().ok()?;
     let mut paths = Vec::new();

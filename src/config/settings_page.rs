@@ -126,8 +126,8 @@ fn yaml(path: &[&str], value: &str) -> String {
     }
 }
 
-/// Names that the parser accepts at a path, taken from its error about an unknown name; `None`
-/// where it takes a single value or any name.
+/// Names that the parser accepts at a path, taken from its error about an unknown name; `None` if
+/// it takes a single value or any name.
 fn expected(file: fn(&Source) -> Option<String>, path: &[&str]) -> Option<Vec<String>> {
     let text = yaml(&[path, &["no_such_key"]].concat(), "0");
     let answer = file(&source(&text))?;

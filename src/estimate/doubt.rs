@@ -15,7 +15,7 @@ use crate::units::{DEG, Unit};
 
 /// Motion that a fit explains without the corrections of a filter, and the second opinion on it.
 pub(super) struct Explanation<'a> {
-    /// Outputs of the equations; `None` where they diverge.
+    /// Outputs of the equations; `None` if they diverge.
     pub outputs: Option<&'a [[f64; OUTPUTS]]>,
     /// True if gusts explain a drift of the attitude: it integrates the rates, and the rotary gusts
     /// in them.

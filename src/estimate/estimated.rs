@@ -24,7 +24,7 @@ pub struct Covariance {
 }
 
 impl Covariance {
-    /// Covariance of a fit; `None` where the data determine none.
+    /// Covariance of a fit; `None` if the data determine none.
     pub(super) fn of_fit(names: &[String], fit: &Fit) -> Option<Covariance> {
         let rows = |m: &DMatrix<f64>| m.transpose().as_slice().to_vec();
         let (white, corrected) = (fit.covariance.as_ref()?, fit.covariance_corrected.as_ref()?);

@@ -234,7 +234,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
         all.view((0, 0), (n, n)).into_owned()
     }
 
-    /// Outputs of a maneuver along the air's angle; `None` where they diverge.
+    /// Outputs of a maneuver along the air's angle; `None` if they diverge.
     pub fn outputs_along_air(
         &self,
         member: usize,

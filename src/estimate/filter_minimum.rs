@@ -34,7 +34,7 @@ pub(super) enum NoMinimum {
 }
 
 impl NoMinimum {
-    /// End of the iteration; `None` where the filter diverges.
+    /// End of the iteration; `None` if the filter diverges.
     pub fn end(&self) -> Option<&Scored> {
         match self {
             NoMinimum::Diverges => None,

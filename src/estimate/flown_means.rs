@@ -5,7 +5,7 @@ use crate::flight::{Record, signal};
 use crate::maneuver::{Maneuver, Means};
 use crate::numerics::mean::finite_mean;
 
-/// Means over a maneuver's finite samples; `None` where a signal of the equations has none.
+/// Means over a maneuver's finite samples; `None` if a signal of the equations has none.
 #[must_use]
 pub fn means(record: &Record, maneuver: &Maneuver, buildup: &Buildup) -> Option<Means> {
     let first = record.sample_at(maneuver.start_s);

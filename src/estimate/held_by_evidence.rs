@@ -26,8 +26,8 @@ pub(super) struct HeldChoice {
     pub reasons: BTreeMap<String, String>,
 }
 
-/// Most rounds of fitting and choosing. Each but the last holds or frees a derivative, and none is
-/// freed twice.
+/// Largest number of rounds of fitting and choosing. Each but the last holds or frees a derivative,
+/// and none is freed twice.
 const ROUNDS: usize = 10;
 
 impl HeldChoice {

@@ -36,13 +36,13 @@ pub(super) struct Filtered {
     pub noise: Noise,
     /// −log of the likelihood.
     pub cost: f64,
-    /// True where gusts account for a drift of the attitude.
+    /// True if gusts account for a drift of the attitude.
     pub attitude_drifts: bool,
     /// Lag-one correlation of each output's innovations.
     autocorrelation: [f64; OUTPUTS],
     /// Log-likelihood gained over output error.
     likelihood_gain: Option<f64>,
-    /// Outputs along the air's angle; `None` where they diverge.
+    /// Outputs along the air's angle; `None` if they diverge.
     pub outputs_along_air: Option<Vec<[f64; OUTPUTS]>>,
     /// Equation error with the slopes over α that the filter holds; `None` without any.
     pub second_opinion: Option<Regression>,

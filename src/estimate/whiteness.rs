@@ -24,7 +24,7 @@ pub(super) fn is_white(measurements: &Measurements, fit: &Fit) -> bool {
     fit.outcome == Outcome::Converged && are_white(measurements, &fit.response.outputs)
 }
 
-/// True where the residuals of every output are as white noise.
+/// True if the residuals of every output are as white noise.
 pub(super) fn are_white(measurements: &Measurements, computed: &[[f64; OUTPUTS]]) -> bool {
     let correlations = lag_one(measurements, computed);
     correlations.iter().all(|r| *r < COLOURED)

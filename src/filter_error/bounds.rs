@@ -167,7 +167,7 @@ pub struct WidePass {
 
 impl WidePass {
     /// Computes the pass of `wide` at the fit of `filter`. `values` has every parameter by name;
-    /// those without a value are zero. `None` where the wide filter diverges.
+    /// those without a value are zero. `None` if the wide filter diverges.
     #[must_use]
     pub fn of<const NX: usize, E: InGusts<NX>>(
         filter: &Filter<NX, E>,

@@ -74,7 +74,7 @@ fn share(output: usize, patterns: &[Pattern], all: usize) -> f64 {
     own.max(1) as f64 / all.max(1) as f64
 }
 
-/// Gains of all patterns; `None` where the filter has no finite covariance.
+/// Gains of all patterns; `None` if the filter has no finite covariance.
 #[inline(always)]
 pub(super) fn gains<const NX: usize>(
     filter: &SteadyFilter<NX>,

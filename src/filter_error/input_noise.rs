@@ -53,7 +53,7 @@ impl<const NX: usize> InputNoise<NX> {
         InputNoise { effects }
     }
 
-    /// True where the inputs are exact.
+    /// True if the inputs are exact.
     pub fn is_zero(&self) -> bool {
         self.effects.is_empty()
     }

@@ -10,7 +10,7 @@ use nalgebra::SMatrix;
 use crate::dynamics::OUTPUTS;
 use crate::numerics::small::{product, product_transposed, sandwich};
 
-/// Most rounds: 2²⁴ steps.
+/// Largest number of rounds: 2²⁴ steps.
 const ROUNDS: usize = 24;
 /// Relative change below which a solution has settled.
 const SETTLED: f64 = 1e-13;
@@ -47,7 +47,7 @@ pub(super) struct SteadyFilter<const NX: usize> {
 }
 
 impl<const NX: usize> SteadyFilter<NX> {
-    /// Solves the Riccati equation; `None` where it has no finite solution.
+    /// Solves the Riccati equation; `None` if it has no finite solution.
     #[inline(always)]
     pub fn of(system: NoisySystem<NX>) -> Option<Self> {
         let prediction = solve(&system)?;

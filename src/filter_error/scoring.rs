@@ -54,7 +54,7 @@ pub struct Scored {
     pub response: JointResponse,
 }
 
-/// Minimises the cost from a start; `None` where a filter diverges there. `floors` are the least
+/// Minimises the cost from a start; `None` if a filter diverges there. `floors` are the least
 /// values of the parameters.
 #[must_use]
 pub fn minimise<const NX: usize, E: InGusts<NX>>(

@@ -67,7 +67,7 @@ struct ShareEstimate {
 }
 
 impl SlopeInformation {
-    /// Computes the slopes' effect; `None` where the information is not positive.
+    /// Computes the slopes' effect; `None` if the information is not positive.
     #[must_use]
     pub fn effect(&self) -> Option<SlopeEffect> {
         let by_slopes = &self.inverse * &self.cross;

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::units::{Conversion, Dimensions, Unit, UnitProduct, name_of};
 
-/// Most characters of a formula.
+/// Largest number of characters of a formula.
 const LONGEST: usize = 500;
 
 /// Deepest nesting of parentheses and signs.
@@ -120,7 +120,7 @@ impl Formula {
     }
 }
 
-/// Most different columns of a formula.
+/// Largest number of different columns of a formula.
 const MOST_OPERANDS: usize = 16;
 
 impl Node {

@@ -14,7 +14,7 @@ pub use formula::Formula;
 pub use record::{Mark, Record};
 pub use stand_in::StandIn;
 
-/// `true` where an id is a flight's own or that of one of its stretches.
+/// `true` if an id is a flight's own or that of one of its stretches.
 #[must_use]
 pub fn is_stretch(id: &str, flight_id: &str) -> bool {
     let rest = id.strip_prefix(flight_id);

@@ -85,7 +85,7 @@ pub struct Record {
     pub signals: BTreeMap<String, Series>,
 }
 
-/// Fewest samples beyond either end of a part: as far as an interpolation reaches.
+/// Least number of samples beyond either end of a part: as far as an interpolation reaches.
 const MARGIN: usize = 10;
 
 /// Shortest time beyond either end of a part: as far as a numerical slope reaches.

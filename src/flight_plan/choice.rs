@@ -28,7 +28,7 @@ const LEAST_WORTH: f64 = 1e-6;
 /// change no decision.
 const LEAST_IMPROVEMENT: f64 = 1e-4;
 
-/// Most rounds of exchanges: the search then ends with the set it has.
+/// Largest number of rounds of exchanges: the search then ends with the set it has.
 const MOST_ROUNDS: usize = 20;
 
 /// Quantity whose standard deviation is to be lowered.
@@ -81,7 +81,7 @@ pub struct Budget {
     pub minutes: f64,
     /// Time to change the angle of attack by one degree. Cards are flown by ascending angle.
     pub minutes_per_deg: f64,
-    /// Most times that one card is flown.
+    /// Largest number of times that one card is flown.
     pub repeats: usize,
 }
 

@@ -68,14 +68,14 @@ pub fn check_reached(file: Option<&Path>, goals: &[Goal], basis: &GoalBasis) -> 
     Err(Source::read(file.to_owned())?.error(name, what))
 }
 
-/// Reason why a derivative cannot be a goal; `None` where it can.
+/// Reason why a derivative cannot be a goal; `None` if it can.
 fn unknown_derivative(name: &str, model: &Model) -> Option<String> {
     let near = || did_you_mean(name, model.quantities());
     let is_unknown = model.breakpoints_deg(name).is_none();
     is_unknown.then(|| format!("the posterior has no derivative `{name}`{}", near()))
 }
 
-/// Reason why the level of a quantity cannot be a goal; `None` where it can.
+/// Reason why the level of a quantity cannot be a goal; `None` if it can.
 fn unknown_level(airframe: Airframe, quantity: FlyingQuality, config: &Config) -> Option<String> {
     let Some(specification) = &config.qualities else {
         return Some(format!(
@@ -97,7 +97,7 @@ fn unknown_level(airframe: Airframe, quantity: FlyingQuality, config: &Config) -
     }
 }
 
-/// Reason why the match of a class cannot be a goal; `None` where it can.
+/// Reason why the match of a class cannot be a goal; `None` if it can.
 fn unknown_match(class: &str, model: Option<ModelSource>, config: &Config) -> Option<String> {
     if config.proof_of_match.is_none() {
         return Some(format!(

@@ -13,10 +13,10 @@ use crate::numerics::order_statistics::median;
 use crate::report::{angle, count, fixed, symbol, unit, well_formed};
 use crate::tables::{FlyingQuality, GoalKind, NextCardRow, NextGoalRow};
 
-/// Most goals on the sheet: those that gain most.
+/// Largest number of goals on the sheet: those that gain most.
 const MOST_GOALS: usize = 14;
 
-/// Most refused cards on the sheet; the table has all.
+/// Largest number of refused cards on the sheet; the table has all.
 const MOST_REFUSED: usize = 4;
 
 /// Values of the template.

@@ -50,7 +50,7 @@ pub struct Assessment {
     pub signature: Signature,
 }
 
-/// Reads signals of a record over a range of its samples; `None` where they cannot be read.
+/// Reads signals of a record over a range of its samples; `None` if they cannot be read.
 type RecordReader<'a> = dyn Fn(&BTreeSet<String>, Range<usize>) -> Option<Record> + 'a;
 
 /// Assesses a stretch from its conditioned channels. `read` reads signals of its record over a

@@ -63,7 +63,7 @@ impl<S: ColumnSource + ?Sized> ColumnSource for ComputedColumns<'_, S> {
         self.source.rows(file)
     }
 
-    /// `true` where the file has the column, or every column of its formula.
+    /// `true` if the file has the column, or every column of its formula.
     fn has(&self, file: usize, column: &str) -> bool {
         match self.formulas.get(column) {
             None => self.source.has(file, column),

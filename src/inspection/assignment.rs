@@ -45,7 +45,7 @@ const KINDS: [&[&str]; 6] = [
     &["deg", "deg/s"],
     &["rad", "rad/s"],
 ];
-/// Most rounds of descent.
+/// Largest number of rounds of descent.
 const ROUNDS: usize = 60;
 
 /// A column that may be a quantity.
@@ -363,7 +363,7 @@ impl Search<'_> {
             .collect()
     }
 
-    /// Gives each quantity in turn its best choice; `true` where one changed.
+    /// Gives each quantity in turn its best choice; `true` if one changed.
     fn improve_single(&self, assignment: &mut Assignment) -> bool {
         let mut changed = false;
         for quantity in Quantity::ALL
@@ -430,7 +430,7 @@ impl Search<'_> {
         trial
     }
 
-    /// Changes unit or sign of two quantities at once; `true` where that improved.
+    /// Changes unit or sign of two quantities at once; `true` if that improved.
     fn improve_pairs(&self, assignment: &mut Assignment) -> bool {
         for (n, first) in Quantity::ALL.into_iter().enumerate() {
             for second in Quantity::ALL.into_iter().skip(n + 1) {
@@ -447,7 +447,8 @@ impl Search<'_> {
         false
     }
 
-    /// Exchanges the columns of two quantities of one kind, such as two rates; `true` where that improved.
+    /// Exchanges the columns of two quantities of one kind, such as two rates; `true` if that
+    /// improved.
     fn improve_axes(&self, assignment: &mut Assignment) -> bool {
         for (first, own) in assignment.clone() {
             let akin = first.akin().iter().filter(|second| **second > first);
@@ -521,7 +522,7 @@ impl Search<'_> {
         })
     }
 
-    /// `true` where the range of a quantity's column allows both signs.
+    /// `true` if the range of a quantity's column allows both signs.
     fn has_either_sign(&self, quantity: Quantity, choice: &Choice) -> bool {
         let candidates = self.candidates.get(&quantity).into_iter().flatten();
         let mut own = candidates.filter(|c| c.column == choice.column);

@@ -146,7 +146,7 @@ fn margin(search: &Search, assignment: &Assignment, quantity: Quantity) -> f64 {
     pairs.fold(least, f64::min)
 }
 
-/// `true` where two assignments differ in the signs of all lateral quantities and in nothing else.
+/// `true` if two assignments differ in the signs of all lateral quantities and in nothing else.
 fn is_mirror_image(trial: &Assignment, assignment: &Assignment) -> bool {
     trial.iter().all(|(quantity, choice)| {
         let own = assignment.get(quantity);
@@ -163,7 +163,7 @@ fn is_mirror_image(trial: &Assignment, assignment: &Assignment) -> bool {
     })
 }
 
-/// `true` where usual signs outnumber reversed ones among the lateral quantities.
+/// `true` if usual signs outnumber reversed ones among the lateral quantities.
 fn has_usual_side(assignment: &Assignment) -> bool {
     let signs = || {
         Quantity::LATERAL

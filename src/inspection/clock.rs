@@ -21,7 +21,7 @@ pub struct ClockColumn {
     pub unit: Unit,
     /// Median step between rows, s.
     pub step_s: f64,
-    /// `true` where name and unit leave no doubt.
+    /// `true` if name and unit leave no doubt.
     pub is_sure: bool,
     pub evidence: String,
 }

@@ -82,7 +82,7 @@ impl Equation {
         }
     }
 
-    /// `true` where the equation contains the quantity.
+    /// `true` if the equation contains the quantity.
     #[must_use]
     pub fn contains(self, quantity: Quantity) -> bool {
         let (needed, others) = self.quantities();
@@ -150,12 +150,12 @@ impl Equation {
         }
     }
 
-    /// `true` where the change is of an angle that wraps around.
+    /// `true` if the change is of an angle that wraps around.
     fn is_angle(self) -> bool {
         matches!(self, Equation::RollAttitude | Equation::Heading)
     }
 
-    /// `true` where values are compared, not changes.
+    /// `true` if values are compared, not changes.
     fn is_level(self) -> bool {
         matches!(self, Equation::DynamicPressure | Equation::SoundSpeed)
     }
@@ -227,7 +227,7 @@ const LEAST_RATIO: f64 = 1e-4;
 /// Least number of intervals that decide.
 const FEWEST_INTERVALS: usize = 5;
 
-/// Misfit of an equation over all stretches of a uniform step; `None` where a needed quantity is
+/// Misfit of an equation over all stretches of a uniform step; `None` if a needed quantity is
 /// missing or too few intervals have all of them.
 pub fn misfit<'a>(
     equation: Equation,

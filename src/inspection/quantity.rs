@@ -114,7 +114,7 @@ impl Quantity {
         }
     }
 
-    /// `true` where recorders differ in the sign.
+    /// `true` if recorders differ in the sign.
     #[must_use]
     pub fn is_signed(self) -> bool {
         !matches!(self, Quantity::Velocity | Quantity::Mach | Quantity::Qbar)

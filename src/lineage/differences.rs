@@ -29,8 +29,8 @@ pub struct Cause {
     pub words: String,
 }
 
-/// Most differences of one part of the configuration that are listed, so that a report stays
-/// readable.
+/// Largest number of differences of one part of the configuration that are listed, so that a report
+/// stays readable.
 const MOST_DIFFERENCES: usize = 5;
 
 /// Longest value that is quoted whole, characters.

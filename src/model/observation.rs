@@ -48,7 +48,7 @@ struct Row {
 }
 
 impl Evidence<'_> {
-    /// Evidence about a coefficient's terms; `None` where the maneuver estimates none of them.
+    /// Evidence about a coefficient's terms; `None` if the maneuver estimates none of them.
     #[must_use]
     pub fn about(&self, terms: &[Term], tunnel: &WindTunnel) -> Option<Observation> {
         let condition = self.maneuver.condition(tunnel);

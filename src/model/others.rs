@@ -23,7 +23,7 @@ struct OwnRows<'a> {
 }
 
 impl<'a> Others<'a> {
-    /// Posterior of all flights but one. `None` where a covariance is not positive definite.
+    /// Posterior of all flights but one. `None` if a covariance is not positive definite.
     #[must_use]
     pub fn new(
         whole: &'a Gaussian,

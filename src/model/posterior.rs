@@ -41,7 +41,7 @@ pub struct Solved<'a> {
 }
 
 impl<'a> Solved<'a> {
-    /// Posterior; `None` where the data are not finite.
+    /// Posterior; `None` if the data are not finite.
     #[must_use]
     pub fn new(root: &'a BlockRoot, information: &Information) -> Option<Solved<'a>> {
         let lower = inner_root(root.right(&root.left(&information.matrix)))?;
@@ -83,7 +83,7 @@ pub fn inner_root(mut inner: DMatrix<f64>) -> Option<DMatrix<f64>> {
     cholesky(inner)
 }
 
-/// Gaussian with a prior covariance R Rᵀ. `None` where the data are not finite.
+/// Gaussian with a prior covariance R Rᵀ. `None` if the data are not finite.
 #[must_use]
 pub fn gaussian(root: &BlockRoot, information: &Information) -> Option<Gaussian> {
     let covariance = Solved::new(root, information)?.covariance();

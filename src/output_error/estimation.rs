@@ -9,7 +9,7 @@ use super::likelihood::outcome::{Fit, Outcome};
 use crate::dynamics::OUTPUTS;
 pub use crate::tables::Weights;
 
-/// Most rounds of re-estimating the weights.
+/// Largest number of rounds of re-estimating the weights.
 const WEIGHT_ROUNDS: usize = 20;
 /// Relative change of all weights below which they have settled.
 const WEIGHTS_SETTLED: f64 = 1e-3;

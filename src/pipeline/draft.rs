@@ -9,9 +9,9 @@ use crate::report::recording_page;
 use crate::store::archive::{self, FlightFiles};
 use crate::store::{atomic, files, recording};
 
-/// Most rows that are read of a file: half an hour at 200 Hz.
+/// Largest number of rows that are read of a file: half an hour at 200 Hz.
 const MOST_ROWS: usize = 360_000;
-/// Most files that are read: one maneuver a file, or a day's flights.
+/// Largest number of files that are read: one maneuver a file, or a day's flights.
 const MOST_FILES: usize = 24;
 
 /// Draft that was written.

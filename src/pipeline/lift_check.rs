@@ -13,7 +13,7 @@ use crate::ingest::LiftPoint;
 /// the ratio at some angles by a third.
 const FACTOR: f64 = 1.6;
 
-/// Fewest angles of attack for a verdict.
+/// Least number of angles of attack for a verdict.
 const FEWEST_ANGLES: usize = 2;
 
 /// Adds a problem for each flight whose normal force is a multiple or a fraction of the tunnel's at

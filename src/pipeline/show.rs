@@ -18,8 +18,8 @@ use crate::report::strip_chart::{self, FlightView, ManeuverView, SignalGroups};
 use crate::store::atomic;
 use crate::surfaces::DelayCorrection;
 
-/// Most samples of a flight that are drawn. Of a longer flight only the smallest and the largest of
-/// several samples are drawn, since a chart has far fewer columns.
+/// Largest number of samples of a flight that are drawn. Of a longer flight only the smallest and
+/// the largest of several samples are drawn, since a chart has far fewer columns.
 const DRAWN_SAMPLES: usize = 1 << 18;
 
 /// Time of the record drawn before and after a maneuver, s.

@@ -267,7 +267,7 @@ impl<'a> AboutTrim<'a> {
         }
     }
 
-    /// True where the coefficients depend on the rate of the angle of attack.
+    /// True if the coefficients depend on the rate of the angle of attack.
     #[must_use]
     pub fn have_lag(&self) -> bool {
         self.has_lag

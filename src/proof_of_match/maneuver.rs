@@ -56,7 +56,7 @@ pub struct Flown<'a> {
 pub struct Matched {
     pub rows: Vec<MatchRow>,
     pub verdicts: Vec<MatchVerdictRow>,
-    /// Judged quantities measured and computed; `None` where the maneuver was not flown again.
+    /// Judged quantities measured and computed; `None` if the maneuver was not flown again.
     pub history: Option<History>,
 }
 

@@ -12,7 +12,7 @@ use crate::numerics::differences;
 use crate::numerics::order_statistics::median;
 use crate::rigid_body::{Loading, Mass};
 
-/// Fewest samples of a maneuver that can be flown again.
+/// Least number of samples of a maneuver that can be flown again.
 const FEWEST_SAMPLES: usize = 20;
 
 /// Least time over which the trim is matched, s: half a second at 40 Hz gives a rate's slope to a

@@ -54,7 +54,7 @@ pub struct AxisAnalysis {
 }
 
 impl AxisAnalysis {
-    /// Analyses linear equations over a posterior; `None` where it is not finite.
+    /// Analyses linear equations over a posterior; `None` if it is not finite.
     #[must_use]
     pub fn of(
         axis: Axis,
@@ -152,7 +152,7 @@ pub struct Uncertainty {
 }
 
 impl Analysis {
-    /// Analyses an airframe in steady flight; `None` where the posterior is not finite.
+    /// Analyses an airframe in steady flight; `None` if the posterior is not finite.
     #[must_use]
     pub fn of(basis: &JudgedAircraft, airframe: Airframe, trim: &Trim) -> Option<Analysis> {
         let specification = basis.specification;

@@ -57,7 +57,7 @@ pub struct QuantityAtMean {
     pub limits: Vec<f64>,
 }
 
-/// Quantity at the mean of a posterior; `None` where it does not exist or is not finite.
+/// Quantity at the mean of a posterior; `None` if it does not exist or is not finite.
 pub fn at_mean(
     axis: Axis,
     linear: &LinearModel,

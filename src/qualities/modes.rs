@@ -10,7 +10,7 @@ use super::linear::{Matrix, STATES};
 use crate::aero::Axis;
 use crate::numerics::dual::Dual;
 
-/// Most iterations of the eigenvalue solver.
+/// Largest number of iterations of the eigenvalue solver.
 const MOST_ITERATIONS: usize = 500;
 
 /// Imaginary part over magnitude below which a root is real.

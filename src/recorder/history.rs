@@ -10,10 +10,10 @@ use super::error_series::{ErrorSample, ErrorSeries};
 use crate::numerics::random_effects::{Observation, RandomEffects};
 use crate::numerics::student;
 
-/// Fewest flights on either side of a step.
+/// Least number of flights on either side of a step.
 const FEWEST_BESIDE: usize = 2;
 
-/// Fewest flights with a history.
+/// Least number of flights with a history.
 const FEWEST_FLIGHTS: usize = 6;
 
 /// Kind of an error's change.

@@ -8,7 +8,7 @@ use crate::error::{Problem, ProblemStage};
 use crate::flight::Record;
 use crate::maneuver::{Class, Unknown};
 
-/// Fewest maneuvers that contradict a constant flag before it counts as stuck: one may be
+/// Least number of maneuvers that contradict a constant flag before it counts as stuck: one may be
 /// misclassified.
 const FEWEST_CONTRADICTIONS: usize = 2;
 

@@ -30,7 +30,7 @@ const AT_FULL_RATE: f64 = 0.9;
 /// but long enough that gyro noise contributes little to the acceleration.
 const HALF_SPAN_S: f64 = 0.1;
 
-/// Fewest samples of a mean square about a line: two determine the line.
+/// Least number of samples of a mean square about a line: two determine the line.
 const FEWEST_SAMPLES: f64 = 3.0;
 
 /// Measures the quality of a maneuver and judges it by the limits.

@@ -122,7 +122,7 @@ impl ArtefactName {
     }
 }
 
-/// Most bytes of an item in a name: file systems allow 255 for a whole name.
+/// Largest number of bytes of an item in a name: file systems allow 255 for a whole name.
 const LONGEST_ITEM: usize = 160;
 
 /// An item's name; a long one is cut and ends in a hash of the whole.

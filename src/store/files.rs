@@ -29,7 +29,7 @@ pub fn text(path: &Path) -> Result<String> {
 /// Largest file that is read whole, bytes: a tunnel database of a million rows has a quarter of it.
 const LARGEST: u64 = 1 << 28;
 
-/// Most rows of a table that an analyst wrote: more than any tunnel's.
+/// Largest number of rows of a table that an analyst wrote: more than any tunnel's.
 const MOST_ROWS: usize = 1_000_000;
 
 /// Reads a file whole.

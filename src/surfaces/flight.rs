@@ -6,7 +6,7 @@ use super::maneuver_data::{AircraftModel, ManeuverData};
 use crate::flight::Record;
 use crate::maneuver::Maneuver;
 
-/// Most steps of a flight's delays; the fit usually settles after three.
+/// Largest number of steps of a flight's delays; the fit usually settles after three.
 const STEPS: usize = 6;
 
 /// Largest change of a delay at which the fit is settled, s.

@@ -26,7 +26,7 @@ const OF_RATE: f64 = 0.125;
 /// Share of the samples at either end over which the taper rises.
 const TAPERED: f64 = 0.1;
 
-/// Fewest frequencies of a fit: about twice the number of regressors.
+/// Least number of frequencies of a fit: about twice the number of regressors.
 const FEWEST: usize = 20;
 
 /// Band of frequencies of series of one length.

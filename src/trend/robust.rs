@@ -15,7 +15,8 @@ use nalgebra::{DMatrix, DVector};
 use super::scatter::{HUBER, total_variances};
 use crate::numerics::symmetric;
 
-/// Most steps of the iteration between coefficients, τ² and Huber's weights; about ten suffice.
+/// Largest number of steps of the iteration between coefficients, τ² and Huber's weights; about ten
+/// suffice.
 const MOST_STEPS: usize = 100;
 /// Change by a step below which the iteration has settled: of the trend over the smallest standard deviation,
 /// and of each variance over itself.

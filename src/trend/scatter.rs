@@ -12,7 +12,8 @@ pub(super) const HUBER: f64 = 1.5;
 pub(super) const HUBER_VARIANCE: f64 = 0.778_465;
 /// Least bound, as a share of the median bound: bounds are uncertain by a factor of a few.
 const BOUND_FLOOR: f64 = 0.25;
-/// Fewest maneuvers of a class with a scatter of its own; classes with fewer share that of all.
+/// Least number of maneuvers of a class with a scatter of its own; classes with fewer share that of
+/// all.
 const OWN_SCATTER: usize = 8;
 
 /// Bounds squared, none smaller than the floor.

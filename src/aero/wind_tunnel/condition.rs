@@ -5,6 +5,6 @@
 pub struct Condition {
     pub alpha_deg: f64,
     pub mach: f64,
-    /// Third variable; `None` where unknown, and [`super::Third::at`] is used.
+    /// Third variable; `None` if unknown, and [`super::Third::at`] is used.
     pub third: Option<f64>,
 }

@@ -49,7 +49,7 @@ pub struct TableReader<'a> {
 }
 
 impl TableReader<'_> {
-    /// Value at a flight condition; `None` where extrapolation is needed and refused.
+    /// Value at a flight condition; `None` if extrapolation is needed and refused.
     #[must_use]
     pub fn at(&self, condition: &Condition) -> Option<TunnelValue> {
         let (tunnel, blocks) = (self.tunnel, &self.blocks);

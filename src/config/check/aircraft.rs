@@ -123,7 +123,7 @@ fn mistake(column: &str, channel: &Channel) -> Option<String> {
         .then(|| format!("channel `{column}`: scale must be greater than zero; a sign is `sign`"))
 }
 
-/// `true` where a signal of the channel map is probably this required one, misspelt.
+/// `true` if a signal of the channel map is probably this required one, misspelt.
 fn is_misspelt(required: &str, signals: &[&str]) -> bool {
     let mut others = signals
         .iter()

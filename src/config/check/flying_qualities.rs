@@ -5,10 +5,10 @@ use crate::config::source::{Files, Source};
 use crate::error::{Result, did_you_mean};
 use crate::qualities::{FEEDBACK_STATES, LevelLimit, Range, Specification};
 
-/// Fewest draws that give a probability to a per cent or two.
+/// Least number of draws that give a probability to a per cent or two.
 const LEAST_DRAWS: usize = 100;
 
-/// Most draws: each takes the roots of two matrices at each angle of attack.
+/// Largest number of draws: each takes the roots of two matrices at each angle of attack.
 const MOST_DRAWS: usize = 1_000_000;
 
 /// Checks the specification of a pipeline that has one.

@@ -10,10 +10,10 @@ use crate::tables::ModelSource;
 /// Longest time over which initial state and trim may be matched, s: more would be a fit.
 const LONGEST_TRIM_S: f64 = 5.0;
 
-/// Fewest draws that give a probability to some per cent.
+/// Least number of draws that give a probability to some per cent.
 const LEAST_DRAWS: usize = 20;
 
-/// Most draws: each takes some tens of thousands of multiplications a maneuver.
+/// Largest number of draws: each takes some tens of thousands of multiplications a maneuver.
 const MOST_DRAWS: usize = 100_000;
 
 /// Checks the proof of match of a pipeline that has one.

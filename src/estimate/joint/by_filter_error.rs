@@ -20,7 +20,7 @@ pub struct OwnEstimate<'m, 'a, const NX: usize, E: Equations<NX>> {
     wide: Case<NX, E>,
     fit: Fit,
     noise: Noise,
-    /// −log of the likelihood by filter error; `None` where a maneuver alone does not determine its
+    /// −log of the likelihood by filter error; `None` if a maneuver alone does not determine its
     /// derivatives, or flew in still air.
     pub cost: Option<f64>,
     pub air_is_still: bool,

@@ -120,7 +120,7 @@ impl<'r> Request<'r> {
         }
     }
 
-    /// Estimates by filter error; `None` where no maneuver shows that the air moves.
+    /// Estimates by filter error; `None` if no maneuver shows that the air moves.
     fn by_filter_error<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
         &self,
         members: &[Member<'r, NX, E>],

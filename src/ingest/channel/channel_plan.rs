@@ -15,7 +15,7 @@ use crate::units::{Conversion, Unit};
 /// Relative difference below which two factors are the same unit: rounding of the factors.
 const SAME_FACTOR: f64 = 1e-12;
 
-/// Most stuck intervals of a channel that a message names by their times.
+/// Largest number of stuck intervals of a channel that a message names by their times.
 const NAMED_INTERVALS: usize = 3;
 
 /// A channel that the files have, with the conversion of its values into the signal's unit.
@@ -196,7 +196,7 @@ pub fn empty_channel(name: &str, channel: &Channel, rows: usize) -> Refusal {
     Refusal::of_channel(name, reason)
 }
 
-/// Report of the intervals in which a channel is stuck; `None` where it never is.
+/// Report of the intervals in which a channel is stuck; `None` if it never is.
 pub fn stuck_channel(name: &str, statistics: &ChannelStatistics, clock: &Clock) -> Option<Refusal> {
     if statistics.stuck.is_empty() {
         return None;

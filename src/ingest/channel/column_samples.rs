@@ -23,7 +23,7 @@ pub struct ColumnSamples<'a, S: ColumnSource + ?Sized> {
 }
 
 impl<S: ColumnSource + ?Sized> ColumnSamples<'_, S> {
-    /// `true` where a file of the clock has the column.
+    /// `true` if a file of the clock has the column.
     pub fn is_on(&self, clock: &Clock) -> bool {
         let mut runs = clock.runs.iter();
         runs.any(|run| self.source.has(run.file, self.name))
@@ -93,7 +93,7 @@ struct RunGroup {
 }
 
 impl RunGroup {
-    /// `true` where a later run begins soon enough after the group's rows.
+    /// `true` if a later run begins soon enough after the group's rows.
     fn reaches(&self, run: &Run) -> bool {
         let gap = run.row.checked_sub(self.rows.end);
         self.file == run.file && gap.is_some_and(|rows| rows < SEPARATE_ROWS)

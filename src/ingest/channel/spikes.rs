@@ -20,7 +20,7 @@ const MEAN_VARIANCE: f64 = 1.5;
 /// Relative difference below which a sample is its neighbours' mean: rounding of the arithmetic.
 const SAME_VALUE: f64 = 1e-12;
 
-/// Fewest samples off their neighbours' mean from which the rounding is inferred.
+/// Least number of samples off their neighbours' mean from which the rounding is inferred.
 const LEAST_ROUNDED: usize = 20;
 
 /// Quantile of the deviations that equals the rounding: low, but above the few samples that a
@@ -103,13 +103,13 @@ pub fn remove(
     spikes
 }
 
-/// `true` where the second of three samples is off the mean of the others by more than a level. False
+/// `true` if the second of three samples is off the mean of the others by more than a level. False
 /// beside a gap.
 fn is_candidate(three: &[f64], level: f64) -> bool {
     (three[1] - 0.5 * (three[0] + three[2])).abs() > level
 }
 
-/// `true` where some sample between the first and the last is a candidate.
+/// `true` if some sample between the first and the last is a candidate.
 fn has_candidate(values: &[f64], level: f64) -> bool {
     Arch::new().dispatch(|| {
         let threes = values.windows(3);

@@ -12,14 +12,14 @@ const SHORTEST_PERIOD: usize = 2;
 /// Longest period of a channel with nulls between its values: 1 Hz in a record at 200 Hz.
 const LONGEST_BETWEEN_NULLS: usize = 200;
 
-/// Fewest distances from which a period is inferred where all of them agree.
+/// Least number of distances from which a period is inferred where all of them agree.
 const FEW_DISTANCES: usize = 4;
 
 /// Share of the distances between recorded samples, or of the changes of a held value, that must
 /// fit a period: frames are lost and clocks slip now and then.
 const FITTING_SHARE: f64 = 0.95;
 
-/// Fewest changes of value, or distances, from which a period is inferred.
+/// Least number of changes of value, or distances, from which a period is inferred.
 pub const LEAST_CHANGES: usize = 20;
 
 /// Least share of its chances, as one in so many, at which a held channel changes. One that changes
@@ -44,7 +44,7 @@ impl UpdateRate {
     };
 
     /// Infers the rate of a channel from its samples, the first of which is sample `first` of the
-    /// record. `None` where there are too few values or changes.
+    /// record. `None` if there are too few values or changes.
     pub fn infer(values: &[f64], first: usize) -> Option<UpdateRate> {
         let finite = values.iter().filter(|v| v.is_finite()).count();
         if finite < LEAST_CHANGES {

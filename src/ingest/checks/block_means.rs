@@ -51,7 +51,7 @@ pub struct BlockAverager {
 }
 
 impl BlockAverager {
-    /// Averager of a signal; `None` where no relation uses it.
+    /// Averager of a signal; `None` if no relation uses it.
     #[must_use]
     pub fn of(signal: &str, step_s: f64, settings: &Checks) -> Option<BlockAverager> {
         USED.contains(&signal).then(|| BlockAverager {

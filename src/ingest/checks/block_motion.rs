@@ -42,7 +42,7 @@ pub struct BlockMotion {
 }
 
 impl BlockMotion {
-    /// Motion in a block; `None` where the aircraft is not flying.
+    /// Motion in a block; `None` if the aircraft is not flying.
     pub fn of(
         blocks: &BlockMeans,
         block: usize,

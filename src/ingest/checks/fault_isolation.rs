@@ -43,7 +43,7 @@ pub struct FaultyChannel {
 }
 
 impl FaultyChannel {
-    /// `true` where this channel alone explains the failed relations and a factor corrects it.
+    /// `true` if this channel alone explains the failed relations and a factor corrects it.
     pub fn is_correctable(&self) -> bool {
         self.is_unique && self.factor.is_some()
     }
@@ -67,7 +67,7 @@ impl FaultyChannel {
 pub struct FaultReport {
     pub place: String,
     pub reason: String,
-    /// `true` where a faulty channel is one that the equations of motion need.
+    /// `true` if a faulty channel is one that the equations of motion need.
     pub required: bool,
 }
 
@@ -358,7 +358,7 @@ fn equally_good(best: &Trial, trials: &[Trial]) -> Vec<FaultyChannel> {
         .collect()
 }
 
-/// Reports the failed checks and the faulty channels in words; `None` where there are neither.
+/// Reports the failed checks and the faulty channels in words; `None` if there are neither.
 pub fn report(faulty: &[FaultyChannel], checks: &[Check]) -> Option<FaultReport> {
     let failures: Vec<String> = failed(checks).map(describe).collect();
     if failures.is_empty() && faulty.is_empty() {

@@ -50,7 +50,7 @@ pub struct AxisGusts {
     pub rms_ft_s: Option<f64>,
 }
 
-/// Gusts of a flight along the body axes; `None` where the record is too short.
+/// Gusts of a flight along the body axes; `None` if the record is too short.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Gusts(pub [Option<AxisGusts>; BODY_AXES]);
 

@@ -41,14 +41,14 @@ const LIFT_PER_SIN_ALPHA: std::ops::Range<f64> = 0.6..24.0;
 /// Geometric mean of the range for aircraft in maneuvers.
 const TYPICAL_LIFT: f64 = 4.0;
 
-/// Fewest blocks from which the mass is checked: ten seconds of a usual setting.
+/// Least number of blocks from which the mass is checked: ten seconds of a usual setting.
 const FEWEST_BLOCKS: usize = 50;
 
 /// Width of the bins of angle of attack in which lift is averaged, deg: half the usual distance of
 /// test points.
 const BIN_DEG: f64 = 2.5;
 
-/// Fewest blocks of a bin: two seconds of a usual setting.
+/// Least number of blocks of a bin: two seconds of a usual setting.
 const FEWEST_IN_BIN: usize = 10;
 
 /// Normal force coefficient of a flight at an angle of attack, from mass and normal acceleration.

@@ -61,7 +61,7 @@ pub fn relation_pairs(
     pairs
 }
 
-/// Both sides of a relation over the blocks of a window; `None` where one is not defined.
+/// Both sides of a relation over the blocks of a window; `None` if one is not defined.
 fn pair(
     relation: &Relation,
     window: usize,
@@ -77,7 +77,7 @@ fn pair(
 }
 
 /// A side over a window of blocks, per second: the change of its state plus the trapezoidal
-/// integral of its rate. `None` where it is not finite.
+/// integral of its rate. `None` if it is not finite.
 ///
 /// The mean over a block smooths states and rates alike, so the two stay consistent.
 fn mean_rate(side: &Side, window: &[&BlockMotion], block_s: f64) -> Option<f64> {

@@ -16,7 +16,7 @@ pub struct PiecePart {
 }
 
 impl PiecePart {
-    /// `true` where a part holds later rows of the same file.
+    /// `true` if a part holds later rows of the same file.
     pub fn is_before(&self, later: &PiecePart) -> bool {
         self.piece.file == later.piece.file && self.piece.end_row() <= later.piece.row
     }
@@ -58,7 +58,7 @@ const MOST_COMPARISONS: usize = 512;
 /// Share of a step by which a row must be later than the end of a sequence to be a new row.
 const LATER: f64 = 0.5;
 
-/// Compares the rows of two pieces whose times overlap; `true` where they are the same rows.
+/// Compares the rows of two pieces whose times overlap; `true` if they are the same rows.
 type CompareRows<'a> = dyn FnMut(&Piece, &Piece) -> Result<bool, String> + 'a;
 
 /// Puts the pieces of files that hold the same channels in order. `file_name` names a file.
@@ -202,7 +202,7 @@ impl Merger<'_, '_> {
         Ok(None)
     }
 
-    /// `true` where a sequence holds rows of this piece.
+    /// `true` if a sequence holds rows of this piece.
     fn holds_rows_of(&mut self, index: usize, piece: &Piece) -> Result<bool, String> {
         let sequence = self.merged.sequences.get(index);
         let parts = sequence.iter().flat_map(|sequence| &sequence.parts);
@@ -228,7 +228,7 @@ impl PieceSequence {
         self.end_s - self.start_s
     }
 
-    /// `true` where its last rows are of this file.
+    /// `true` if its last rows are of this file.
     fn ends_in(&self, file: usize) -> bool {
         self.parts
             .last()

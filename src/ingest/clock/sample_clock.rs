@@ -169,7 +169,7 @@ impl ClockBuilder {
 }
 
 impl Run {
-    /// `true` where the run goes on with this row of a file as this sample.
+    /// `true` if the run goes on with this row of a file as this sample.
     fn continues_with(&self, file: usize, row: usize, sample: usize) -> bool {
         self.file == file && self.row + self.count == row && self.sample + self.count == sample
     }
@@ -182,8 +182,8 @@ impl Clock {
         self.start_s + sample as f64 * self.step_s
     }
 
-    /// `true` where another clock has a sample within some steps of this one's span, so that a
-    /// value on it can be interpolated to this clock.
+    /// `true` if another clock has a sample within some steps of this one's span, so that a value
+    /// on it can be interpolated to this clock.
     pub(super) fn is_near(&self, other: &Clock) -> bool {
         let margin_s = NEAR_STEPS * self.step_s.max(other.step_s);
         let end_s = |clock: &Clock| clock.time_s(clock.samples) + margin_s;

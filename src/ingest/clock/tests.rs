@@ -106,7 +106,7 @@ impl ColumnSource for Counted {
 /// Most readings of a survey, whatever the clock.
 const MOST_READINGS: usize = 10_000;
 
-/// Most rows that a survey reads, per row and binary logarithm of the rows.
+/// Largest number of rows that a survey reads, per row and binary logarithm of the rows.
 const MOST_ROWS: f64 = 64.0;
 
 fn clock(rows: usize) -> Vec<f64> {

@@ -60,7 +60,7 @@ pub struct ErrorEstimate {
     pub doubtful: bool,
     /// `true` at the limit of the search: the error is named, and never corrected.
     pub at_limit: bool,
-    /// `true` where the record is corrected by it.
+    /// `true` if the record is corrected by it.
     pub applied: bool,
 }
 
@@ -69,7 +69,7 @@ pub struct ErrorEstimate {
 pub struct InstrumentFinding {
     pub signal: &'static str,
     pub channel: String,
-    /// `false` where no window of the flight could be reconstructed.
+    /// `false` if no window of the flight could be reconstructed.
     pub examined: bool,
     pub estimates: [Option<ErrorEstimate>; KINDS],
     /// Mean airspeed of the windows.
@@ -116,13 +116,13 @@ impl Findings {
         Findings((0..INSTRUMENTS).filter_map(finding).collect())
     }
 
-    /// `true` where an instrument has a fault.
+    /// `true` if an instrument has a fault.
     #[must_use]
     pub fn has_fault(&self) -> bool {
         self.0.iter().any(|f| !f.faults().is_empty())
     }
 
-    /// `true` where an instrument that the equations of motion need has a fault.
+    /// `true` if an instrument that the equations of motion need has a fault.
     #[must_use]
     pub fn has_required_fault(&self) -> bool {
         self.0
@@ -280,7 +280,7 @@ fn instrument_error(kind: Kind) -> InstrumentError {
     }
 }
 
-/// Estimate of one parameter; `None` where the flight does not determine it.
+/// Estimate of one parameter; `None` if the flight does not determine it.
 fn estimate(
     errors: &FittedErrors,
     instrument: usize,

@@ -156,7 +156,7 @@ fn add_scaled(sums: &mut [f64], values: &[f64], factor: f64) {
 }
 
 /// Moves of the initial state that act like one standard deviation of each input's noise, block by
-/// block: Φ(t, 0)⁻¹ B(t) h σ √samples at the middle of a block. `None` where Φ is singular.
+/// block: Φ(t, 0)⁻¹ B(t) h σ √samples at the middle of a block. `None` if Φ is singular.
 fn moves_of_start(window: &Window, linearised: &LinearisedWindow) -> Option<Vec<DMatrix<f64>>> {
     let (length, spacing) = (block_length(window), window.samples_per_node());
     let slopes = &linearised.sensitivities;

@@ -41,7 +41,7 @@ const FREED: f64 = 4.0;
 /// Number of ordinary sizes below which no parameter is freed.
 const LEAST_FREED: f64 = 2.0;
 
-/// Most parameters that are freed, as faults are rare.
+/// Largest number of parameters that are freed, as faults are rare.
 const MOST_FREED: usize = 4;
 
 /// Prior of the first round, as a multiple of the least size of a fault, so that any fault is
@@ -68,7 +68,7 @@ pub struct FittedErrors {
     pub speed_ft_s: Option<f64>,
 }
 
-/// Fits the windows; `None` where too few of them can be integrated.
+/// Fits the windows; `None` if too few of them can be integrated.
 pub fn fit(
     windows: &[Window],
     aircraft: &Aircraft,

@@ -18,7 +18,7 @@ use crate::numerics::symmetric;
 /// that change anyway.
 const STEPS: usize = 2;
 
-/// Most halvings of a step that raises the cost; after them the step is dropped.
+/// Largest number of halvings of a step that raises the cost; after them the step is dropped.
 const HALVINGS: usize = 5;
 
 /// Rise of twice the cost that is ignored: that of a tenth of a standard deviation. A gradient of

@@ -66,7 +66,7 @@ pub fn place(instrument: usize, kind: Kind) -> usize {
     instrument * KINDS + kind as usize
 }
 
-/// `true` where the kinematic equations determine a parameter. They contain changes of altitude and
+/// `true` if the kinematic equations determine a parameter. They contain changes of altitude and
 /// heading only, and the heading's scale is that of a full turn.
 pub fn is_observable(instrument: usize, kind: Kind) -> bool {
     !matches!(

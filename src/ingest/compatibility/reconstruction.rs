@@ -73,7 +73,7 @@ struct CorrectedInputs {
     gains: Inputs,
 }
 
-/// Reconstructs the motion of a window. `None` where the integration diverges.
+/// Reconstructs the motion of a window. `None` if the integration diverges.
 pub fn reconstruct(
     window: &Window,
     aircraft: &Aircraft,
@@ -143,7 +143,7 @@ impl WithSimd for Integration<'_> {
 }
 
 impl Integration<'_> {
-    /// States at every point; `None` where they diverge.
+    /// States at every point; `None` if they diverge.
     #[inline(always)]
     fn states(&self) -> Option<Vec<State>> {
         let points = self.window.points();

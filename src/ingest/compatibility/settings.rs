@@ -54,7 +54,7 @@ settings! {
 }
 
 impl Compatibility {
-    /// `true` where an ordinary error corrects the record.
+    /// `true` if an ordinary error corrects the record.
     #[must_use]
     pub fn corrects(&self, error: InstrumentError, value: f64, bound: f64) -> bool {
         let action = match error {

@@ -99,7 +99,7 @@ struct LocalPrior {
 
 impl<'a> WindowFit<'a> {
     /// Begins at the measured state, with the outputs' ordinary biases as standard deviations.
-    /// `None` where the integration diverges or does not determine the state.
+    /// `None` if the integration diverges or does not determine the state.
     pub fn begin(
         window: &'a Window,
         context: &FitContext,
@@ -142,9 +142,9 @@ impl<'a> WindowFit<'a> {
         &self.information.shared
     }
 
-    /// The window at other shared parameters, its own following their step. `step` is the full
-    /// step of the shared parameters and `share` the part of it that is taken. `None` where the
-    /// integration diverges.
+    /// The window at other shared parameters, its own following their step. `step` is the full step
+    /// of the shared parameters and `share` the part of it that is taken. `None` if the integration
+    /// diverges.
     pub fn moved(
         &self,
         context: &FitContext,

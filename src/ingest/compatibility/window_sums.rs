@@ -252,7 +252,7 @@ pub struct ReducedInformation {
 }
 
 impl ReducedInformation {
-    /// Eliminates a window's own parameters. `None` where they are not determined.
+    /// Eliminates a window's own parameters. `None` if they are not determined.
     pub fn of(all: &DMatrix<f64>) -> Option<ReducedInformation> {
         let own = Cholesky::new(all.view((0, 0), (LOCAL, LOCAL)).into_owned())?;
         let cross = all.view((0, LOCAL), (LOCAL, PARAMETERS));

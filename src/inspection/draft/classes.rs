@@ -9,7 +9,7 @@ use crate::inspection::findings::Channel;
 use crate::inspection::inputs::{Acts, InputColumn};
 use crate::inspection::vocabulary::Input;
 
-/// Fewest steps of an input that make a maneuver: a doublet has three.
+/// Least number of steps of an input that make a maneuver: a doublet has three.
 const FEWEST_STEPS: usize = 3;
 /// Largest number of steps of an input that is not excited in a maneuver: two may be a trim and its
 /// return.

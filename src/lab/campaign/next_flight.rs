@@ -18,7 +18,7 @@ pub struct NextFlight {
     pub settle_s: f64,
     /// Time to change the angle of attack by one degree.
     pub change_s_per_deg: f64,
-    /// Most times that one card is flown.
+    /// Largest number of times that one card is flown.
     pub repeats: usize,
     pub limits: FlightLimits,
     /// Candidates in place of the flights' test points.

@@ -65,7 +65,7 @@ impl Aerodynamics {
         self.buildup.derivatives.iter().map(value).collect()
     }
 
-    /// True where the loads depend on the rate of the angle of attack.
+    /// True if the loads depend on the rate of the angle of attack.
     #[must_use]
     pub fn have_lag(&self) -> bool {
         self.buildup.lags().next().is_some()

@@ -100,7 +100,7 @@ impl StandardEstimate {
     }
 
     /// Standard errors that account for autocorrelated residuals and the noise of the surfaces;
-    /// `None` where the information matrix is singular.
+    /// `None` if the information matrix is singular.
     pub fn corrected(&mut self, standard: &StandardCase) -> Option<Vec<f64>> {
         let model = standard.model();
         self.case.noisy_inputs.surfaces = noisy_surfaces(&standard.aircraft, &self.window, &model);

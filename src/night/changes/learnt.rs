@@ -70,7 +70,7 @@ fn of(derivative: &str, before: &Night, now: &Night) -> Option<Learnt> {
     })
 }
 
-/// Divergence in nats; `None` where a covariance is not positive definite.
+/// Divergence in nats; `None` if a covariance is not positive definite.
 fn divergence(before: &Posterior, now: &Posterior) -> Option<f64> {
     let n = before.values.len();
     let root = Cholesky::new(before.covariance.clone())?;

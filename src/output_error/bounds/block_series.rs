@@ -16,7 +16,7 @@ use crate::output_error::case::blocks::{BlockSums, samples_per_block};
 /// Highest order of a process.
 pub(super) const HIGHEST_ORDER: usize = 12;
 const _: () = assert!(HIGHEST_ORDER <= LONGEST_LAG);
-/// Fewest blocks per coefficient of a process.
+/// Least number of blocks per coefficient of a process.
 const BLOCKS_PER_COEFFICIENT: usize = 10;
 
 /// One output of one maneuver in blocks of samples.

@@ -101,7 +101,7 @@ fn shifts<const NX: usize, E: Equations<NX>>(
 }
 
 impl<const NX: usize, E: Equations<NX>> Considered<'_, NX, E> {
-    /// Information matrix with the held derivatives free as well; `None` where the integration
+    /// Information matrix with the held derivatives free as well; `None` if the integration
     /// diverges.
     fn wide_information(&self, weights: &[f64; OUTPUTS]) -> Option<DMatrix<f64>> {
         let names = self.wide.names.iter();

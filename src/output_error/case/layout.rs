@@ -21,11 +21,11 @@ use super::build_up::Term;
 use crate::dynamics::COEFFICIENTS;
 use crate::numerics::simd::VECTOR;
 
-/// Most products of states that are regressors of an axis: with the states themselves they fit into one
-/// vector.
+/// Largest number of products of states that are regressors of an axis: with the states themselves
+/// they fit into one vector.
 pub const MOST_PRODUCTS: usize = VECTOR - MOST_STATES;
 
-/// Most states of an axis that regressors are proportional to.
+/// Largest number of states of an axis that regressors are proportional to.
 const MOST_STATES: usize = 3;
 
 /// Groups of lanes: one per coefficient, and the initial states.

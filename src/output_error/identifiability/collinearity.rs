@@ -49,7 +49,7 @@ pub struct CollinearGroup {
 pub struct Collinearity {
     /// Variance inflation of each parameter; `None` if it takes part in an undetermined direction.
     pub inflation: Vec<Option<f64>>,
-    /// Correlation of the estimates, from H⁻¹; `None` where H has no inverse.
+    /// Correlation of the estimates, from H⁻¹; `None` if H has no inverse.
     pub correlation: Option<DMatrix<f64>>,
     /// Largest condition index, `√(λ_max/λ_min)`; infinite where a direction is undetermined.
     pub largest_index: f64,
@@ -57,7 +57,7 @@ pub struct Collinearity {
     pub groups: Vec<CollinearGroup>,
 }
 
-/// Computes the collinearity of an information matrix; `None` where it is empty or not finite. A
+/// Computes the collinearity of an information matrix; `None` if it is empty or not finite. A
 /// parameter that is not excited (`H_jj = 0`) is in no group.
 #[must_use]
 pub fn collinearity(
@@ -170,7 +170,7 @@ impl Directions {
     }
 }
 
-/// Correlation of two histories; `None` where one of them is constant.
+/// Correlation of two histories; `None` if one of them is constant.
 #[must_use]
 pub fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
     let (da, db) = (about_mean(a), about_mean(b));

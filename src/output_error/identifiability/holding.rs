@@ -67,7 +67,7 @@ enum FreeSet {
 }
 
 impl HoldingCandidates {
-    /// Gathers the information on a case with all parameters free at `values`; `None` where its
+    /// Gathers the information on a case with all parameters free at `values`; `None` if its
     /// integration diverges.
     ///
     /// The noise is best taken from the fit that holds least. With more held, residuals contain

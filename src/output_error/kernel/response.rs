@@ -32,7 +32,7 @@ pub enum Detail {
 
 /// Step of a coarse response, s: it follows the airframe's motion well, but not the surfaces.
 pub const COARSE_STEP_S: f64 = 0.1;
-/// Fewest samples per parameter of a coarse response.
+/// Least number of samples per parameter of a coarse response.
 const SAMPLES_PER_PARAMETER: usize = 8;
 
 /// Slopes of every output along every parameter at every sample; zero where a sample does not count.

@@ -18,7 +18,7 @@ pub struct Estimate {
     pub covariance: DMatrix<f64>,
 }
 
-/// Weighted mean of `n` parameters; `None` where a parameter is in no estimate or a covariance has no
+/// Weighted mean of `n` parameters; `None` if a parameter is in no estimate or a covariance has no
 /// inverse.
 #[must_use]
 pub fn weighted(estimates: &[Estimate], n: usize) -> Option<DVector<f64>> {

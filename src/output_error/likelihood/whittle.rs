@@ -17,7 +17,7 @@ use crate::numerics::symmetric::raise_variances;
 const ROUNDS: usize = 3;
 /// Condition number of the scaled normal matrix beyond which a regression has no result.
 const MAX_CONDITION_NUMBER: f64 = 1e10;
-/// Fewest degrees of freedom of the residuals, as for Student's t.
+/// Least number of degrees of freedom of the residuals, as for Student's t.
 const FEWEST_FREE: f64 = 3.0;
 /// Smallest spectrum, relative to the response's: rounding errors of an exact fit.
 const ROUNDING: f64 = 1e-24;

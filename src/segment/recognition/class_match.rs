@@ -5,11 +5,11 @@ use super::patterns;
 use super::segment::Segment;
 use crate::maneuver::Class;
 
-/// Most steps of the pilot during a maneuver of the on-board system: a correction is one step and
-/// its return; more is flying.
+/// Largest number of steps of the pilot during a maneuver of the on-board system: a correction is
+/// one step and its return; more is flying.
 const CORRECTION_STEPS: usize = 2;
 
-/// True where every condition of a class holds in a segment.
+/// True if every condition of a class holds in a segment.
 pub(super) fn fits(segment: &Segment, class: &Class) -> bool {
     mismatches(segment, class).is_empty()
 }

@@ -14,12 +14,13 @@ use super::sequences::{SequenceStep, StepSequence};
 use crate::maneuver::Class;
 use crate::segment::steps::step::TRIM_SHARE;
 
-/// Most pauses within one maneuver: the limit keeps the time of the search linear in a flight's
-/// length. It is three times the number of steps of the longest maneuvers, so it excludes none.
+/// Largest number of pauses within one maneuver: the limit keeps the time of the search linear in a
+/// flight's length. It is three times the number of steps of the longest maneuvers, so it excludes
+/// none.
 const MOST_PAUSES: usize = 64;
 
-/// Most steps in a gap of the flag within a maneuver: one may be feedback. A flag with more steps in
-/// its gap is late or wrong, so the gap is not counted.
+/// Largest number of steps in a gap of the flag within a maneuver: one may be feedback. A flag with
+/// more steps in its gap is late or wrong, so the gap is not counted.
 const STEPS_IN_FLAG_GAP: usize = 1;
 
 /// A part of the best cut: a maneuver, or steps between maneuvers.

@@ -28,7 +28,7 @@ pub(in crate::segment) struct Detections<'a> {
     /// True if one of the pilot's controls is recorded. Otherwise the pilot's inputs cannot be
     /// separated from the system's.
     pub pilot_is_recorded: bool,
-    /// True where the excitation flag is recorded and not stuck.
+    /// True if the excitation flag is recorded and not stuck.
     flag_varies: bool,
     /// Times during which a varying flag is down between two times that it is up, of at least the
     /// shortest pause.
@@ -111,7 +111,7 @@ impl<'a> Detections<'a> {
             >= settings.geared_share * self.steps.smallest(control)
     }
 
-    /// True where a varying flag is up at a time.
+    /// True if a varying flag is up at a time.
     fn flag_is_up_at(&self, time_s: f64) -> bool {
         let values = self
             .record
@@ -123,7 +123,7 @@ impl<'a> Detections<'a> {
                 .is_some_and(|v| *v > FLAG_UP)
     }
 
-    /// True where a flag is up for most of the time; `None` where it is not recorded.
+    /// True if a flag is up for most of the time; `None` if it is not recorded.
     pub fn flag_is_mostly_up(&self, flag: &str, (from_s, to_s): (f64, f64)) -> Option<bool> {
         let record = self.record;
         let (first, last) = (record.sample_at(from_s), record.sample_at(to_s));

@@ -6,7 +6,7 @@ use crate::maneuver::{Pulses, Sweep};
 use crate::segment::steps::step::Step;
 use crate::segment::steps::swings::Swing;
 
-/// Fewest swings of a sweep: three intervals, one for each third of it.
+/// Least number of swings of a sweep: three intervals, one for each third of it.
 const FEWEST_SWINGS: usize = 4;
 
 /// Factor by which an interval between swings may exceed the one before and still count as not

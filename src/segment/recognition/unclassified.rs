@@ -11,7 +11,7 @@ use super::segment::Segment;
 use crate::maneuver::{Class, Unknown};
 use crate::segment::steps::detection::{is_maneuver_alone, largest_change};
 
-/// Fewest steps of pilot controls that are more than ordinary flying: four reversals.
+/// Least number of steps of pilot controls that are more than ordinary flying: four reversals.
 const FEWEST_PILOT_STEPS: usize = 4;
 
 /// Time before the first step within which the start of the record may have cut a maneuver, s.

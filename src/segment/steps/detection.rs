@@ -255,7 +255,7 @@ fn step_of_run(run: &[LevelChange]) -> Option<Step> {
 /// Number of levels averaged side by side: a multiple of every vector width, small enough for L1.
 const SIDE: usize = 64;
 
-/// Fewest finite samples of a level that leaves out its largest and smallest: two remain.
+/// Least number of finite samples of a level that leaves out its largest and smallest: two remain.
 const FEWEST_TO_TRIM: f64 = 4.0;
 
 /// The level that begins at each sample: the mean of its finite samples without the largest and the

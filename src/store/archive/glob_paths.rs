@@ -10,7 +10,7 @@ use glob::Pattern;
 
 use crate::error::Error;
 
-/// Most folders that are read for a glob: more than an archive has.
+/// Largest number of folders that are read for a glob: more than an archive has.
 const MOST_FOLDERS: usize = 50_000;
 
 /// Paths that match a glob without `**`. A folder that a link leads to again, or that cannot be read, is among

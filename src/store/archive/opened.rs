@@ -30,8 +30,8 @@ use crate::store::recorder::UNIT;
 /// Rows decoded at a time: a few MB for row groups of any size.
 const BATCH_ROWS: usize = 16_384;
 
-/// Most numbers of a file, rows times mapped columns: more than ten hours of sixty channels at 200
-/// Hz. A damaged file of a few kilobytes can claim any number of rows.
+/// Largest number of numbers of a file, rows times mapped columns: more than ten hours of sixty
+/// channels at 200 Hz. A damaged file of a few kilobytes can claim any number of rows.
 const LARGEST_FILE: u64 = 500_000_000;
 
 /// Files of a flight with their footers. Columns are read one at a time, so memory holds one page

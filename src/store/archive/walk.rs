@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::file_rules::is_hidden;
 use crate::error::Error;
 
-/// Most folders of an archive: links may lead to the whole file system.
+/// Largest number of folders of an archive: links may lead to the whole file system.
 const MOST_FOLDERS: usize = 50_000;
 
 /// Search of folders, each entered once, no matter how many links lead to it: folders themselves

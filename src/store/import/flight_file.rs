@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::store::atomic::Draft;
 use crate::store::recorder::{array, properties, schema};
 
-/// Most rows that are in memory at once.
+/// Largest number of rows that are in memory at once.
 const BATCH_ROWS: usize = 16_384;
 
 /// Numbers that are in memory at once: those of 256 columns.
@@ -24,7 +24,7 @@ pub fn batch_rows(columns: usize) -> usize {
     (BATCH_NUMBERS / columns.max(1)).min(BATCH_ROWS)
 }
 
-/// Most columns of a file: each takes some hundred kilobytes while it is written.
+/// Largest number of columns of a file: each takes some hundred kilobytes while it is written.
 const MOST_COLUMNS: usize = 4000;
 
 /// A file being written; it appears whole or not at all.

@@ -4,7 +4,7 @@
 /// Largest file, bytes: a hundred times a simulator's aerodynamic model.
 const LARGEST: usize = 1 << 25;
 
-/// Most attributes of an element; those of DAVE-ML have some ten.
+/// Largest number of attributes of an element; those of DAVE-ML have some ten.
 const MOST_ATTRIBUTES: usize = 1000;
 
 /// Finds the first place at which a text exceeds the bounds: its line, counted from 1, and the

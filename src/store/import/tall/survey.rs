@@ -9,7 +9,7 @@ use crate::store::import::imported_contents::refused;
 /// Number of bins of the time span, from which the spans that are sorted at once are composed.
 pub(super) const BINS: usize = 1 << 14;
 
-/// Most names of a file: more than any recorder has channels.
+/// Largest number of names of a file: more than any recorder has channels.
 const MOST_NAMES: usize = 20_000;
 
 /// Values of one name.
