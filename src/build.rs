@@ -12,7 +12,7 @@ fn main() {
     for file in &files {
         let name = file.to_string_lossy().replace('\\', "/");
         for byte in name.bytes().chain(std::fs::read(file).unwrap_or_default()) {
-            // Fowler, Noll and Vo: no guard against malice, and none is needed to tell one state of
+            // FNV-1a hash: no protection against tampering, and none is needed to distinguish one state of
             // the code from another.
             hash = (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
         }

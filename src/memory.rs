@@ -20,8 +20,8 @@ pub fn keep() {
         unsafe_code,
         reason = "there is no safe way to set the allocator's thresholds; two whole numbers are all it takes"
     )]
-    // SAFETY: mallopt may be called at any time; it takes its arguments by value and refuses what
-    // it does not know.
+    // SAFETY: mallopt may be called at any time; it takes its arguments by value and rejects
+    // parameters that it does not have.
     unsafe {
         libc::mallopt(libc::M_MMAP_THRESHOLD, LARGEST_KEPT);
         libc::mallopt(libc::M_TRIM_THRESHOLD, MOST_KEPT);

@@ -70,6 +70,6 @@ pub fn check(options: &Options) -> anyhow::Result<ExitCode> {
     if !doubts.is_empty() {
         out!("           Check these, and delete the word `unsure:` of each that is right.");
     }
-    out!("The configuration is right.");
+    out!("The configuration is valid.");
     Ok(ExitCode::SUCCESS)
 }

@@ -124,7 +124,7 @@ fn print_plan(plan: &ShardPlan, file: &Path) {
     let dearest = costs.values().copied().fold(0.0, f64::max);
     let mean = costs.values().sum::<f64>() / costs.len() as f64;
     out!(
-        "{} {} to {} shards, the dearest {:.2} times the mean",
+        "{} {} to {} shards, the most expensive {:.2} times the mean",
         plan.items.len(),
         plan.of.name(),
         plan.shards,
@@ -156,7 +156,7 @@ impl ShareOptions {
 }
 
 fn ask_for_another_try(error: &anyhow::Error) -> ExitCode {
-    err!("harvest: {error:#}; another try may go well");
+    err!("harvest: {error:#}; another try may succeed");
     ExitCode::from(TRY_AGAIN)
 }
 
@@ -276,7 +276,7 @@ pub fn submit(options: &SubmitOptions) -> anyhow::Result<ExitCode> {
             out!("arrays of more than {LARGEST_ARRAY} need a larger MaxArraySize of the scheduler");
         }
         out!(
-            "scripts in {}; bash {} hands them over",
+            "scripts in {}; bash {} submits them",
             out.display(),
             submit.display()
         );
@@ -288,7 +288,7 @@ pub fn submit(options: &SubmitOptions) -> anyhow::Result<ExitCode> {
             .with_context(|| format!("cannot run {}", submit.display()))?;
         anyhow::ensure!(
             status.success(),
-            "the scheduler did not take the jobs: {status}"
+            "the scheduler did not accept the jobs: {status}"
         );
     }
     Ok(ExitCode::SUCCESS)

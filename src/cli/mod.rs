@@ -69,7 +69,7 @@ Examples:
   harvest run --quiet --wait 3600 --log nightly.jsonl
                                                  from cron or a timer: waits for another run, prints only errors
   harvest diff                                   the changes since the night before, with their causes
-  harvest submit --engine slurm                  the scripts of a job array and its merge; --go hands them over
+  harvest submit --engine slurm                  the scripts of a job array and its merge; --go submits them
   harvest lab simulate pipelines/harv/cards.yaml --out data/simulation/campaign
                                                  a campaign whose derivatives are known
 

@@ -206,9 +206,9 @@ pub fn verify(options: &VerifyOptions) -> anyhow::Result<ExitCode> {
         out!(
             "{}",
             if found.is_valid() {
-                "All of it holds."
+                "The night is valid."
             } else {
-                "It does not hold."
+                "The night is not valid."
             }
         );
     }

@@ -167,7 +167,7 @@ fn check_lineage(
         planned
             .flights
             .retain(|id, _| flights.contains(id.as_str()));
-        // Copies that were left out concern the whole archive.
+        // Copies that were left out are listed for the whole archive.
         now.flights.retain(|id, _| planned.flights.contains_key(id));
     }
     let causes = now.differences(&planned);
@@ -176,7 +176,7 @@ fn check_lineage(
     }
     let words: Vec<String> = causes.into_iter().map(|cause| cause.words).collect();
     let what = format!(
-        "the plan is of something else: since then {}; plan again",
+        "the plan does not match: since then {}; plan again",
         words.join("; ")
     );
     Err(Error::config(&conductor.runner.config.store, None, what))

@@ -41,7 +41,7 @@ pub(super) fn none_open(files: &Files) -> Result<()> {
     });
     let count = open.len();
     let what = format!(
-        "{}{}\n{count} lines have values to give: each {OPEN} stands for one, and the comment says where it matters",
+        "{}{}\n{count} lines have values to give: each {OPEN} stands for one, and its comment states where it matters",
         text.trim(),
         lines.collect::<String>()
     );

@@ -558,7 +558,7 @@ fn recognition_by_steps_of_no_stated_size_is_named() {
     assert_eq!(
         copy.error(),
         format!(
-            "maneuvers/ppss.yaml:{line}: class PPSS: `segment: steps:` of pipeline.yaml says no size for steps of \
+            "maneuvers/ppss.yaml:{line}: class PPSS: `segment: steps:` of pipeline.yaml gives no size for steps of \
              `theta_deg`"
         )
     );

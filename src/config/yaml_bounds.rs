@@ -35,7 +35,7 @@ pub fn excess(text: &str) -> Option<(Option<usize>, &'static str)> {
                 return Some((Some(line), "brackets are nested more than 1000 deep here"));
             }
         }
-        // Each of these may begin a level of its own: `- - - 1`.
+        // Each of these may begin another level: `- - - 1`.
         let words = text.split([' ', '\t']);
         if words.filter(|word| ["-", "?"].contains(word)).count() > DEEPEST {
             let what = "dashes or question marks are nested more than 1000 deep here";

@@ -79,7 +79,7 @@ impl Task<'_> {
             .copied()
             .chain(model.held.iter().map(|(d, _)| *d))
             .collect();
-        // In the order of the model, whatever is held: a pair has one name in all maneuvers.
+        // In the order of the model, held or not, so that a pair has one name in all maneuvers.
         acting.sort_by_key(|d| {
             self.context
                 .buildup

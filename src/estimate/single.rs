@@ -195,7 +195,7 @@ impl Task<'_> {
     }
 }
 
-/// Takes back a fit by output error in moving air, which charges the gusts to the derivatives.
+/// Discards a fit by output error in moving air, since it charges the gusts to the derivatives.
 fn discard_in_gusts(measurements: &Measurements, why: &NoMinimum, fit: &mut Fit) {
     if fit.outcome == Outcome::Converged && !is_white(measurements, fit) {
         fit.outcome = Outcome::NotConverged;

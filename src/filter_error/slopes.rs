@@ -198,7 +198,7 @@ mod tests {
 
     #[test]
     fn slopes_that_the_data_show_tell_of_those_that_they_do_not() {
-        // The first slope has a deviation of 0.005; nothing is known of the second.
+        // The first slope has a deviation of 0.005; the data have no information on the second.
         let effect = |first: f64| {
             let own = DVector::from_vec(vec![4e4, 1e-12]);
             let information = SlopeInformation {

@@ -118,7 +118,7 @@ impl Flight {
         for (name, signal, unit, value) in steady() {
             add(name, signal, unit, vec![value; ROWS]);
         }
-        // What the instruments are off by has tests of its own, and takes longer than all of these.
+        // The errors of the instruments have separate tests, which take longer than all of these.
         let compatibility = Compatibility {
             reconstruct: false,
             ..Compatibility::default()

@@ -36,8 +36,9 @@ pub fn verdict(
         return Verdict {
             is_sure: false,
             margin: 0.0,
-            evidence: "by its name; no equation of motion contains it and what else is recorded"
-                .to_owned(),
+            evidence:
+                "by its name; no equation of motion relates it to the other recorded quantities"
+                    .to_owned(),
         };
     };
     let held = format!("{} holds to {:.1} %", equation.name(), 100.0 * ratio.sqrt());

@@ -355,8 +355,10 @@ fn reason(facts: &ColumnFacts, candidates: &Candidates, assignment: &Assignment)
             format!("it may be {signal}, but is constant")
         }
         (None, Some(signal)) => format!("it may be {signal}, but its range or unit does not fit"),
-        (None, None) if kind_of(facts).is_some() => "an input, of which nothing follows".to_owned(),
-        (None, None) => "its name has no meaning that harvest has".to_owned(),
+        (None, None) if kind_of(facts).is_some() => {
+            "an input; nothing can be inferred from it".to_owned()
+        }
+        (None, None) => "its name is not in harvest's vocabulary".to_owned(),
     }
 }
 
@@ -371,12 +373,12 @@ fn constant_channel(facts: &ColumnFacts, name: &str) -> Channel {
         (true, true) => (false, "it is negative at times"),
         (true, false) => (
             false,
-            "its name and its stated unit; no motion tells its sign",
+            "its name and its stated unit; no motion determines its sign",
         ),
         (false, true) => (false, "its name; its unit is not stated"),
         (false, false) => (
             false,
-            "its name; its unit is not stated, and no motion tells its sign",
+            "its name; its unit is not stated, and no motion determines its sign",
         ),
     };
     let (is_sure, evidence) = unless_unknown_unit(facts, is_sure, evidence.to_owned());
@@ -398,7 +400,7 @@ fn unless_unknown_unit(facts: &ColumnFacts, is_sure: bool, evidence: String) -> 
     }
 }
 
-/// Range beyond which an angle is in degrees: no surface turns as far in radians.
+/// Range above which an angle is in degrees: no surface turns by as many radians.
 const LARGEST_RAD: f64 = 1.6;
 
 /// Unit of an input, and `true` if the file or the name states it. The unit of other angles follows

@@ -103,7 +103,7 @@ fn unnamed(
         Some(InputColumn {
             is_sure: false,
             evidence: format!(
-                "its name has no meaning that harvest has; {}",
+                "its name is not in harvest's vocabulary; {}",
                 input.evidence
             ),
             ..input
@@ -244,14 +244,14 @@ impl<'a> Responses<'a> {
             "negative"
         };
         let evidence = match (usual == 0.0, is_sure, other) {
-            (true, _, _) => "no motion tells its sign".to_owned(),
+            (true, _, _) => "no motion determines its sign".to_owned(),
             (_, false, Some(other)) => format!(
                 "by its name; but {} follows it more clearly than {}",
                 acceleration(other),
                 acceleration(acts)
             ),
             (_, false, None) => format!(
-                "the motion does not tell its sign ({:.0} standard errors)",
+                "the motion does not determine its sign ({:.0} standard errors)",
                 found.abs()
             ),
             (_, true, _) => format!(

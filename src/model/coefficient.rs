@@ -30,7 +30,7 @@ pub struct CoefficientPosterior {
     pub terms: Vec<Term>,
     pub unknowns: Unknowns,
     pub scales: Vec<Scale>,
-    /// Scales before their last step: those of the noise between the points of the grids.
+    /// Scales before the last step. The noise between the points of the grids was computed with them.
     pub noise_scales: Vec<Scale>,
     /// Posterior, including the spread over the scales that the data leave open.
     pub gaussian: Gaussian,

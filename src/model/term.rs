@@ -103,7 +103,7 @@ impl TermSources<'_> {
         let axis = coefficient.axis();
         let own = evidence.iter().filter(|e| e.maneuver.axis == axis);
         let flown = || own.clone().map(|e| e.maneuver.alpha_deg);
-        // Beyond the tables a whole step holds the outermost maneuver.
+        // Beyond the tables a whole step encloses the outermost maneuver.
         let step = self.settings.alpha_step_deg;
         let lowest = flown().reduce(f64::min).map(|a| (a / step).floor() * step);
         let highest = flown().reduce(f64::max).map(|a| (a / step).ceil() * step);

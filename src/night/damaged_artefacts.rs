@@ -35,7 +35,7 @@ pub fn damaged_artefacts(
 /// bytes are read. One that cannot be copied stays unread.
 pub fn fetch_records(store: &Store, night: &Night) {
     for (name, digest) in records(store, night) {
-        // What cannot be fetched is found damaged.
+        // A record that cannot be fetched is reported as damaged.
         let _ = store.fetch(&name, &digest);
     }
 }

@@ -60,7 +60,7 @@ pub fn gc(config: &Config, remove: bool, wait: Duration) -> Result<Unneeded> {
     unneeded.kept = kept.len();
     unneeded.artefacts = artefacts;
     if remove {
-        // Nights first: a night without its artefacts would be damaged.
+        // Nights are removed first, since a night without its artefacts would be damaged.
         let own = served.iter().filter(|reports| reports.is_own);
         own.map(|reports| &reports.nights)
             .try_for_each(|nights| nights.prune(keep))?;

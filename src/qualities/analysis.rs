@@ -214,7 +214,7 @@ impl Place<'_> {
     fn quality_rows(&self, analysis: &AxisAnalysis) -> Vec<QualityRow> {
         let row = |(quantity, dual): &(FlyingQuality, Dual)| {
             let uncertainty = analysis.uncertainty(*quantity, dual);
-            // A time to double that is none has no deviation, though some draws may have one.
+            // An infinite time to double has no deviation, though some draws may have a finite one.
             let is_some = dual.value.is_finite();
             let finite = |value: f64| (is_some && value.is_finite()).then_some(value);
             let trim = self.trim;

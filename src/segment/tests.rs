@@ -778,7 +778,7 @@ fn the_pilot_may_rest_when_he_goes_over_from_one_control_to_another_but_not_to_t
     let pedal_s = pilot_steps(&mut r, "pedal_in", 20.0, 1.5, 3, 1.2);
     let last_s = pilot_steps(&mut r, "stick_lat_in", pedal_s + 2.6, -1.5, 3, 1.2);
     assert_only(&r, "YAW_ROLL", 19.0, last_s + 2.5);
-    // Steps broken off, and what the pilot recovers with: together as many as a maneuver has.
+    // Steps that are broken off, and steps of the recovery: together as many as a maneuver has.
     let mut r = flight(60);
     let broken_off_s = pilot_steps(&mut r, "stick_pitch_in", 20.0, 1.5, 3, 1.2);
     pilot_steps(&mut r, "stick_pitch_in", broken_off_s + 2.6, 1.5, 1, 1.2);
@@ -964,7 +964,7 @@ fn a_recording_in_which_nothing_is_recognised_says_so() {
         reason.contains("de_deg 0.") && reason.contains(" of 2"),
         "{reason}"
     );
-    // In a longer flight ordinary flying is no news.
+    // In a longer flight ordinary flying is not reported.
     assert_eq!(found(&flight(60)).unknown, []);
 }
 

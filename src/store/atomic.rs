@@ -122,7 +122,7 @@ impl Draft {
             .sync_all()
             .map_err(Error::io(&self.path, "cannot write it to the disk"))?;
         let placed = self.file.persist(&self.path).or_else(|e| {
-            // An empty folder in its place is nobody's.
+            // An empty folder at its path may be removed.
             let _ = fs::remove_dir(&self.path);
             e.file.persist(&self.path)
         });

@@ -35,7 +35,7 @@ impl Lock {
     /// [`Error::Busy`] naming the holder, [`Error::Io`] when the disk fails.
     pub fn take(path: &Path, what: &str, wait: Duration) -> Result<Lock> {
         let mut lock = Lock::acquire(path, what, wait, File::try_lock)?;
-        // The note is a courtesy: a disk too full for it stops no run.
+        // The note is only information: a disk too full for it stops no run.
         let note = format!(
             "pid {} on {} since {}\n",
             std::process::id(),

@@ -110,7 +110,7 @@ impl Shared {
         self.listing().remove(name);
         Err(Error::damaged(
             &path,
-            &"its bytes were not those that were written, and it was removed; run again",
+            &"its bytes differed from those that were written, and it was removed; run again",
         ))
     }
 }

@@ -413,7 +413,7 @@ mod tests {
         };
         let (alike, different) = (of_campaign(&flights(0.1)), of_campaign(&flights(3.0)));
         assert!(of(&alike, "da").bound_s < 0.5e-3, "{alike:?}");
-        // Of one flight no scatter is known, whatever its weight is rounded to.
+        // A single flight has no scatter, for any rounding of its weight.
         for bound_ms in [0.31, 0.47, 0.53, 0.77] {
             let one = flight(vec![maneuver(&[("da", 7.3, bound_ms)])]);
             let delays = of_campaign(&[one]);

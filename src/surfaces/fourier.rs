@@ -68,7 +68,7 @@ impl Band {
         self.sums(&tapered.collect::<Vec<_>>())
     }
 
-    /// Spectra of series, for shifts in time.
+    /// Series with their spectra, prepared for shifts in time.
     pub fn shifted(&self, series: &[Vec<f64>]) -> Vec<Shifted> {
         let both = series.iter().flat_map(|series| {
             [

@@ -160,7 +160,7 @@ fn a_class_that_strays_does_not_take_the_weight_from_those_that_agree() {
         )
     };
     let mut estimates: Vec<EstimateRow> = (0..14).map(|i| draw("A", i, 1.0, 0.02)).collect();
-    // As a vane of which the rudder that moves with it is held at a wrong value.
+    // Like a vane whose rudder, which moves with it, is held at a wrong value.
     estimates.extend((0..14).map(|i| draw("B", i, -2.0 + 0.3 * f64::from(i), 0.4)));
     let trends = through(
         &estimates,

@@ -466,7 +466,7 @@ fn published_tables_carry_their_lineage_and_verify_checks_it() {
         campaign
             .ends("verify", 0)
             .stdout
-            .contains("All of it holds.")
+            .contains("The night is valid.")
     );
 
     // A setting that only trends read: what comes before them still holds.

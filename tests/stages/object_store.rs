@@ -487,7 +487,7 @@ fn what_stands_in_the_way_is_named_with_what_to_do() {
     ]);
     let outcome = run(server.reach(&mut shard));
     assert!(
-        outcome.code == Some(75) && outcome.stderr.contains("another try may go well"),
+        outcome.code == Some(75) && outcome.stderr.contains("another try may succeed"),
         "{outcome:?}"
     );
 }

@@ -115,7 +115,7 @@ fn a_tolerance_without_width_and_an_unknown_class_are_named_with_their_line() {
     let place = format!("match.yaml:{line}: `an_g`: give `within` or `within_pct`");
     assert!(outcome.stderr.contains(&place), "{}", outcome.stderr);
     campaign.edit("match.yaml", "an_g }", "an_g, within: 0.10 }");
-    let unknown = "axis: longitudinal # of all its classes; or";
+    let unknown = "axis: longitudinal # applies to all its classes; or";
     let line = campaign.edit(
         "match.yaml",
         unknown,

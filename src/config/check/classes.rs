@@ -126,13 +126,16 @@ fn recognition(config: &Config, class: &Class, source: &Source) -> Result<()> {
         |name: &str, what: &str| Err(source.error_under("recognise", name, of_class(class, what)));
     for (name, count) in &rule.steps {
         if count.at_least > count.at_most {
-            return error(name, &format!("`{name}` steps at least more than at most"));
+            return error(
+                name,
+                &format!("`{name}` has an `at_least` above its `at_most`"),
+            );
         }
     }
     for name in rule.counted() {
         if !config.segment.steps.contains_key(name) {
             let what =
-                format!("`segment: steps:` of pipeline.yaml says no size for steps of `{name}`");
+                format!("`segment: steps:` of pipeline.yaml gives no size for steps of `{name}`");
             return error(name, &what);
         }
     }

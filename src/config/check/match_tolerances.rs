@@ -54,8 +54,7 @@ fn check_numbers(specification: &Specification, source: &Source) -> Result<()> {
     }
     let has_model = specification.models.contains(&ModelSource::Database);
     if has_model != specification.database.is_some() {
-        let what =
-            "the model `database` needs the key `database` with its file, and the key the model";
+        let what = "the model `database` needs the key `database` with its file, and the key needs the model";
         return Err(source.error("database", what));
     }
     if !(LEAST_DRAWS..=MOST_DRAWS).contains(&specification.draws) {

@@ -33,7 +33,8 @@ fn segment(config: &Config, source: &Source) -> Result<()> {
     }
     let mut controls = settings.pilot_controls.iter();
     if let Some(name) = controls.find(|name| !settings.steps.contains_key(*name)) {
-        let what = format!("segment: `steps` says no size for steps of the pilot control `{name}`");
+        let what =
+            format!("segment: `steps` gives no size for steps of the pilot control `{name}`");
         return Err(source.error_under("pilot_controls", name, what));
     }
     quality_limits(&settings.quality, source)

@@ -302,7 +302,7 @@ fn of_surfaces_that_move_in_proportion_evidence_holds_one_and_says_from_what_it_
         because.starts_with("the data do not tell it apart from") && because.contains(other),
         "{because}"
     );
-    // The twin moves by twice the elevator: what is wrong with the one goes into the other, and its
+    // The twin moves by twice the elevator: an error of the one enters the other, and its
     // bound counts it.
     let factor = if name == "Cm_twin" { 2.0 } else { 0.5 };
     let wrong = 0.5

@@ -14,8 +14,8 @@ use crate::numerics::sample_count::nearest;
 /// Interval between the times of a signature, s: a flight has some hundreds of them.
 const INTERVAL_S: f64 = 10.0;
 
-/// Least number of times that two records of the same rows have in common. Fewer are chance, or two
-/// aircraft at rest.
+/// Least number of different hashes that two records of the same rows have in common. Fewer are
+/// chance, or two aircraft at rest.
 const LEAST_COMMON: usize = 3;
 
 /// Odd multiplier of the hash: 2⁶⁴ divided by the golden ratio (Knuth's multiplicative hashing).

@@ -123,7 +123,7 @@ fn is_spike(values: &[f64], k: usize, floor: f64, reach: usize, settings: &Spike
     let Some(height) = Height::of(values, k) else {
         return false;
     };
-    // The local noise is expensive. The least and the largest that it could be decide most samples.
+    // The local noise is expensive. Its least and its largest possible value decide most samples.
     let most = height.off_mean / settings.deviations;
     if !height.exceeds(floor, settings) || !height.lines_meet(most, settings) {
         return false;

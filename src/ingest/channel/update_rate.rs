@@ -22,8 +22,8 @@ const FITTING_SHARE: f64 = 0.95;
 /// Least number of changes of value, or distances, from which a period is inferred.
 pub const LEAST_CHANGES: usize = 20;
 
-/// Least share of its chances, as one in so many, at which a held channel changes. One that changes
-/// less often is as well a coarse channel at full rate.
+/// Largest mean number of periods per change of a held channel. A channel that changes less often
+/// may as well be a coarse channel at full rate.
 const CHANCES_PER_CHANGE: usize = 4;
 
 /// Update rate of a channel.

@@ -146,7 +146,7 @@ impl ClockBuilder {
             && (self.step_s * rate - 1.0).abs() > RATE_TOLERANCE
         {
             return Err(format!(
-                "the record runs at {:.2} Hz, sampling_rate_hz says {rate} Hz",
+                "the record runs at {:.2} Hz, sampling_rate_hz is {rate} Hz",
                 1.0 / self.step_s
             ));
         }

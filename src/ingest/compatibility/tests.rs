@@ -239,7 +239,7 @@ fn flight(seconds: f64) -> Record {
     const PARTS: usize = 10;
     let samples = window_samples(seconds);
     let aircraft = aircraft();
-    // φ, θ and the velocity are steered back to what they were, so that the flight goes on for
+    // φ, θ and the velocity are steered back to their initial values, so that the flight lasts
     // long.
     let mut x = State::from([450.0, 0.0, 90.0, 0.0, 0.2, 1.0, 24_000.0]);
     let mut columns: Vec<Vec<f64>> = vec![Vec::new(); INSTRUMENTS];
@@ -981,7 +981,7 @@ fn bounds_grow_without_a_redundant_channel() {
         let own = findings.into_iter().find(|f| f.signal == signal).unwrap();
         own.estimates[kind as usize].unwrap().bound
     };
-    // The heading tells the yaw rate's bias more closely than anything else.
+    // The heading determines the yaw rate's bias more closely than anything else.
     let [with, without] = [&record, &without_heading].map(|record| bound(record, s::R, Kind::Bias));
     assert!(without > 1.2 * with, "{without} with {with}");
 }

@@ -355,7 +355,7 @@ fn air_that_turns_with_the_aircraft_damps_nothing_and_gyros_do_not_feel_it() {
         epsilon = 1e-12
     );
     assert!((damped.specific_force - still.specific_force).norm() > 1e-3);
-    // Roll damping alone tells the two apart in ṗ: gyroscopic terms are in both.
+    // Only roll damping distinguishes the two in ṗ: gyroscopic terms are in both.
     let relative = carried.rate.rates - damped.rate.rates;
     assert!(relative.x > 0.0 && relative.y > 0.0, "{relative}");
     for (name, rate) in [

@@ -134,7 +134,7 @@ fn what_a_maneuver_held_wrongly_is_put_right_by_a_maneuver_that_knows_it() {
     let (value, deviation) = at(&found, "CN_alpha", 20.0);
     assert_relative_eq!(value, 0.04, max_relative = 1e-4);
     assert_relative_eq!(deviation, 0.002, max_relative = 1e-4);
-    // Alone it cannot tell them apart.
+    // Alone it cannot separate them.
     let alone = posterior(&[held], &tunnel(Some(0.8)), &exact());
     assert!(at(&alone, "CN_alpha", 20.0).1 > 0.005);
 }

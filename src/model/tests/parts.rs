@@ -312,7 +312,7 @@ fn what_is_left_out_is_predicted_as_if_it_had_not_been_there() {
     assert_relative_eq!(left.differences, expected, epsilon = 1e-9);
     let expected = spread + own.covariance(&weights);
     assert_relative_eq!(left.covariance, expected, epsilon = 1e-9);
-    // One of its maneuvers: the flight's calibration errors are as its other maneuvers say.
+    // One of its maneuvers: the flight's calibration errors follow from its other maneuvers.
     let (_, rows) = own.maneuvers[0].clone();
     let alone = leaving_out.rows(&rows).unwrap();
     // Of the flight's rows, those of the maneuver given the others.

@@ -58,7 +58,7 @@ fn add_below(archive: &str, at: usize, files: &mut BTreeSet<PathBuf>) -> Result<
         "" => "/",
         above => above,
     };
-    // `**` alone is every flight below.
+    // `**` alone matches every flight below.
     let mut walk = if below.trim_end_matches('/') == "**" {
         Walk::of_flights()
     } else {

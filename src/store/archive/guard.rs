@@ -25,6 +25,6 @@ pub(in crate::store) fn guarded<T>(read: impl FnOnce() -> Result<T, String>) -> 
     let result = panic::catch_unwind(AssertUnwindSafe(read));
     READING.set(outside);
     result.unwrap_or_else(|_| {
-        Err("the Parquet reader gave up on its bytes; copy it again from its source".to_owned())
+        Err("the Parquet reader failed on its bytes; copy it again from its source".to_owned())
     })
 }

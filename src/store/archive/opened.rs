@@ -62,8 +62,8 @@ struct OpenColumn {
     clock_factor: Option<f64>,
 }
 
-/// Opens the files of a flight. A tall file is written with one column a name beside `scratch`, into
-/// files that go with the flight.
+/// Opens the files of a flight. A tall file is rewritten beside `scratch` with one column per name;
+/// these files are removed with the flight.
 ///
 /// # Errors
 /// A fault of the disk. Inside, a problem of the flight: a file that is no readable Parquet, or a
@@ -124,7 +124,7 @@ fn open_file(
     };
     check_size(&metadata, 1).map_err(refused)?;
     let wide = tall.widened(scratch, is_channel).map_err(|e| {
-        // A fault of the network is the reason for what the reader says.
+        // A fault of the network explains the reader's message.
         match object::failed(path) {
             Some(failed) if matches!(e, Error::Archive { .. }) => refused(failed),
             _ => e,

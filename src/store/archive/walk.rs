@@ -42,9 +42,9 @@ impl Walk {
         }
     }
 
-    /// Adds the files below a folder, except names with a leading dot or underscore. The folder
-    /// itself is added in place of its files if it cannot be read, if a link leads to it again, or
-    /// if it holds the archive.
+    /// Adds the files below a folder, except names with a leading dot or underscore. A sub-folder is
+    /// added itself, in place of its files, if it cannot be read, if a link leads to it again, or if
+    /// it holds the archive.
     ///
     /// # Errors
     /// The folder cannot be read, or there are more folders than an archive has.
@@ -97,7 +97,7 @@ impl Walk {
             if is_hidden(&name.to_string_lossy()) {
                 continue;
             }
-            // No further look at the disk for each of what may be many files.
+            // No further access to the disk for each file: there may be many.
             let kind = entry.file_type();
             if kind.as_ref().is_ok_and(fs::FileType::is_dir) {
                 let own = target.join(name);

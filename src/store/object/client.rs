@@ -93,7 +93,7 @@ fn refuse_environment() -> Result<(), Failure> {
     match ENDPOINTS.iter().find_map(|name| set(name)) {
         Some(endpoint) if endpoint.starts_with("http://") && !allowed => {
             Err(Failure::Lasting(format!(
-                "the endpoint {endpoint} is not encrypted: use https, or set AWS_ALLOW_HTTP=true where nobody listens"
+                "the endpoint {endpoint} is not encrypted: use https, or set AWS_ALLOW_HTTP=true in a trusted network"
             )))
         }
         _ => Ok(()),
@@ -133,7 +133,7 @@ impl Client {
             .build();
         let store = store.map_err(|e| {
             Failure::Lasting(format!(
-                "cannot connect as the environment's AWS_ variables say: {}",
+                "cannot connect with the environment's AWS_ variables: {}",
                 words(&e).join(": ")
             ))
         })?;
@@ -231,7 +231,7 @@ impl Client {
                      in the environment, at AWS_REGION, and at what they may do in bucket `{bucket}`"
             )),
             (_, Some(status)) if status.starts_with(['3', '4']) => refused(format!(
-                "{endpoint} does not take the request ({said}): look at AWS_REGION and AWS_ENDPOINT_URL in the environment"
+                "{endpoint} refuses the request ({said}): look at AWS_REGION and AWS_ENDPOINT_URL in the environment"
             )),
             _ => {
                 let last = words.last().map(String::as_str).unwrap_or_default();
@@ -331,8 +331,9 @@ impl Client {
         let bytes = self.ask(key, async {
             self.store.get_opts(&path, options).await?.bytes().await
         })?;
-        let gone =
-            || Failure::Passing("vanished while it was read; the next run will see".to_owned());
+        let gone = || {
+            Failure::Passing("vanished while it was read; the next run will report it".to_owned())
+        };
         let bytes = bytes.ok_or_else(gone)?;
         if bytes.len() as u64 == expected {
             return Ok(bytes);

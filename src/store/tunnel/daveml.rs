@@ -157,7 +157,7 @@ impl<'a, 'input> File<'a, 'input> {
             .filter(|i| *i != "linear")
         {
             let what = format!(
-                "`interpolate=\"{other}\"`: tables are read linearly, or as pipeline.yaml says (tunnel: interpolation:)"
+                "`interpolate=\"{other}\"`: tables are read linearly, or as pipeline.yaml states (tunnel: interpolation:)"
             );
             return Err(self.wrong(reference, what));
         }
