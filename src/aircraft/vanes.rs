@@ -34,7 +34,7 @@ pub struct Reading {
 
 /// Velocity of the air past a point of the aircraft in body axes, and its slopes along α, β and the
 /// rates.
-struct Local {
+struct LocalVelocity {
     velocity: [f64; 3],
     by_alpha: [f64; 3],
     by_beta: [f64; 3],
@@ -52,7 +52,7 @@ struct Turn {
     by_rates: [f64; 3],
 }
 
-impl Local {
+impl LocalVelocity {
     /// Angle in the plane of symmetry from a direction given by sine and cosine.
     #[inline(always)]
     fn alpha_from(&self, direction: (f64, f64)) -> Turn {
@@ -112,11 +112,11 @@ impl Turn {
 
 impl Flow {
     #[inline(always)]
-    fn at(&self, arm: [f64; 3]) -> Local {
+    fn at(&self, arm: [f64; 3]) -> LocalVelocity {
         let (directions, v) = (sin_cos([self.alpha, self.beta]), self.velocity);
         let [(sa, ca), (sb, cb)] = directions;
         let ([p, q, r], [x, y, z]) = (self.rates, arm);
-        Local {
+        LocalVelocity {
             velocity: [
                 v * ca * cb + q * z - r * y,
                 v * sb + r * x - p * z,

@@ -11,13 +11,13 @@ use crate::store::log::timestamp;
 
 /// Stage and items in work at this moment.
 #[derive(Debug, Default)]
-pub struct Work {
+pub struct CurrentItems {
     stage: Mutex<Option<(String, usize, Instant)>>,
     /// Items in work with the time of day since when, the oldest first.
     items: Mutex<Vec<(String, String)>>,
 }
 
-impl Work {
+impl CurrentItems {
     /// Name of the stage; empty between stages.
     pub fn stage(&self) -> String {
         let begun = self.stage.lock().ok();
@@ -58,7 +58,7 @@ pub struct Bars<'a> {
     quiet: bool,
     log: Option<&'a Log>,
     bar: Mutex<ProgressBar>,
-    work: Arc<Work>,
+    work: Arc<CurrentItems>,
 }
 
 impl Bars<'_> {
@@ -72,7 +72,7 @@ impl Bars<'_> {
     }
 
     /// The work that the bars show.
-    pub fn work(&self) -> &Arc<Work> {
+    pub fn work(&self) -> &Arc<CurrentItems> {
         &self.work
     }
 

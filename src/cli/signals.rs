@@ -4,7 +4,7 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use super::bars::Work;
+use super::bars::CurrentItems;
 use crate::store::Log;
 
 /// Logs a signal that ends the program, with the stage and the flights in work, and lets it end the
@@ -13,7 +13,7 @@ use crate::store::Log;
 /// # Errors
 /// The system refuses to report signals.
 #[cfg(unix)]
-pub fn log_signals(log: &Arc<Log>, work: &Arc<Work>) -> std::io::Result<()> {
+pub fn log_signals(log: &Arc<Log>, work: &Arc<CurrentItems>) -> std::io::Result<()> {
     use signal_hook::consts::{SIGINT, SIGTERM};
     let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM])?;
     let (log, work) = (Arc::clone(log), Arc::clone(work));
@@ -57,6 +57,6 @@ pub fn outlive_file_limits() -> std::io::Result<()> {
 
 /// Other systems have no such signals.
 #[cfg(not(unix))]
-pub fn log_signals(_: &Arc<Log>, _: &Arc<Work>) -> std::io::Result<()> {
+pub fn log_signals(_: &Arc<Log>, _: &Arc<CurrentItems>) -> std::io::Result<()> {
     Ok(())
 }

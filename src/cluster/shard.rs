@@ -16,7 +16,7 @@ use crate::flight::is_stretch;
 use crate::lineage::{Lineage, Stage};
 use crate::maneuver::{Maneuver, Status};
 use crate::night::{RunOutcome, campaign_lineage, run};
-use crate::pipeline::{Absent, Campaign, Conductor, Progress, bring_maneuvers};
+use crate::pipeline::{AbsentArtefacts, Campaign, Conductor, Progress, bring_maneuvers};
 use crate::recorder::FlightCorrections;
 use crate::store::archive::{self, FlightFiles};
 use crate::store::files;
@@ -42,7 +42,13 @@ pub fn deal(
     progress: &dyn Progress,
 ) -> Result<ShardPlan> {
     let archive = archive::find(&config.archive)?;
-    let mut conductor = Conductor::join(config, archive, Absent::Report, Duration::ZERO, progress)?;
+    let mut conductor = Conductor::join(
+        config,
+        archive,
+        AbsentArtefacts::Report,
+        Duration::ZERO,
+        progress,
+    )?;
     conductor.remember_contents()?;
     let (work, delays, corrections) = match dealt {
         Dealt::Flights => (flights(&conductor), vec![], vec![]),
@@ -80,7 +86,7 @@ pub fn compute(
     let flight_ids: BTreeSet<&str> = items.iter().map(|item| item.flight_id.as_str()).collect();
     let mut archive = archive::find(&config.archive)?;
     archive.retain(|f| flight_ids.contains(f.flight_id.as_str()));
-    let conductor = Conductor::join(config, archive, Absent::Make, wait, progress)?;
+    let conductor = Conductor::join(config, archive, AbsentArtefacts::Make, wait, progress)?;
     check_lineage(plan, &conductor, Some(&flight_ids))?;
     let mut campaign = conductor.campaign(until.min(Stage::Segment))?;
     if let Some((flight, why)) = campaign.unread.first_key_value() {
@@ -109,7 +115,7 @@ pub fn missing_items(
     plan: &ShardPlan,
     progress: &dyn Progress,
 ) -> Result<BTreeSet<String>> {
-    let conductor = Conductor::look(config, progress)?;
+    let conductor = Conductor::read_only(config, progress)?;
     check_lineage(plan, &conductor, None)?;
     let mut campaign = conductor.campaign(plan.of.last_stage())?;
     conductor.runner.store.check_transfers()?;
@@ -224,7 +230,7 @@ fn maneuvers(conductor: &mut Conductor) -> Result<ManeuverWork> {
         return Err(Error::config(&config.store, None, what));
     }
     // The shards of the flights have made the evidence, but for rows that two flights share.
-    conductor.runner.absent = Absent::Make;
+    conductor.runner.absent = AbsentArtefacts::Make;
     conductor.surfaces(&mut campaign)?;
     let work = |m: &Maneuver| {
         let mut archive = conductor.archive.iter();

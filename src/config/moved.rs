@@ -59,7 +59,7 @@ pub(super) fn refusal(pipeline: &Source) -> Option<Error> {
     let mut paths = Vec::new();
     leaves(&written, &mut Vec::new(), &mut paths);
     let expert = expert_keys();
-    let mut moved: Vec<Moved> = paths
+    let mut moved: Vec<MovedKey> = paths
         .iter()
         .filter_map(|path| new_place(path, &expert))
         .collect();
@@ -75,12 +75,12 @@ pub(super) fn refusal(pipeline: &Source) -> Option<Error> {
 
 /// An old key.
 #[derive(PartialEq)]
-struct Moved {
+struct MovedKey {
     old: Vec<String>,
     place: String,
 }
 
-impl Moved {
+impl MovedKey {
     fn message(&self) -> String {
         format!("`{}` is now {}", self.old.join(": "), self.place)
     }
@@ -107,10 +107,10 @@ fn expert_keys() -> Vec<String> {
 }
 
 /// New place of an old key.
-fn new_place(path: &[String], expert_keys: &[String]) -> Option<Moved> {
+fn new_place(path: &[String], expert_keys: &[String]) -> Option<MovedKey> {
     let written = path.join(": ");
     if let Some((old, place)) = REPLACED.iter().find(|(old, _)| is_below(&written, old)) {
-        return Some(Moved {
+        return Some(MovedKey {
             old: old.split(": ").map(str::to_owned).collect(),
             place: (*place).to_owned(),
         });
@@ -118,7 +118,7 @@ fn new_place(path: &[String], expert_keys: &[String]) -> Option<Moved> {
     let (stage, rest) = path.split_first()?;
     let expert = format!("{stage}: expert: {}", rest.join(": "));
     let exists = expert_keys.iter().any(|key| is_below(&expert, key));
-    exists.then(|| Moved {
+    exists.then(|| MovedKey {
         old: path.to_vec(),
         place: format!("`{expert}`"),
     })

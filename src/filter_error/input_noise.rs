@@ -43,7 +43,7 @@ impl<const NX: usize> InputNoise<NX> {
         let share = 1.0 / samples.len().max(1) as f64;
         let mut effects = vec![];
         for sample in samples {
-            let at = At::new(case, sample);
+            let at = CaseSample::new(case, sample);
             let surfaces = inputs.surfaces.iter();
             effects.extend(surfaces.map(|surface| at.of_surface(surface, share)));
             if inputs.pressure_variance > 0.0 {
@@ -76,19 +76,19 @@ impl<const NX: usize> InputNoise<NX> {
 }
 
 /// A sample of a case.
-struct At<'a, const NX: usize, E: Equations<NX>> {
+struct CaseSample<'a, const NX: usize, E: Equations<NX>> {
     case: &'a Case<NX, E>,
     sample: usize,
     /// Γ, column by column.
     by_coefficient: [SVector<f64, NX>; COEFFICIENTS],
 }
 
-impl<'a, const NX: usize, E: Equations<NX>> At<'a, NX, E> {
+impl<'a, const NX: usize, E: Equations<NX>> CaseSample<'a, NX, E> {
     fn new(case: &'a Case<NX, E>, sample: usize) -> Self {
         let inputs = &case.motion.rate_inputs[2 * sample];
         let rates = E::rates(inputs, &case.motion.states[sample], &[0.0; COEFFICIENTS]);
         let column = |k: usize| rates.by_coefficient.column(k) * case.step_s;
-        At {
+        CaseSample {
             case,
             sample,
             by_coefficient: std::array::from_fn(column),

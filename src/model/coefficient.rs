@@ -6,14 +6,14 @@ use super::evidence::Evidence;
 use super::flight_data::{FlightData, Observed};
 use super::held_values::{HeldDifferences, Posterior};
 use super::observation::Observation;
+use super::observed_differences::ObservedDifferences;
 use super::open_scales::add_open_scales;
-use super::others::Others;
+use super::other_flights::OtherFlights;
 use super::posterior::{Gaussian, gaussian, information, of_differences, reweighted};
 use super::scale_prior::Scale;
 use super::scales::{centres, most_probable};
 use super::self_check::{self, Agreement};
 use super::term::{Term, TermSources};
-use super::touched::Touched;
 use super::unknowns::Unknowns;
 use crate::aero::WindTunnel;
 use crate::numerics::root::EXACT;
@@ -58,12 +58,12 @@ impl CoefficientPosterior {
         let mut data = Data::new(&terms, evidence, basis);
         let mut weights = vec![1.0; evidence.len()];
         let mut noise_scales = centres(&terms);
-        let (mut touched, mut scales, mut found) = data.fit(&terms, &weights, &noise_scales)?;
+        let (mut observed, mut scales, mut found) = data.fit(&terms, &weights, &noise_scales)?;
         for _ in 0..REWEIGHTINGS {
             let freedom = basis.settings.degrees_of_freedom;
             weights = reweighted(&data.flights, &weights, &found, freedom);
             noise_scales = scales;
-            (touched, scales, found) = data.fit(&terms, &weights, &noise_scales)?;
+            (observed, scales, found) = data.fit(&terms, &weights, &noise_scales)?;
         }
         let posterior = Posterior {
             terms: &terms,
@@ -72,7 +72,7 @@ impl CoefficientPosterior {
         };
         let held = data.held(&posterior, &weights, evidence, basis.tunnel);
         let mut whole = data.posterior(terms, scales, &weights, found, evidence);
-        add_open_scales(&touched, &whole.scales, &mut whole.gaussian);
+        add_open_scales(&observed, &whole.scales, &mut whole.gaussian);
         Some(CoefficientPosterior {
             noise_scales,
             held,
@@ -163,14 +163,14 @@ impl Data {
         terms: &[Term],
         weights: &[f64],
         start: &[Scale],
-    ) -> Option<(Touched, Vec<Scale>, Gaussian)> {
+    ) -> Option<(ObservedDifferences, Vec<Scale>, Gaussian)> {
         self.set_between(terms, start);
         let sums = information(&self.flights, weights, self.unknowns.count);
         let own = of_differences(&sums, &self.unknowns)?;
-        let touched = Touched::new(terms, &self.unknowns, &own);
-        let scales = most_probable(&touched, start);
+        let observed = ObservedDifferences::new(terms, &self.unknowns, &own);
+        let scales = most_probable(&observed, start);
         let gaussian = gaussian(&self.unknowns.root(terms, &scales, EXACT), &sums)?;
-        Some((touched, scales, gaussian))
+        Some((observed, scales, gaussian))
     }
 
     /// Differences from the tunnel of the values that each maneuver holds, by the posterior of the
@@ -186,7 +186,7 @@ impl Data {
         for own in evidence.chunk_by(|a, b| a.maneuver.flight_id == b.maneuver.flight_id) {
             let place = self.flight_ids.binary_search(&own[0].maneuver.flight_id);
             let flight = place.ok().map(|i| &self.flights[i]);
-            let Some(others) = Others::new(posterior.gaussian, flight, weights) else {
+            let Some(others) = OtherFlights::new(posterior.gaussian, flight, weights) else {
                 continue;
             };
             held.extend(own.iter().filter_map(|e| {

@@ -168,8 +168,8 @@ impl FlightData {
 
     /// Unknowns on which the flight's rows depend, ascending.
     fn active(&self) -> Vec<usize> {
-        let touched = self.rows.iter().flatten().map(|(place, _)| *place);
-        touched.collect::<BTreeSet<_>>().into_iter().collect()
+        let observed = self.rows.iter().flatten().map(|(place, _)| *place);
+        observed.collect::<BTreeSet<_>>().into_iter().collect()
     }
 
     fn dense(&self, active: &[usize]) -> DMatrix<f64> {

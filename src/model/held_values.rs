@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::evidence::Evidence;
-use super::others::Others;
+use super::other_flights::OtherFlights;
 use super::posterior::Gaussian;
 use super::scale_prior::Scale;
 use super::term::{Term, between_points};
@@ -45,7 +45,7 @@ impl Evidence<'_> {
         &self,
         posterior: &Posterior,
         unknowns: &Unknowns,
-        others: &Others,
+        others: &OtherFlights,
         tunnel: &WindTunnel,
     ) -> Option<HeldDifferences> {
         let Posterior { terms, scales, .. } = *posterior;

@@ -32,7 +32,7 @@ const TOTAL: &str = "total";
 
 /// Maneuver as it was flown, with its build-up.
 #[derive(Clone, Copy, Debug)]
-pub struct Flown<'a> {
+pub struct PublishedManeuver<'a> {
     pub evidence: &'a Evidence<'a>,
     /// Rows of the estimates as they are published.
     pub estimates: &'a [EstimateRow],
@@ -64,7 +64,11 @@ impl Model {
     /// their slopes along the regressors; empty for others. Held derivatives have the values of the
     /// posterior of the other flights, or of the tunnel.
     #[must_use]
-    pub fn lift_and_drag(&self, flown: &Flown, held_by_posterior: bool) -> Vec<LiftAndDragRow> {
+    pub fn lift_and_drag(
+        &self,
+        flown: &PublishedManeuver,
+        held_by_posterior: bool,
+    ) -> Vec<LiftAndDragRow> {
         let derivatives = flown.derivatives();
         let is_estimated = |c: Coefficient| {
             let mut own = derivatives.iter().filter(|d| d.coefficient == c);
@@ -94,7 +98,7 @@ impl Model {
     }
 }
 
-impl Flown<'_> {
+impl PublishedManeuver<'_> {
     fn derivatives(&self) -> Vec<&Derivative> {
         let longitudinal = self.buildup.derivatives_of(Axis::Longitudinal);
         longitudinal

@@ -8,10 +8,10 @@
 
 use nalgebra::DVector;
 
+use super::observed_differences::ObservedDifferences;
 use super::posterior::Gaussian;
 use super::scale_prior::Scale;
 use super::scales::{LEAST_VARIANCE, logarithms_of, negative_log_posterior, scales_of};
-use super::touched::Touched;
 
 /// Least second derivative along a direction: that of the widest prior of a scale.
 const LEAST_CURVATURE: f64 = 1.5;
@@ -21,10 +21,10 @@ const OUTER: f64 = 1.0 / 6.0;
 
 /// Adds the spread to the covariance of a Gaussian at the most probable scales. A direction in
 /// which the posterior cannot be computed is skipped.
-pub fn add_open_scales(touched: &Touched, scales: &[Scale], whole: &mut Gaussian) {
+pub fn add_open_scales(observed: &ObservedDifferences, scales: &[Scale], whole: &mut Gaussian) {
     let at = logarithms_of(scales);
-    let mean = |logarithms: &DVector<f64>| touched.mean(&scales_of(logarithms), LEAST_VARIANCE);
-    let local = negative_log_posterior(touched, scales, LEAST_VARIANCE);
+    let mean = |logarithms: &DVector<f64>| observed.mean(&scales_of(logarithms), LEAST_VARIANCE);
+    let local = negative_log_posterior(observed, scales, LEAST_VARIANCE);
     let (Some(local), Some(centre)) = (local, mean(&at)) else {
         return;
     };

@@ -16,10 +16,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::observed_differences::{Fit, ObservedDifferences, ObservedTerm};
 use super::scale_prior::Scale;
 use super::term::Term;
-use super::touched::{Fit, Touched, TouchedTerm};
-use crate::numerics::minimise::{Local, minimum};
+use crate::numerics::minimise::{LocalExpansion, minimum};
 
 /// Share of a term's largest variance below which the search ignores a direction: such directions
 /// change a difference by a thousandth of its deviation.
@@ -39,9 +39,9 @@ pub fn centres(terms: &[Term]) -> Vec<Scale> {
 
 /// Most probable scales, from a start.
 #[must_use]
-pub fn most_probable(touched: &Touched, start: &[Scale]) -> Vec<Scale> {
+pub fn most_probable(observed: &ObservedDifferences, start: &[Scale]) -> Vec<Scale> {
     let negative = |logarithms: &DVector<f64>| {
-        negative_log_posterior(touched, &scales_of(logarithms), LEAST_VARIANCE)
+        negative_log_posterior(observed, &scales_of(logarithms), LEAST_VARIANCE)
     };
     scales_of(&minimum(logarithms_of(start), STEPS, TOLERANCE, negative))
 }
@@ -68,12 +68,16 @@ pub fn scales_of(logarithms: &DVector<f64>) -> Vec<Scale> {
 /// −log of marginal likelihood times prior, with its derivatives by the logarithms of the scales.
 /// Directions below `least` of a term's largest variance are ignored.
 #[must_use]
-pub fn negative_log_posterior(touched: &Touched, scales: &[Scale], least: f64) -> Option<Local> {
-    let fit = touched.fit(scales, least)?;
-    let both = touched.terms.iter().zip(scales);
+pub fn negative_log_posterior(
+    observed: &ObservedDifferences,
+    scales: &[Scale],
+    least: f64,
+) -> Option<LocalExpansion> {
+    let fit = observed.fit(scales, least)?;
+    let both = observed.terms.iter().zip(scales);
     let changes: Vec<Changes> = both.map(|(t, s)| Changes::new(t, s, &fit)).collect();
     let n = 2 * changes.len();
-    let mut local = Local {
+    let mut local = LocalExpansion {
         value: fit.value,
         gradient: DVector::zeros(n),
         curvature: DMatrix::zeros(n, n),
@@ -85,7 +89,7 @@ pub fn negative_log_posterior(touched: &Touched, scales: &[Scale], least: f64) -
         }
         own.add_single(scale, 2 * i, &mut local);
     }
-    let Local {
+    let LocalExpansion {
         value, curvature, ..
     } = &local;
     (value.is_finite() && curvature.iter().all(|c| c.is_finite())).then_some(local)
@@ -93,7 +97,7 @@ pub fn negative_log_posterior(touched: &Touched, scales: &[Scale], least: f64) -
 
 /// Changes of the likelihood with the size and the length of one term.
 struct Changes<'a> {
-    term: &'a TouchedTerm,
+    term: &'a ObservedTerm,
     /// M C_i, all rows.
     images: [DMatrix<f64>; 2],
     /// C_i a.
@@ -103,7 +107,7 @@ struct Changes<'a> {
 }
 
 impl<'a> Changes<'a> {
-    fn new(term: &'a TouchedTerm, scale: &Scale, fit: &Fit) -> Changes<'a> {
+    fn new(term: &'a ObservedTerm, scale: &Scale, fit: &Fit) -> Changes<'a> {
         let slopes = term.covariance.slopes(scale);
         let (start, n) = (term.start, term.len());
         let columns = fit.information.columns(start, n);
@@ -120,7 +124,13 @@ impl<'a> Changes<'a> {
     }
 
     /// Adds the products of first derivatives with those of an earlier term, or of the same.
-    fn add_pair(&self, other: &Changes, fit: &Fit, (i, j): (usize, usize), local: &mut Local) {
+    fn add_pair(
+        &self,
+        other: &Changes,
+        fit: &Fit,
+        (i, j): (usize, usize),
+        local: &mut LocalExpansion,
+    ) {
         let (own, before) = (self.term, other.term);
         let at = (own.start, before.start);
         let between = fit.information.view(at, (own.len(), before.len()));
@@ -138,7 +148,7 @@ impl<'a> Changes<'a> {
 
     /// Adds the first derivatives, the terms from second derivatives of the covariance, and the
     /// prior.
-    fn add_single(&self, scale: &Scale, i: usize, local: &mut Local) {
+    fn add_single(&self, scale: &Scale, i: usize, local: &mut LocalExpansion) {
         let [value, by_length, by_length_twice] = self.halves;
         let penalty = self.term.scale.penalty(scale);
         local.value += penalty.value;

@@ -20,7 +20,7 @@ pub struct Diff {
 /// # Errors
 /// There is no such night, or its tables cannot be read.
 pub fn diff(config: &Config, since: Option<&str>, to: Option<&str>) -> Result<Diff> {
-    let nights = Nights::look(&config.reports);
+    let nights = Nights::read_only(&config.reports);
     let night = match to {
         Some(name) => complete_night(config, &nights, name)?,
         None => last_night(config, &nights)?,
@@ -68,5 +68,5 @@ fn complete_night(config: &Config, nights: &Nights, name: &str) -> Result<Night>
 /// # Errors
 /// A disk that fails.
 pub fn mark_reported(config: &Config, night: &str) -> Result<bool> {
-    Nights::look(&config.reports).mark_reported(night)
+    Nights::read_only(&config.reports).mark_reported(night)
 }

@@ -19,7 +19,7 @@ use crate::tables::{ChannelRow, EstimateRow, StartingValues};
 /// # Errors
 /// No archive, or no such maneuver in the store; then with the likely name.
 pub fn explain(config: &Config, id: &str, progress: &dyn Progress) -> Result<String> {
-    let conductor = Conductor::look(config, progress)?;
+    let conductor = Conductor::read_only(config, progress)?;
     // All flights: their surfaces' delays decide every estimate.
     let mut campaign = conductor.campaign(Stage::Segment)?;
     conductor.surfaces(&mut campaign)?;

@@ -86,7 +86,7 @@ fn served_reports(
         let nights = if remove {
             Nights::open(&folder, wait)?
         } else {
-            Nights::look(&folder)
+            Nights::read_only(&folder)
         };
         Ok(ServedReports {
             nights,

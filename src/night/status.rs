@@ -68,11 +68,11 @@ impl NightStatus {
 /// # Errors
 /// There is no archive.
 pub fn status(config: &Config, progress: &dyn Progress) -> Result<NightStatus> {
-    let conductor = Conductor::look(config, progress)?;
+    let conductor = Conductor::read_only(config, progress)?;
     let mut campaign = conductor.campaign(Stage::Estimate)?;
     let comparison = Comparison {
         lineage: campaign_lineage(&conductor),
-        current: Nights::look(&config.reports).current(),
+        current: Nights::read_only(&config.reports).current(),
     };
     let mut stages: Vec<StageStatus> = [Stage::Ingest, Stage::Segment, Stage::Estimate]
         .into_iter()
@@ -100,7 +100,7 @@ pub fn status(config: &Config, progress: &dyn Progress) -> Result<NightStatus> {
     }
     Ok(NightStatus {
         night: comparison.current.map(|night| night.name),
-        damaged_night: Nights::look(&config.reports).damaged_current(),
+        damaged_night: Nights::read_only(&config.reports).damaged_current(),
         stages,
         in_work: store::in_work(&config.store),
     })

@@ -13,7 +13,7 @@ const HALVINGS: usize = 25;
 
 /// Value and derivatives of a function at a point.
 #[derive(Clone, Debug)]
-pub struct Local {
+pub struct LocalExpansion {
     pub value: f64,
     pub gradient: DVector<f64>,
     /// Second derivatives.
@@ -23,7 +23,7 @@ pub struct Local {
     pub expected: DMatrix<f64>,
 }
 
-impl Local {
+impl LocalExpansion {
     /// Newton's step; `None` if neither matrix is positive definite.
     fn step(&self) -> Option<DVector<f64>> {
         let root = Cholesky::new(self.curvature.clone());
@@ -43,7 +43,7 @@ pub fn minimum(
     start: DVector<f64>,
     steps: usize,
     tolerance: f64,
-    mut function: impl FnMut(&DVector<f64>) -> Option<Local>,
+    mut function: impl FnMut(&DVector<f64>) -> Option<LocalExpansion>,
 ) -> DVector<f64> {
     let Some(mut local) = function(&start) else {
         return start;
@@ -72,10 +72,10 @@ pub fn minimum(
 /// First of a step and its halvings at which the function decreases.
 fn decreased(
     at: &DVector<f64>,
-    local: &Local,
+    local: &LocalExpansion,
     mut step: DVector<f64>,
-    function: &mut impl FnMut(&DVector<f64>) -> Option<Local>,
-) -> Option<(DVector<f64>, Local)> {
+    function: &mut impl FnMut(&DVector<f64>) -> Option<LocalExpansion>,
+) -> Option<(DVector<f64>, LocalExpansion)> {
     for _ in 0..HALVINGS {
         let next = at + &step;
         let wanted = local.value + LEAST_DECREASE * step.dot(&local.gradient);
@@ -106,7 +106,7 @@ mod tests {
             let (a, b) = (1.0 - x[0], x[1] - x[0] * x[0]);
             let bend = 2.0 - 400.0 * (b - 2.0 * x[0] * x[0]);
             let twist = -400.0 * x[0];
-            Some(Local {
+            Some(LocalExpansion {
                 value: a * a + 100.0 * b * b,
                 gradient: vector([-2.0 * a - 400.0 * x[0] * b, 200.0 * b]),
                 curvature: DMatrix::from_row_slice(2, 2, &[bend, twist, twist, 200.0]),
@@ -121,7 +121,7 @@ mod tests {
     fn a_step_into_nothing_is_shortened() {
         let half_line = |x: &DVector<f64>| {
             let x = x[0];
-            (x > 0.0).then(|| Local {
+            (x > 0.0).then(|| LocalExpansion {
                 value: x - x.ln(),
                 gradient: vector([1.0 - 1.0 / x]),
                 curvature: DMatrix::from_element(1, 1, 1.0 / (x * x)),
@@ -135,7 +135,7 @@ mod tests {
     #[test]
     fn a_summit_is_left_by_the_expected_second_derivatives() {
         let wave = |x: &DVector<f64>| {
-            Some(Local {
+            Some(LocalExpansion {
                 value: x[0].cos(),
                 gradient: vector([-x[0].sin()]),
                 curvature: DMatrix::from_element(1, 1, -x[0].cos()),

@@ -15,7 +15,7 @@ use super::progress::Progress;
 use super::qualities_stage::{self, QUALITIES_VERSION};
 use super::segment_step::{self, SegmentStep};
 use super::step::Step;
-use super::step_runner::{Absent, StepRunner};
+use super::step_runner::{AbsentArtefacts, StepRunner};
 use super::surfaces_step::{self, SurfacesStep};
 use super::trend_stage::{self, COMPARE_VERSION, TREND_VERSION};
 use crate::compare::earlier_campaign::Earlier;
@@ -82,7 +82,14 @@ impl<'a> Conductor<'a> {
         let archive = archive::find(&config.archive)?;
         let store = Store::open(&config.store, wait)?.sharing(config.shared_store.as_deref())?;
         let contents = store.contents();
-        let conductor = Conductor::new(config, store, contents, archive, Absent::Make, progress)?;
+        let conductor = Conductor::new(
+            config,
+            store,
+            contents,
+            archive,
+            AbsentArtefacts::Make,
+            progress,
+        )?;
         conductor.remember_contents()?;
         Ok(conductor)
     }
@@ -95,7 +102,7 @@ impl<'a> Conductor<'a> {
     pub fn join(
         config: &'a Config,
         archive: Vec<FlightFiles>,
-        absent: Absent,
+        absent: AbsentArtefacts,
         wait: Duration,
         progress: &'a dyn Progress,
     ) -> Result<Conductor<'a>> {
@@ -108,32 +115,39 @@ impl<'a> Conductor<'a> {
     ///
     /// # Errors
     /// No archive.
-    pub fn look(config: &'a Config, progress: &'a dyn Progress) -> Result<Conductor<'a>> {
-        let store = Store::look(&config.store).sharing(config.shared_store.as_deref())?;
+    pub fn read_only(config: &'a Config, progress: &'a dyn Progress) -> Result<Conductor<'a>> {
+        let store = Store::read_only(&config.store).sharing(config.shared_store.as_deref())?;
         let contents = store.contents();
-        Conductor::looking(config, store, contents, progress)
+        Conductor::read_only_with(config, store, contents, progress)
     }
 
     /// Opens the campaign for reading only, with every input file digested anew.
     ///
     /// # Errors
     /// No archive.
-    pub fn look_at_every_byte(
+    pub fn read_only_digesting_all(
         config: &'a Config,
         progress: &'a dyn Progress,
     ) -> Result<Conductor<'a>> {
-        let store = Store::look(&config.store).sharing(config.shared_store.as_deref())?;
-        Conductor::looking(config, store, InputDigests::empty(), progress)
+        let store = Store::read_only(&config.store).sharing(config.shared_store.as_deref())?;
+        Conductor::read_only_with(config, store, InputDigests::empty(), progress)
     }
 
-    fn looking(
+    fn read_only_with(
         config: &'a Config,
         store: Store,
         contents: InputDigests,
         progress: &'a dyn Progress,
     ) -> Result<Conductor<'a>> {
         let archive = archive::find(&config.archive)?;
-        Conductor::new(config, store, contents, archive, Absent::Report, progress)
+        Conductor::new(
+            config,
+            store,
+            contents,
+            archive,
+            AbsentArtefacts::Report,
+            progress,
+        )
     }
 
     fn new(
@@ -141,7 +155,7 @@ impl<'a> Conductor<'a> {
         store: Store,
         contents: InputDigests,
         archive: Vec<FlightFiles>,
-        absent: Absent,
+        absent: AbsentArtefacts,
         progress: &'a dyn Progress,
     ) -> Result<Conductor<'a>> {
         let earlier = trend_stage::read_earlier(config)?;

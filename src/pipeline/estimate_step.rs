@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::campaign::{Campaign, Failure, MissingArtefact};
 use super::ingested::Flight;
 use super::problems::problem;
-use super::step::{Brought, Companion, Made, Step};
+use super::step::{Companion, ComputedArtefact, LoadedOrMade, Step};
 use super::step_runner::StepRunner;
 use crate::aero::{Axis, Buildup, WindTunnel};
 use crate::aircraft::Aircraft;
@@ -119,14 +119,14 @@ impl<'a> Step for EstimateStep<'a> {
         }
     }
 
-    fn make(&self, name: &ArtefactName) -> Result<Made<Estimated>> {
+    fn make(&self, name: &ArtefactName) -> Result<ComputedArtefact<Estimated>> {
         let record = self.record.part(self.maneuver)?;
         let mut estimated =
             estimate_maneuver(self.config, &record, self.maneuver, self.record.delays);
         let history = estimated.history.take().map(|h| report::thinned(&h));
         self.store.save(&name.sibling(Kind::History), &history)?;
         estimated.means = estimate::means(&record, self.maneuver, &self.config.buildup);
-        Ok(Made::Settled(estimated))
+        Ok(ComputedArtefact::Settled(estimated))
     }
 
     fn companions(&self, name: &ArtefactName, _: &Estimated) -> Vec<Companion> {
@@ -227,7 +227,7 @@ pub fn bring_maneuvers(
     flights: &[Flight],
     maneuvers: &[&Maneuver],
     delays: &[DelayCorrection],
-) -> Result<Vec<Option<Brought<Estimated>>>> {
+) -> Result<Vec<Option<LoadedOrMade<Estimated>>>> {
     let of_flight = |flight: &Flight| {
         let record = LazyRecord::new(flight, &runner.store, delays);
         let of_flight = maneuvers.iter().filter(|m| m.flight_id == flight.id());

@@ -10,7 +10,7 @@ use super::campaign::{Campaign, MissingArtefact};
 use super::estimate_step::{LazyRecord, context};
 use super::ingested::Flight;
 use super::problems::problem;
-use super::step::{Made, Step};
+use super::step::{ComputedArtefact, Step};
 use super::step_runner::StepRunner;
 use crate::config::Config;
 use crate::error::{Error, ProblemStage, Result};
@@ -96,7 +96,7 @@ impl<'a> Step for JointStep<'a> {
         }
     }
 
-    fn make(&self, name: &ArtefactName) -> Result<Made<Joined>> {
+    fn make(&self, name: &ArtefactName) -> Result<ComputedArtefact<Joined>> {
         let class = self
             .config
             .class(&self.bin.class)
@@ -114,7 +114,7 @@ impl<'a> Step for JointStep<'a> {
             .map(|(member, fit)| (member.maneuver, format!("doubtful: {}", fit.reason)))
             .collect();
         let joint_id = &self.bin.joint_id;
-        Ok(Made::Settled(joint::estimate(
+        Ok(ComputedArtefact::Settled(joint::estimate(
             joint_id,
             &members,
             &doubtful,
@@ -220,7 +220,7 @@ impl<'a> Step for PredictStep<'a> {
         }
     }
 
-    fn make(&self, _: &ArtefactName) -> Result<Made<Predicted>> {
+    fn make(&self, _: &ArtefactName) -> Result<ComputedArtefact<Predicted>> {
         let maneuver = self.member.maneuver;
         let from: Vec<&Estimated> = self.from.iter().map(|(_, estimated)| *estimated).collect();
         let predicted = match self.config.class(&maneuver.class) {
@@ -231,7 +231,7 @@ impl<'a> Step for PredictStep<'a> {
             }
             None => Predicted::none("the configuration has no such class", from.len()),
         };
-        Ok(Made::Settled(predicted))
+        Ok(ComputedArtefact::Settled(predicted))
     }
 }
 

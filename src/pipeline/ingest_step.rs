@@ -11,7 +11,7 @@ use super::memory_shares::{MemoryShares, map_with_workers};
 use super::problems::problem;
 use super::record_writing::RecordWriting;
 use super::repeated_rows;
-use super::step::{Brought, Companion, Made, Step};
+use super::step::{Companion, ComputedArtefact, LoadedOrMade, Step};
 use super::step_runner::StepRunner;
 use crate::aircraft::Aircraft;
 use crate::error::{Error, Problem, ProblemStage, Result};
@@ -67,7 +67,7 @@ impl<'a> Step for IngestStep<'a> {
         }
     }
 
-    fn make(&self, name: &ArtefactName) -> Result<Made<IngestedFlight>> {
+    fn make(&self, name: &ArtefactName) -> Result<ComputedArtefact<IngestedFlight>> {
         let writing = RecordWriting {
             config: self.runner.config,
             store: &self.runner.store,
@@ -78,8 +78,8 @@ impl<'a> Step for IngestStep<'a> {
         let ingested = writing.ingest(self.files)?;
         drop(in_work);
         Ok(match self.passing_fault() {
-            None => Made::Settled(ingested),
-            Some(fault) => Made::Passing(IngestedFlight::rejected(self.item(), fault)),
+            None => ComputedArtefact::Settled(ingested),
+            Some(fault) => ComputedArtefact::Passing(IngestedFlight::rejected(self.item(), fault)),
         })
     }
 
@@ -164,7 +164,7 @@ fn bring_flight(
     shares: MemoryShares,
     files: &FlightFiles,
     contents: &FlightContents,
-) -> Result<Option<Brought<IngestedFlight>>> {
+) -> Result<Option<LoadedOrMade<IngestedFlight>>> {
     let id = &files.flight_id;
     match contents.fingerprint(id) {
         Ok(content) => runner.bring(&IngestStep {
@@ -175,7 +175,7 @@ fn bring_flight(
         }),
         Err(reason) => {
             let problem = problem(ProblemStage::Ingest, id, &first_file(files), reason);
-            Ok(Some(Brought {
+            Ok(Some(LoadedOrMade {
                 name: ArtefactName::new(Kind::Ingest, id, "unread"),
                 artefact: IngestedFlight::rejected(id, problem),
                 is_stored: false,
@@ -190,7 +190,7 @@ fn first_file(flight: &FlightFiles) -> String {
     first.map_or_else(String::new, |file| file.display().to_string())
 }
 
-fn add_flight(campaign: &mut Campaign, flight_id: &str, flight: Brought<IngestedFlight>) {
+fn add_flight(campaign: &mut Campaign, flight_id: &str, flight: LoadedOrMade<IngestedFlight>) {
     let IngestedFlight {
         problems,
         stretches,

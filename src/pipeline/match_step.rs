@@ -9,7 +9,7 @@ use super::campaign::Campaign;
 use super::estimate_step::LazyRecord;
 use super::ingested::Flight;
 use super::model_stage::by_maneuver;
-use super::step::{Made, Step};
+use super::step::{ComputedArtefact, Step};
 use super::step_runner::StepRunner;
 use crate::aero::{Buildup, WindTunnel};
 use crate::aircraft::Aircraft;
@@ -19,7 +19,7 @@ use crate::flight::Correction;
 use crate::maneuver::{Maneuver, Means};
 use crate::model::Model;
 use crate::proof_of_match::{
-    self, DecisiveDifference, Flown, Matched, OwnEstimates, ProofInputs, Specification,
+    self, DecisiveDifference, Matched, OwnEstimates, ProofInputs, RecordedManeuver, Specification,
 };
 use crate::store::{ArtefactName, Fingerprint, Kind};
 use crate::surfaces::DelayCorrection;
@@ -79,16 +79,16 @@ impl<'a> Step for MatchStep<'a> {
         }
     }
 
-    fn make(&self, _: &ArtefactName) -> Result<Made<Matched>> {
+    fn make(&self, _: &ArtefactName) -> Result<ComputedArtefact<Matched>> {
         if self.maneuver.is_rejected() {
             let reason = format!("rejected: {}", self.maneuver.quality.reason);
             let matched = proof_of_match::not_flown(self.basis, self.maneuver, &reason);
-            return Ok(Made::Settled(matched));
+            return Ok(ComputedArtefact::Settled(matched));
         }
         let record = self.record.part(self.maneuver)?;
         let condition = self.maneuver.condition(self.basis.tunnel);
         let local = self.posterior.at(self.maneuver.axis, &condition);
-        let flown = Flown {
+        let flown = RecordedManeuver {
             record: &record,
             maneuver: self.maneuver,
             local: Some(&local),
@@ -96,7 +96,7 @@ impl<'a> Step for MatchStep<'a> {
         };
         let mut matched = proof_of_match::fly_again(self.basis, &flown);
         matched.history = matched.history.map(|h| crate::report::thinned(&h));
-        Ok(Made::Settled(matched))
+        Ok(ComputedArtefact::Settled(matched))
     }
 }
 
@@ -171,7 +171,7 @@ pub fn decisive_differences(
             let local = campaign
                 .model
                 .at(maneuver.axis, &maneuver.condition(basis.tunnel));
-            let flown = Flown {
+            let flown = RecordedManeuver {
                 record: &record,
                 maneuver,
                 local: Some(&local),

@@ -47,4 +47,4 @@ pub(crate) use qualities_stage::flown_means;
 pub(crate) use report_stage::{PAGE, PRINTED_PAGE, Report, make_report};
 pub(crate) use segment_step::SegmentStep;
 pub(crate) use step::Step;
-pub(crate) use step_runner::Absent;
+pub(crate) use step_runner::AbsentArtefacts;

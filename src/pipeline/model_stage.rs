@@ -9,7 +9,7 @@ use crate::config::Config;
 use crate::error::{Problem, ProblemStage};
 use crate::estimate::HeldValues;
 use crate::maneuver::Means;
-use crate::model::{self, Evidence, Failure, Flown, MOST_POINTS, Model};
+use crate::model::{self, Evidence, Failure, MOST_POINTS, Model, PublishedManeuver};
 use crate::output_error::Outcome;
 use crate::tables::{EstimateRow, LiftAndDragRow};
 
@@ -70,7 +70,7 @@ fn lift_and_drag(
     let by_posterior = config.estimate.held_values == HeldValues::Posterior;
     let of_maneuver = |evidence: &Evidence| {
         let id = evidence.maneuver.maneuver_id.as_str();
-        let flown = Flown {
+        let flown = PublishedManeuver {
             evidence,
             estimates: estimates.get(id)?,
             means: means.get(id)?,

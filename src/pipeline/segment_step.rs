@@ -8,8 +8,8 @@ use super::ingested::Flight;
 use super::problems::problem;
 use super::record_windows::{FoundManeuvers, find_maneuvers};
 use super::repeated_rows;
-use super::step::{Brought, Made, Step};
-use super::step_runner::{Absent, StepRunner};
+use super::step::{ComputedArtefact, LoadedOrMade, Step};
+use super::step_runner::{AbsentArtefacts, StepRunner};
 use crate::aero::Axis;
 use crate::config::Config;
 use crate::error::{ProblemStage, Result};
@@ -86,9 +86,9 @@ impl<'a> Step for SegmentStep<'a> {
         }
     }
 
-    fn make(&self, _: &ArtefactName) -> Result<Made<FoundManeuvers>> {
+    fn make(&self, _: &ArtefactName) -> Result<ComputedArtefact<FoundManeuvers>> {
         let record = self.flight.open(self.store)?;
-        find_maneuvers(self.config, &record, &self.events).map(Made::Settled)
+        find_maneuvers(self.config, &record, &self.events).map(ComputedArtefact::Settled)
     }
 }
 
@@ -126,14 +126,14 @@ pub fn segment(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
 fn bring_flights(
     runner: &StepRunner,
     flights: &[&Flight],
-) -> Result<Vec<Option<Brought<FoundManeuvers>>>> {
+) -> Result<Vec<Option<LoadedOrMade<FoundManeuvers>>>> {
     flights
         .par_iter()
         .map(|flight| {
             let found = match SegmentStep::new(runner.config, &runner.store, flight) {
                 Ok(step) => runner.bring(&step),
                 // A record that cannot be opened will be made again.
-                Err(_) if runner.absent == Absent::Report => Ok(None),
+                Err(_) if runner.absent == AbsentArtefacts::Report => Ok(None),
                 Err(error) => Err(error),
             };
             runner.advance(flight.id());

@@ -29,7 +29,7 @@ pub trait Step: Sync {
     ///
     /// # Errors
     /// A fault that stops the run. A fault of the flight or maneuver is part of the artefact.
-    fn make(&self, name: &ArtefactName) -> Result<Made<Self::Artefact>>;
+    fn make(&self, name: &ArtefactName) -> Result<ComputedArtefact<Self::Artefact>>;
 
     /// Further files of the store that belong to the artefact saved as `name`.
     fn companions(&self, _name: &ArtefactName, _artefact: &Self::Artefact) -> Vec<Companion> {
@@ -47,7 +47,7 @@ pub trait Step: Sync {
 
 /// A computed artefact.
 #[derive(Clone, Debug)]
-pub enum Made<A> {
+pub enum ComputedArtefact<A> {
     /// Determined by the key alone; it is saved.
     Settled(A),
     /// Affected by a temporary fault, such as a file that changed meanwhile; the next run tries
@@ -65,7 +65,7 @@ pub struct Companion {
 
 /// An artefact, loaded or made.
 #[derive(Clone, Debug)]
-pub struct Brought<A> {
+pub struct LoadedOrMade<A> {
     pub name: ArtefactName,
     pub artefact: A,
     /// `false` for an artefact that a temporary fault affected; the store does not keep it.

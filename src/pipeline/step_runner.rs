@@ -6,14 +6,14 @@ use std::sync::Mutex;
 use rayon::prelude::*;
 
 use super::progress::Progress;
-use super::step::{Brought, Companion, Made, Step};
+use super::step::{Companion, ComputedArtefact, LoadedOrMade, Step};
 use crate::config::Config;
 use crate::error::Result;
 use crate::store::{ArtefactName, InputDigests, Listed, Store};
 
 /// Treatment of an artefact that is absent from the store.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Absent {
+pub enum AbsentArtefacts {
     /// It is made and saved.
     Make,
     /// It is reported missing; nothing is written.
@@ -26,7 +26,7 @@ pub struct StepRunner<'a> {
     pub store: Store,
     /// Digests of input files.
     pub contents: InputDigests,
-    pub absent: Absent,
+    pub absent: AbsentArtefacts,
     progress: &'a dyn Progress,
     /// Artefacts that were found missing.
     missing: Mutex<BTreeSet<ArtefactName>>,
@@ -37,7 +37,7 @@ impl<'a> StepRunner<'a> {
         config: &'a Config,
         store: Store,
         contents: InputDigests,
-        absent: Absent,
+        absent: AbsentArtefacts,
         progress: &'a dyn Progress,
     ) -> StepRunner<'a> {
         StepRunner {
@@ -54,14 +54,14 @@ impl<'a> StepRunner<'a> {
     ///
     /// # Errors
     /// As [`Step::make`]; an artefact that cannot be saved.
-    pub fn bring<S: Step>(&self, step: &S) -> Result<Option<Brought<S::Artefact>>> {
+    pub fn bring<S: Step>(&self, step: &S) -> Result<Option<LoadedOrMade<S::Artefact>>> {
         let brought = match (self.load(step), self.absent) {
             (Some(brought), _) => brought,
-            (None, Absent::Report) => {
+            (None, AbsentArtefacts::Report) => {
                 self.note_missing(step.name());
                 return Ok(None);
             }
-            (None, Absent::Make) => self.make(step)?,
+            (None, AbsentArtefacts::Make) => self.make(step)?,
         };
         if brought.is_stored {
             self.store.require(&brought.name);
@@ -73,29 +73,29 @@ impl<'a> StepRunner<'a> {
     }
 
     /// Loads a step's artefact; `None` unless it and its companions are unchanged.
-    pub fn load<S: Step>(&self, step: &S) -> Option<Brought<S::Artefact>> {
+    pub fn load<S: Step>(&self, step: &S) -> Option<LoadedOrMade<S::Artefact>> {
         let name = step.name();
         let artefact = self.store.load(&name)?;
         step.companions(&name, &artefact)
             .iter()
             .all(|companion| self.has(companion))
-            .then_some(Brought {
+            .then_some(LoadedOrMade {
                 name,
                 artefact,
                 is_stored: true,
             })
     }
 
-    fn make<S: Step>(&self, step: &S) -> Result<Brought<S::Artefact>> {
+    fn make<S: Step>(&self, step: &S) -> Result<LoadedOrMade<S::Artefact>> {
         let name = step.name();
         let (artefact, is_stored) = match step.make(&name)? {
-            Made::Settled(artefact) => {
+            ComputedArtefact::Settled(artefact) => {
                 self.store.save(&name, &artefact)?;
                 (artefact, true)
             }
-            Made::Passing(artefact) => (artefact, false),
+            ComputedArtefact::Passing(artefact) => (artefact, false),
         };
-        Ok(Brought {
+        Ok(LoadedOrMade {
             name,
             artefact,
             is_stored,
@@ -129,7 +129,7 @@ impl<'a> StepRunner<'a> {
     ///
     /// # Errors
     /// As [`StepRunner::bring`].
-    pub fn bring_all<S: Step>(&self, steps: &[S]) -> Result<Vec<Option<Brought<S::Artefact>>>>
+    pub fn bring_all<S: Step>(&self, steps: &[S]) -> Result<Vec<Option<LoadedOrMade<S::Artefact>>>>
     where
         S::Artefact: Send,
     {
@@ -145,7 +145,7 @@ impl<'a> StepRunner<'a> {
 
     /// Calls `work` with a progress display of this number of items, unless nothing is made.
     pub fn with_progress<T>(&self, stage: &str, items: usize, work: impl FnOnce() -> T) -> T {
-        if self.absent == Absent::Report {
+        if self.absent == AbsentArtefacts::Report {
             return work();
         }
         self.progress.begin(stage, items);
@@ -162,7 +162,7 @@ impl<'a> StepRunner<'a> {
     }
 
     pub fn advance(&self, item: &str) {
-        if self.absent == Absent::Make {
+        if self.absent == AbsentArtefacts::Make {
             self.progress.advance(item);
         }
     }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::campaign::{Campaign, MissingArtefact};
 use super::estimate_step::LazyRecord;
 use super::ingested::Flight;
-use super::step::{Made, Step};
+use super::step::{ComputedArtefact, Step};
 use super::step_runner::StepRunner;
 use crate::aero::{Buildup, WindTunnel};
 use crate::aircraft::Aircraft;
@@ -61,7 +61,7 @@ impl<'a> Step for SurfacesStep<'a> {
         }
     }
 
-    fn make(&self, _: &ArtefactName) -> Result<Made<FlightEvidence>> {
+    fn make(&self, _: &ArtefactName) -> Result<ComputedArtefact<FlightEvidence>> {
         let file = LazyRecord::new(self.flight, self.store, &[]);
         let part = |maneuver: &&'a Maneuver| Ok((file.part(maneuver)?, *maneuver));
         let parts: Result<Vec<(Record, &Maneuver)>> = self.maneuvers.iter().map(part).collect();
@@ -71,7 +71,7 @@ impl<'a> Step for SurfacesStep<'a> {
             tunnel: &self.config.tunnel,
         };
         let evidence = surfaces::flight_evidence(self.flight.id(), &parts?, basis);
-        Ok(Made::Settled(evidence))
+        Ok(ComputedArtefact::Settled(evidence))
     }
 }
 

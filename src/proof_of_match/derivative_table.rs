@@ -24,7 +24,7 @@ pub struct DerivativeTable {
 
 /// Position of an angle of attack in a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
+pub struct TablePosition {
     row: usize,
     /// Fraction of the interval; below 0 or above 1 beyond the table.
     fraction: f64,
@@ -93,7 +93,7 @@ impl DerivativeTable {
 
     #[inline]
     #[must_use]
-    pub fn place(&self, alpha_deg: f64) -> Place {
+    pub fn place(&self, alpha_deg: f64) -> TablePosition {
         let steps = (alpha_deg - self.first_deg) / STEP_DEG;
         #[expect(
             clippy::cast_possible_truncation,
@@ -101,7 +101,7 @@ impl DerivativeTable {
             reason = "not negative; what is no number becomes 0"
         )]
         let row = (steps.max(0.0) as usize).min(self.nodes - 2);
-        Place {
+        TablePosition {
             row,
             fraction: steps - row as f64,
         }
@@ -110,7 +110,7 @@ impl DerivativeTable {
     /// Entries of all derivatives on both sides of a position.
     #[inline]
     #[must_use]
-    pub fn entries(&self, place: Place) -> Entries<'_> {
+    pub fn entries(&self, place: TablePosition) -> Entries<'_> {
         let both = &self.values[place.row * self.derivatives..][..2 * self.derivatives];
         let (low, high) = both.split_at(self.derivatives);
         Entries {
@@ -123,7 +123,7 @@ impl DerivativeTable {
 
     /// Derivative at a position, constant beyond the table.
     #[must_use]
-    pub fn value(&self, place: Place, derivative: usize) -> f64 {
+    pub fn value(&self, place: TablePosition, derivative: usize) -> f64 {
         self.entries(place).value(derivative)
     }
 }

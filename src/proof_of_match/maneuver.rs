@@ -42,7 +42,7 @@ pub struct ProofInputs<'a> {
 
 /// A maneuver as found.
 #[derive(Clone, Copy, Debug)]
-pub struct Flown<'a> {
+pub struct RecordedManeuver<'a> {
     pub record: &'a Record,
     pub maneuver: &'a Maneuver,
     /// Posterior of the maneuver's axis at its condition; without one there are no probabilities.
@@ -77,7 +77,7 @@ impl Matched {
 
 /// Flies a maneuver again with each model.
 #[must_use]
-pub fn fly_again(basis: &ProofInputs, flown: &Flown) -> Matched {
+pub fn fly_again(basis: &ProofInputs, flown: &RecordedManeuver) -> Matched {
     match Flight::new(basis, flown) {
         Ok(flight) => flight.matched(),
         Err(reason) => not_flown(basis, flown.maneuver, &reason),
@@ -91,7 +91,7 @@ pub fn fly_again(basis: &ProofInputs, flown: &Flown) -> Matched {
 /// The reason why there is none.
 pub fn decisive_difference(
     basis: &ProofInputs,
-    flown: &Flown,
+    flown: &RecordedManeuver,
 ) -> Result<DecisiveDifference, String> {
     Flight::new(basis, flown)?.decisive_difference()
 }
@@ -175,8 +175,8 @@ impl<'a> Flight<'a> {
     ///
     /// # Errors
     /// The reason why it cannot.
-    fn new(basis: &'a ProofInputs, flown: &Flown<'a>) -> Result<Flight<'a>, String> {
-        let Flown {
+    fn new(basis: &'a ProofInputs, flown: &RecordedManeuver<'a>) -> Result<Flight<'a>, String> {
+        let RecordedManeuver {
             record,
             maneuver,
             local,

@@ -29,6 +29,8 @@ mod tests;
 
 pub use decisive_difference::DecisiveDifference;
 pub use dutch_roll::OwnEstimates;
-pub use maneuver::{Flown, Matched, ProofInputs, decisive_difference, fly_again, not_flown};
+pub use maneuver::{
+    Matched, ProofInputs, RecordedManeuver, decisive_difference, fly_again, not_flown,
+};
 pub use models::{of_posterior, of_trends};
 pub use specification::{Specification, Test, Tolerance};

@@ -165,7 +165,7 @@ impl Analysis {
         if axes.is_empty() {
             return None;
         }
-        let place = Place { airframe, trim };
+        let place = JudgedFlight { airframe, trim };
         Some(Analysis {
             qualities: axes.iter().flat_map(|a| place.quality_rows(a)).collect(),
             levels: place.level_rows(&axes, specification),
@@ -205,12 +205,12 @@ pub fn linearised(
 }
 
 /// Airframe and steady flight to which the rows apply.
-struct Place<'a> {
+struct JudgedFlight<'a> {
     airframe: Airframe,
     trim: &'a Trim,
 }
 
-impl Place<'_> {
+impl JudgedFlight<'_> {
     fn quality_rows(&self, analysis: &AxisAnalysis) -> Vec<QualityRow> {
         let row = |(quantity, dual): &(FlyingQuality, Dual)| {
             let uncertainty = analysis.uncertainty(*quantity, dual);

@@ -88,7 +88,7 @@ impl Trim {
 
 /// Values of one flown condition.
 #[derive(Clone, Debug, PartialEq)]
-struct Flown {
+struct FlownCondition {
     alpha_deg: f64,
     /// By signal; includes the tunnel's third variable, if it has one.
     quantities: BTreeMap<&'static str, f64>,
@@ -99,17 +99,17 @@ struct Flown {
 /// Conditions in which a campaign was flown, by ascending angle of attack.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FlownConditions {
-    conditions: Vec<Flown>,
+    conditions: Vec<FlownCondition>,
 }
 
 impl FlownConditions {
     /// Means of maneuvers that were flown at nearly the same angle of attack.
     #[must_use]
     pub fn new(flown: &[(&Maneuver, &Means)], tunnel: &WindTunnel) -> FlownConditions {
-        let of_maneuver = |(m, means): &(&Maneuver, &Means)| Flown::of(m, means, tunnel);
-        let mut all: Vec<Flown> = flown.iter().map(of_maneuver).collect();
+        let of_maneuver = |(m, means): &(&Maneuver, &Means)| FlownCondition::of(m, means, tunnel);
+        let mut all: Vec<FlownCondition> = flown.iter().map(of_maneuver).collect();
         all.sort_by(|a, b| a.alpha_deg.total_cmp(&b.alpha_deg));
-        let mut groups: Vec<Vec<Flown>> = Vec::new();
+        let mut groups: Vec<Vec<FlownCondition>> = Vec::new();
         for own in all {
             match groups.last_mut() {
                 Some(group) if own.alpha_deg - group[0].alpha_deg <= TOGETHER_DEG => {
@@ -121,7 +121,7 @@ impl FlownConditions {
         FlownConditions {
             conditions: groups
                 .iter()
-                .filter_map(|group| Flown::mean(group))
+                .filter_map(|group| FlownCondition::mean(group))
                 .collect(),
         }
     }
@@ -129,18 +129,18 @@ impl FlownConditions {
     /// Steady flight at an angle of attack; `None` well beyond the flown ones.
     #[must_use]
     pub fn trim(&self, alpha_deg: f64, aircraft: &Aircraft) -> Option<Trim> {
-        let is_near = |c: &&Flown| (c.alpha_deg - alpha_deg).abs() <= TOGETHER_DEG;
+        let is_near = |c: &&FlownCondition| (c.alpha_deg - alpha_deg).abs() <= TOGETHER_DEG;
         let upper = self.conditions.iter().find(|c| c.alpha_deg >= alpha_deg);
         let lower = self.conditions.iter().rfind(|c| c.alpha_deg <= alpha_deg);
         let upper_end = self.conditions.last().filter(is_near);
         let lower_end = self.conditions.first().filter(is_near);
         let (lower, upper) = (lower.or(lower_end)?, upper.or(upper_end)?);
-        Flown::between(lower, upper, alpha_deg).trim(alpha_deg, aircraft)
+        FlownCondition::between(lower, upper, alpha_deg).trim(alpha_deg, aircraft)
     }
 }
 
-impl Flown {
-    fn of(maneuver: &Maneuver, means: &Means, tunnel: &WindTunnel) -> Flown {
+impl FlownCondition {
+    fn of(maneuver: &Maneuver, means: &Means, tunnel: &WindTunnel) -> FlownCondition {
         let known = [
             (THIRD, maneuver.condition(tunnel).third),
             (signal::THETA, Some(means.theta_deg)),
@@ -159,7 +159,7 @@ impl Flown {
         let known = known
             .into_iter()
             .filter_map(|(name, value)| Some((name, value?)));
-        Flown {
+        FlownCondition {
             alpha_deg: maneuver.alpha_deg,
             quantities: known.collect(),
             surfaces_deg: means.surfaces_deg.clone(),
@@ -167,8 +167,8 @@ impl Flown {
     }
 
     /// Mean of several; `None` for an empty list.
-    fn mean(group: &[Flown]) -> Option<Flown> {
-        Some(Flown {
+    fn mean(group: &[FlownCondition]) -> Option<FlownCondition> {
+        Some(FlownCondition {
             alpha_deg: finite_mean(group.iter().map(|own| own.alpha_deg))?,
             quantities: mean_of(&group.iter().map(|own| &own.quantities)),
             surfaces_deg: mean_of(&group.iter().map(|own| &own.surfaces_deg)),
@@ -176,14 +176,14 @@ impl Flown {
     }
 
     /// Values between two conditions.
-    fn between(lower: &Flown, upper: &Flown, alpha_deg: f64) -> Flown {
+    fn between(lower: &FlownCondition, upper: &FlownCondition, alpha_deg: f64) -> FlownCondition {
         let width = upper.alpha_deg - lower.alpha_deg;
         let share = if width > 0.0 {
             (alpha_deg - lower.alpha_deg) / width
         } else {
             1.0
         };
-        Flown {
+        FlownCondition {
             alpha_deg: lower.alpha_deg + share * width,
             quantities: between(&lower.quantities, &upper.quantities, share),
             surfaces_deg: between(&lower.surfaces_deg, &upper.surfaces_deg, share),

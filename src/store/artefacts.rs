@@ -68,7 +68,7 @@ impl Store {
         Ok(Store {
             _lock: Some(lock),
             in_work: Some(InWorkList::of(folder)),
-            ..Store::look(folder)
+            ..Store::read_only(folder)
         })
     }
 
@@ -81,13 +81,13 @@ impl Store {
         let lock = Lock::share(&folder.join("lock"), "store", wait)?;
         Ok(Store {
             _lock: Some(lock),
-            ..Store::look(folder)
+            ..Store::read_only(folder)
         })
     }
 
     /// A store for reading without a lock; it need not exist.
     #[must_use]
-    pub fn look(folder: &Path) -> Store {
+    pub fn read_only(folder: &Path) -> Store {
         Store {
             folder: folder.to_owned(),
             _lock: None,

@@ -114,7 +114,7 @@ impl Nights {
 
     /// The nights of a folder to read without a lock; the folder need not exist.
     #[must_use]
-    pub fn look(reports: &Path) -> Nights {
+    pub fn read_only(reports: &Path) -> Nights {
         Nights {
             reports: reports.to_owned(),
             _lock: None,

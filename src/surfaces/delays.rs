@@ -253,7 +253,7 @@ impl Posterior {
         let mut parts = Vec::with_capacity(SPREADS_S.len().pow(2));
         for common_s in SPREADS_S {
             for own_s in SPREADS_S {
-                parts.push(Part::new(data, common_s, own_s)?);
+                parts.push(SpreadPosterior::new(data, common_s, own_s)?);
             }
         }
         let largest = parts
@@ -268,7 +268,7 @@ impl Posterior {
             delays += *share * &part.delays;
         }
         let variance = |s: usize| {
-            let of_part = |(part, share): (&Part, &f64)| {
+            let of_part = |(part, share): (&SpreadPosterior, &f64)| {
                 share * (part.variances[s] + (part.delays[s] - delays[s]).powi(2))
             };
             parts.iter().zip(&shares).map(of_part).sum::<f64>()
@@ -279,15 +279,15 @@ impl Posterior {
 }
 
 /// Posterior at one pair of spreads.
-struct Part {
+struct SpreadPosterior {
     delays: DVector<f64>,
     variances: DVector<f64>,
     log_evidence: f64,
 }
 
-impl Part {
+impl SpreadPosterior {
     /// The prior has covariance own² I + common² 1 1ᵀ.
-    fn new(data: &Information, common_s: f64, own_s: f64) -> Option<Part> {
+    fn new(data: &Information, common_s: f64, own_s: f64) -> Option<SpreadPosterior> {
         let count = data.moment.len();
         let (own, common) = (own_s * own_s, common_s * common_s);
         let along_one = own + count as f64 * common;
@@ -299,7 +299,7 @@ impl Part {
         let delays = &covariance * &data.moment;
         let log_determinant = posterior.cholesky()?.ln_determinant();
         let log_prior = (count as f64 - 1.0) * own.ln() + along_one.ln();
-        Some(Part {
+        Some(SpreadPosterior {
             log_evidence: 0.5 * (data.moment.dot(&delays) - log_prior - log_determinant),
             variances: covariance.diagonal(),
             delays,

@@ -37,7 +37,7 @@ pub const ROW: usize = DRIVING + KINDS;
 /// Length of a row in whole vectors.
 pub const WIDE: usize = ROW.next_multiple_of(8);
 
-pub type Local = [f64; LOCAL];
+pub type LocalParameters = [f64; LOCAL];
 pub type Row = [f64; WIDE];
 
 /// Motion of a window that its inputs make, at its points.
@@ -77,7 +77,7 @@ struct CorrectedInputs {
 pub fn reconstruct(
     window: &Window,
     aircraft: &Aircraft,
-    local: &Local,
+    local: &LocalParameters,
     shared: &Parameters,
 ) -> Option<Path> {
     let inputs = CorrectedInputs::of(window, shared);
@@ -113,7 +113,7 @@ pub fn sensitivities(
 struct Integration<'a> {
     window: &'a Window,
     aircraft: &'a Aircraft,
-    local: &'a Local,
+    local: &'a LocalParameters,
     inputs: &'a CorrectedInputs,
 }
 

@@ -10,7 +10,9 @@ use super::equations::{
 use super::parameters::{
     INPUTS, INSTRUMENTS, Kind, OUTPUTS, PARAMETERS, SIGNALS, is_observable, place,
 };
-use super::reconstruction::{DRIVING, LOCAL, Local, ROW, reconstruct, sensitivities, shared_place};
+use super::reconstruction::{
+    DRIVING, LOCAL, LocalParameters, ROW, reconstruct, sensitivities, shared_place,
+};
 use super::window::{self, Window, choose_windows, input_factor};
 use super::window_fit::{FitContext, WindowFit};
 use super::window_sums::{Comparison, LinearisedWindow};
@@ -353,7 +355,7 @@ fn windows(record: &Record) -> Vec<Window> {
 }
 
 /// A window with parameters at which nothing is zero.
-fn disturbed_window() -> (Window, Local, [f64; PARAMETERS]) {
+fn disturbed_window() -> (Window, LocalParameters, [f64; PARAMETERS]) {
     let record = flight(12.0);
     let short = Compatibility {
         window_s: 6.0,
@@ -371,10 +373,10 @@ fn disturbed_window() -> (Window, Local, [f64; PARAMETERS]) {
 
 /// Parameters of an output's row after a change of one of them.
 fn changed(
-    (local, shared): (&Local, &[f64; PARAMETERS]),
+    (local, shared): (&LocalParameters, &[f64; PARAMETERS]),
     (column, output): (usize, usize),
     change: f64,
-) -> (Local, [f64; PARAMETERS]) {
+) -> (LocalParameters, [f64; PARAMETERS]) {
     let (mut local, mut shared) = (*local, *shared);
     if column < LOCAL {
         local[column] += change;
@@ -492,7 +494,7 @@ fn sensitivities_of_the_readings_are_those_of_finite_differences() {
     let (window, local, shared) = disturbed_window();
     let aircraft = aircraft();
     assert_eq!(window.samples_per_node(), 4);
-    let readings = |local: &Local, shared: &[f64; PARAMETERS]| {
+    let readings = |local: &LocalParameters, shared: &[f64; PARAMETERS]| {
         reconstruct(&window, &aircraft, local, shared)
             .unwrap()
             .readings
@@ -531,7 +533,7 @@ fn the_gradient_of_each_output_is_that_of_finite_differences_of_its_squares() {
     let (window, local, shared) = disturbed_window();
     let aircraft = aircraft();
     let samples = window.margin..window.samples - window.margin;
-    let compared = |local: &Local, shared: &[f64; PARAMETERS]| {
+    let compared = |local: &LocalParameters, shared: &[f64; PARAMETERS]| {
         let path = reconstruct(&window, &aircraft, local, shared).unwrap();
         Comparison::of(&window, &path, shared, &samples)
     };

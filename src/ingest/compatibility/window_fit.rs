@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use super::equations::STATES;
 use super::input_noise::{score_covariance, with_input_noise};
 use super::parameters::{INPUTS, Kind, OUTPUTS, PARAMETERS, Parameters};
-use super::reconstruction::{LOCAL, Local, Path, Row, WIND, reconstruct, sensitivities};
+use super::reconstruction::{LOCAL, LocalParameters, Path, Row, WIND, reconstruct, sensitivities};
 use super::settings::Compatibility;
 use super::window::Window;
 use super::window_sums::{Comparison, LinearisedWindow, ReducedInformation, weighted_gradient};
@@ -45,7 +45,7 @@ impl FitContext<'_> {
 /// One window with its own parameters. A small move keeps the linearisation and the information.
 pub struct WindowFit<'a> {
     window: &'a Window,
-    local: Local,
+    local: LocalParameters,
     /// R: long-run variances of the outputs' residuals.
     variances: [f64; OUTPUTS],
     path: Path,
@@ -284,7 +284,7 @@ fn weights(variances: &[f64; OUTPUTS]) -> [f64; OUTPUTS] {
 }
 
 /// Priors of the wind's change and of initial states without instrument.
-fn local_priors(window: &Window, local: &Local, context: &FitContext) -> Vec<LocalPrior> {
+fn local_priors(window: &Window, local: &LocalParameters, context: &FitContext) -> Vec<LocalPrior> {
     let wind = (LOCAL - WIND..LOCAL).map(|parameter| LocalPrior {
         parameter,
         distance: local[parameter],

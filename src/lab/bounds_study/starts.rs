@@ -43,7 +43,7 @@ fn start_tables(variant: StartVariant, truth: &[TrueDerivative], buildup: &Build
 
 /// Minimum reached from other starting values, compared with the minimum from the true values.
 #[derive(Clone, Copy, Debug)]
-struct Reached {
+struct ReachedMinimum {
     /// `true` if the same minimum was reached, possibly from the equation-error start.
     same: bool,
     /// `true` if it was reached from the given values themselves.
@@ -91,7 +91,7 @@ fn reached(
     start: &WindTunnel,
     realisations: usize,
     seed: u64,
-) -> Vec<Reached> {
+) -> Vec<ReachedMinimum> {
     let truth = true_tables(&flown.truth);
     (0..realisations)
         .into_par_iter()
@@ -100,7 +100,7 @@ fn reached(
             let reference = maneuver.estimate(flown, &truth, seed);
             let estimated = maneuver.estimate(flown, start, seed);
             let same = is_same_minimum(&reference, &estimated);
-            Reached {
+            ReachedMinimum {
                 same,
                 unaided: same && estimated.fit.start == Some(StartingValues::WindTunnel),
             }

@@ -5,7 +5,7 @@ use approx::{assert_abs_diff_eq, assert_relative_eq};
 use super::fixture::{Flown, at, buildup, diagonal, exact, posterior, tunnel};
 use super::parts::{campaign, data, scales};
 use crate::model::Settings;
-use crate::model::others::Others;
+use crate::model::other_flights::OtherFlights;
 use crate::model::posterior::{gaussian, information};
 use crate::numerics::root::EXACT;
 use crate::output_error::error_effect::SharedError;
@@ -50,8 +50,8 @@ fn the_other_flights_are_as_if_one_s_own_had_not_been_there() {
     let own = others.remove(1);
     let rest = of(&others).unwrap();
     let asked = vec![vec![(0, 1.0), (4, -0.5)], vec![(7, 2.0)]];
-    let without = Others::new(&rest, None, &weights).unwrap().of(&asked);
-    let left = Others::new(&whole, Some(&own), &weights)
+    let without = OtherFlights::new(&rest, None, &weights).unwrap().of(&asked);
+    let left = OtherFlights::new(&whole, Some(&own), &weights)
         .unwrap()
         .of(&asked);
     assert_relative_eq!(left.0, without.0, epsilon = 1e-9);

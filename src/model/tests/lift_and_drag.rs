@@ -9,7 +9,7 @@ use crate::aero::{Buildup, Coefficient, Derivative, Regressor};
 use crate::dynamics::tests::aircraft;
 use crate::estimate::Covariance;
 use crate::maneuver::{Maneuver, Means, Status};
-use crate::model::lift_and_drag::Flown;
+use crate::model::lift_and_drag::PublishedManeuver;
 use crate::model::{Evidence, Model};
 use crate::output_error::error_effect::{ErrorEffect, SharedError};
 use crate::tables::{EstimateRow, LiftAndDragRow};
@@ -81,7 +81,7 @@ fn rows(corrected: &DMatrix<f64>, effects: Vec<ErrorEffect>) -> Vec<LiftAndDragR
         surfaces_deg: BTreeMap::from([("de_deg".into(), DE_DEG)]),
         ..Means::default()
     };
-    let flown = Flown {
+    let flown = PublishedManeuver {
         evidence: &evidence,
         estimates: &estimates,
         means: &means,

@@ -8,12 +8,12 @@ use crate::aero::wind_tunnel::{self, Third};
 use crate::aero::{Coefficient, Condition, WindTunnel};
 use crate::maneuver::Maneuver;
 use crate::model::coefficient::Data;
+use crate::model::observed_differences::ObservedDifferences;
 use crate::model::open_scales::add_open_scales;
 use crate::model::posterior::{LeavingOut, gaussian, information, of_differences};
 use crate::model::scale_prior::Scale;
 use crate::model::scales::{logarithms_of, most_probable, negative_log_posterior, scales_of};
 use crate::model::term::{Term, TermSources};
-use crate::model::touched::Touched;
 use crate::model::unknowns::root_of_differences;
 use crate::model::{Evidence, Settings};
 use crate::numerics::random::RandomStream;
@@ -124,7 +124,7 @@ fn the_normal_equations_give_generalised_least_squares() {
 }
 
 /// Information of the data on the differences.
-fn touched(terms: &[Term], data: &Data) -> Touched {
+fn observed(terms: &[Term], data: &Data) -> ObservedDifferences {
     let weights: Vec<f64> = data
         .flights
         .iter()
@@ -133,17 +133,17 @@ fn touched(terms: &[Term], data: &Data) -> Touched {
         .collect();
     let sums = information(&data.flights, &weights, data.unknowns.count);
     let own = of_differences(&sums, &data.unknowns).unwrap();
-    Touched::new(terms, &data.unknowns, &own)
+    ObservedDifferences::new(terms, &data.unknowns, &own)
 }
 
 #[test]
 fn derivatives_over_the_scales_are_those_of_differences() {
     let (terms, data) = data(&campaign(), &Settings::default());
-    let touched = touched(&terms, &data);
-    assert!(touched.information.vector.len() < data.unknowns.differences);
+    let observed = observed(&terms, &data);
+    assert!(observed.information.vector.len() < data.unknowns.differences);
     let at = logarithms_of(&scales());
     let local =
-        |at: &DVector<f64>| negative_log_posterior(&touched, &scales_of(at), EXACT).unwrap();
+        |at: &DVector<f64>| negative_log_posterior(&observed, &scales_of(at), EXACT).unwrap();
     let (whole, step) = (local(&at), 1e-5);
     for i in 0..at.len() {
         let off = DVector::from_fn(at.len(), |k, _| if k == i { step } else { 0.0 });
@@ -164,10 +164,10 @@ fn derivatives_over_the_scales_are_those_of_differences() {
 #[test]
 fn expected_second_derivatives_are_the_mean_over_data_that_the_scales_predict() {
     let (terms, data) = data(&campaign(), &exact());
-    let mut touched = touched(&terms, &data);
-    let root = touched.root(&scales(), EXACT);
+    let mut observed = observed(&terms, &data);
+    let root = observed.root(&scales(), EXACT);
     // η = Λ f + Λ^½ e of a difference f with its prior's covariance and unit noise e.
-    let matrix = touched.information.matrix.clone();
+    let matrix = observed.information.matrix.clone();
     let eigen = matrix.clone().symmetric_eigen();
     let half = &eigen.eigenvectors
         * DMatrix::from_diagonal(&eigen.eigenvalues.map(|v| v.max(0.0).sqrt()))
@@ -178,8 +178,8 @@ fn expected_second_derivatives_are_the_mean_over_data_that_the_scales_predict() 
     for _ in 0..count {
         let difference = root.times(&DVector::from_fn(root.rank(), |_, _| stream.normal()));
         let noise = DVector::from_fn(matrix.nrows(), |_, _| stream.normal());
-        touched.information.vector = &matrix * difference + &half * noise;
-        let local = negative_log_posterior(&touched, &scales(), EXACT).unwrap();
+        observed.information.vector = &matrix * difference + &half * noise;
+        let local = negative_log_posterior(&observed, &scales(), EXACT).unwrap();
         sum += local.curvature / f64::from(count);
         expected = local.expected;
     }
@@ -191,12 +191,12 @@ fn expected_second_derivatives_are_the_mean_over_data_that_the_scales_predict() 
 }
 
 #[test]
-fn the_mean_from_what_is_touched_is_that_of_all_unknowns() {
+fn the_mean_from_observed_differences_is_that_of_all_unknowns() {
     let (terms, data) = data(&campaign(), &Settings::default());
     let weights = vec![1.0; 10];
     let sums = information(&data.flights, &weights, data.unknowns.count);
     let whole = gaussian(&data.unknowns.root(&terms, &scales(), EXACT), &sums).unwrap();
-    let mean = touched(&terms, &data).mean(&scales(), EXACT).unwrap();
+    let mean = observed(&terms, &data).mean(&scales(), EXACT).unwrap();
     assert_eq!(mean.len(), data.unknowns.differences);
     for (i, own) in mean.iter().enumerate() {
         let unit = whole.covariance[(i, i)].sqrt();
@@ -223,7 +223,7 @@ fn the_likelihood_of_the_scales_is_that_of_the_data() {
         0.5 * differences.dot(&cholesky.solve(&differences)) + roots
     };
     let own = |scales: &[Scale]| {
-        let value = negative_log_posterior(&touched(&terms, &data), scales, EXACT)
+        let value = negative_log_posterior(&observed(&terms, &data), scales, EXACT)
             .unwrap()
             .value;
         let both = terms.iter().zip(scales);
@@ -256,8 +256,8 @@ fn the_spread_over_open_scales_is_the_mean_square_over_draws_of_them() {
     let weights = vec![1.0; flown.len()];
     let sums = information(&data.flights, &weights, data.unknowns.count);
     let own = of_differences(&sums, &data.unknowns).unwrap();
-    let touched = touched(&terms, &data);
-    let scales = most_probable(&touched, &scales());
+    let observed = observed(&terms, &data);
+    let scales = most_probable(&observed, &scales());
     let mean = |at: &DVector<f64>| {
         let root = root_of_differences(&terms, &scales_of(at), EXACT);
         gaussian(&root, &own).unwrap().mean
@@ -265,7 +265,7 @@ fn the_spread_over_open_scales_is_the_mean_square_over_draws_of_them() {
     let at = logarithms_of(&scales);
     let curvature = second_derivatives(&at, |at| {
         let scales = scales_of(at);
-        negative_log_posterior(&touched, &scales, EXACT)
+        negative_log_posterior(&observed, &scales, EXACT)
             .unwrap()
             .value
     });
@@ -280,7 +280,7 @@ fn the_spread_over_open_scales_is_the_mean_square_over_draws_of_them() {
     }
     let mut whole = gaussian(&data.unknowns.root(&terms, &scales, EXACT), &sums).unwrap();
     let before = whole.covariance.diagonal();
-    add_open_scales(&touched, &scales, &mut whole);
+    add_open_scales(&observed, &scales, &mut whole);
     let added = whole.covariance.diagonal() - before;
     // A quadrature of three points a direction beside a thousand draws.
     let share = added.rows(0, squares.len()).sum() / squares.sum();

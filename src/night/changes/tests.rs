@@ -257,7 +257,7 @@ fn an_instrument_that_steps_is_an_alert_with_its_channel_and_flight_once() {
 #[test]
 fn a_night_before_without_readable_tables_is_an_alert_with_the_reason() {
     let folder = tempfile::tempdir().unwrap();
-    let nights = Nights::look(folder.path());
+    let nights = Nights::read_only(folder.path());
     let before = Night {
         name: "0007".to_owned(),
         ..Night::default()

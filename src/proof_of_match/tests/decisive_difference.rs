@@ -11,7 +11,7 @@ use crate::estimate;
 use crate::model::LocalPosterior;
 use crate::numerics::random::RandomStream;
 use crate::proof_of_match::outputs::place;
-use crate::proof_of_match::{Flown, ProofInputs, decisive_difference};
+use crate::proof_of_match::{ProofInputs, RecordedManeuver, decisive_difference};
 use crate::tables::{MatchedQuantity, ModelSource};
 
 /// Decisive difference of a class at 20 deg when a database predicts it, about the truth.
@@ -32,7 +32,7 @@ fn decisive(
         tunnel: &shipped().config.tunnel,
         specification: &specification(),
     };
-    let flown = Flown {
+    let flown = RecordedManeuver {
         record: &record,
         maneuver: &flown.maneuver,
         local: Some(local),
@@ -155,7 +155,7 @@ fn a_dutch_roll_that_is_wrong_decides_with_its_difference_in_tolerances() {
             tunnel: &config.tunnel,
             specification: &of_period,
         };
-        let flown = Flown {
+        let flown = RecordedManeuver {
             record: &record,
             maneuver: &flown.maneuver,
             local: Some(&local),

@@ -16,7 +16,9 @@ use crate::proof_of_match::aerodynamics::Aerodynamics;
 use crate::proof_of_match::derivative_table::DerivativeTable;
 use crate::proof_of_match::free_run::Simulation;
 use crate::proof_of_match::recording::Recording;
-use crate::proof_of_match::{Flown, Matched, OwnEstimates, ProofInputs, Specification, fly_again};
+use crate::proof_of_match::{
+    Matched, OwnEstimates, ProofInputs, RecordedManeuver, Specification, fly_again,
+};
 use crate::tables::{MatchVerdictRow, ModelSource};
 
 pub fn shipped() -> &'static SimulatedCampaign {
@@ -126,7 +128,7 @@ pub fn proof_with(
         tunnel: &shipped().config.tunnel,
         specification,
     };
-    let flown = Flown {
+    let flown = RecordedManeuver {
         record,
         maneuver: &flown.maneuver,
         local,

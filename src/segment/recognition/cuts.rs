@@ -25,7 +25,7 @@ const STEPS_IN_FLAG_GAP: usize = 1;
 
 /// A part of the best cut: a maneuver, or steps between maneuvers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Part {
+pub(super) struct CutPart {
     /// The steps `first..end` of the sequence.
     pub steps: (usize, usize),
     pub is_maneuver: bool,
@@ -63,7 +63,7 @@ impl<'s, 'a> CutSearch<'s, 'a> {
     }
 
     /// Finds the best cut: the parts of the sequence in order, and the penalties.
-    pub fn best_cut(&self) -> (Vec<Part>, Penalties) {
+    pub fn best_cut(&self) -> (Vec<CutPart>, Penalties) {
         let bursts = self.bursts();
         let mut best: Vec<Cut> = vec![Cut::default()];
         for end in 1..=bursts.len() {
@@ -75,7 +75,7 @@ impl<'s, 'a> CutSearch<'s, 'a> {
         let mut end = bursts.len();
         while end > 0 {
             let from = best[end].from;
-            parts.push(Part {
+            parts.push(CutPart {
                 steps: (bursts[from].0, bursts[end - 1].1),
                 is_maneuver: best[end].class.is_some(),
             });

@@ -147,7 +147,8 @@ fn footer(path: &Path, object: Option<&object::Reader>) -> Result<ArrowReaderMet
         // The page index of an object avoids fetching other pages.
         let options =
             ArrowReaderOptions::default().with_offset_index_policy(PageIndexPolicy::Optional);
-        return ArrowReaderMetadata::load(object, options).map_err(|e| remote::why(path, &e));
+        return ArrowReaderMetadata::load(object, options)
+            .map_err(|e| remote::failure_reason(path, &e));
     }
     let opened = File::open(path).map_err(|e| format!("cannot open the file: {e}"))?;
     ArrowReaderMetadata::load(&opened, ArrowReaderOptions::default()).map_err(|e| unreadable(&e))

@@ -76,7 +76,7 @@ fn matches(glob: &Pattern, object: &str) -> bool {
 }
 
 /// Reason that an object cannot be opened: the store's answer, or that it is no Parquet.
-pub(super) fn why(path: &Path, error: &ParquetError) -> String {
+pub(super) fn failure_reason(path: &Path, error: &ParquetError) -> String {
     object::failed(path).unwrap_or_else(|| unreadable(error))
 }
 

@@ -47,12 +47,12 @@ pub struct Client {
     endpoint: String,
     /// Remembered entries of listings.
     listed: Mutex<BTreeMap<String, ObjectInfo>>,
-    trouble: Mutex<Trouble>,
+    failures: Mutex<FailedRequests>,
 }
 
 /// Failed requests of this run.
 #[derive(Default)]
-struct Trouble {
+struct FailedRequests {
     silent: usize,
     /// Keys whose request failed, with the reason.
     failed: BTreeMap<String, String>,
@@ -101,7 +101,7 @@ fn refuse_environment() -> Result<(), Failure> {
 }
 
 /// Messages of an error and its causes, each once.
-fn words(error: &dyn std::error::Error) -> Vec<String> {
+fn error_messages(error: &dyn std::error::Error) -> Vec<String> {
     std::iter::successors(Some(error), |e| e.source())
         .map(ToString::to_string)
         .collect()
@@ -134,7 +134,7 @@ impl Client {
         let store = store.map_err(|e| {
             Failure::Lasting(format!(
                 "cannot connect with the environment's AWS_ variables: {}",
-                words(&e).join(": ")
+                error_messages(&e).join(": ")
             ))
         })?;
         let runtime = tokio::runtime::Builder::new_current_thread()
@@ -159,7 +159,7 @@ impl Client {
             bucket: bucket.to_owned(),
             endpoint,
             listed: Mutex::default(),
-            trouble: Mutex::default(),
+            failures: Mutex::default(),
         })
     }
 
@@ -169,12 +169,12 @@ impl Client {
         key: &str,
         request: impl Future<Output = Result<T, Error>>,
     ) -> Result<Option<T>, Failure> {
-        let trouble = || self.trouble.lock().unwrap_or_else(PoisonError::into_inner);
+        let failures = || self.failures.lock().unwrap_or_else(PoisonError::into_inner);
         let unanswered = |what: String| {
-            trouble().failed.insert(key.to_owned(), what.clone());
+            failures().failed.insert(key.to_owned(), what.clone());
             Failure::Passing(what)
         };
-        if trouble().silent >= SILENT_REQUESTS {
+        if failures().silent >= SILENT_REQUESTS {
             return Err(unanswered(format!(
                 "{} did not answer {SILENT_REQUESTS} requests in a row and is not asked again; run again when it does",
                 self.endpoint
@@ -182,32 +182,35 @@ impl Client {
         }
         let error = match self.runtime.block_on(request) {
             Ok(answer) => {
-                trouble().silent = 0;
+                failures().silent = 0;
                 return Ok(Some(answer));
             }
             Err(error) => error,
         };
-        match self.told(&error) {
-            Told::Missing => {
-                trouble().silent = 0;
+        match self.classify(&error) {
+            RequestError::Missing => {
+                failures().silent = 0;
                 Ok(None)
             }
-            Told::Refused(failure) => {
-                trouble().silent = 0;
-                trouble().failed.insert(key.to_owned(), failure.to_string());
+            RequestError::Refused(failure) => {
+                failures().silent = 0;
+                failures()
+                    .failed
+                    .insert(key.to_owned(), failure.to_string());
                 Err(failure)
             }
-            Told::Nothing(what) => {
-                trouble().silent += 1;
+            RequestError::Nothing(what) => {
+                failures().silent += 1;
                 Err(unanswered(what))
             }
         }
     }
 
     /// Classifies the error of a request.
-    fn told(&self, error: &Error) -> Told {
-        let (words, endpoint, bucket) = (words(error), &self.endpoint, &self.bucket);
-        let text = words.join("\n");
+    fn classify(&self, error: &Error) -> RequestError {
+        let (error_messages, endpoint, bucket) =
+            (error_messages(error), &self.endpoint, &self.bucket);
+        let text = error_messages.join("\n");
         let code = code(&text);
         let status = text
             .split_once("status code: ")
@@ -216,13 +219,13 @@ impl Client {
             .map(str::to_owned)
             .or(status.map(|s| format!("status {s}")))
             .unwrap_or_default();
-        let refused = |what: String| Told::Refused(Failure::Lasting(what));
+        let refused = |what: String| RequestError::Refused(Failure::Lasting(what));
         match (error, status) {
             _ if code == Some("NoSuchBucket") => refused(format!(
                 "there is no bucket `{bucket}` at {endpoint}: create it, or name another"
             )),
-            (Error::NotFound { .. }, _) | (_, Some("404")) => Told::Missing,
-            (Error::Precondition { .. }, _) => Told::Refused(Failure::Passing(
+            (Error::NotFound { .. }, _) | (_, Some("404")) => RequestError::Missing,
+            (Error::Precondition { .. }, _) => RequestError::Refused(Failure::Passing(
                 "was replaced while it was read; the next run will read it".to_owned(),
             )),
             (Error::PermissionDenied { .. } | Error::Unauthenticated { .. }, _)
@@ -234,13 +237,16 @@ impl Client {
                 "{endpoint} refuses the request ({said}): look at AWS_REGION and AWS_ENDPOINT_URL in the environment"
             )),
             _ => {
-                let last = words.last().map(String::as_str).unwrap_or_default();
+                let last = error_messages
+                    .last()
+                    .map(String::as_str)
+                    .unwrap_or_default();
                 let said = if said.is_empty() {
                     last.to_owned()
                 } else {
                     said
                 };
-                Told::Nothing(format!(
+                RequestError::Nothing(format!(
                     "{endpoint} does not answer ({said}): look at AWS_ENDPOINT_URL and AWS_REGION in the environment, and at \
                      the network"
                 ))
@@ -253,7 +259,7 @@ impl Client {
     }
 
     pub fn failed(&self, key: &str) -> Option<String> {
-        self.trouble
+        self.failures
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .failed
@@ -401,7 +407,7 @@ impl Client {
 }
 
 /// Kind of a failed request.
-enum Told {
+enum RequestError {
     Missing,
     Refused(Failure),
     /// No answer, or none that could be parsed.

@@ -10,7 +10,7 @@ use super::posterior::Gaussian;
 use super::unknowns::{SparseRow, between, sum};
 
 /// Posterior of the other flights, from the point of view of one flight.
-pub struct Others<'a> {
+pub struct OtherFlights<'a> {
     whole: &'a Gaussian,
     own: Option<OwnRows<'a>>,
 }
@@ -22,16 +22,16 @@ struct OwnRows<'a> {
     weighted: DVector<f64>,
 }
 
-impl<'a> Others<'a> {
+impl<'a> OtherFlights<'a> {
     /// Posterior of all flights but one. `None` if a covariance is not positive definite.
     #[must_use]
     pub fn new(
         whole: &'a Gaussian,
         flight: Option<&'a FlightData>,
         weights: &[f64],
-    ) -> Option<Others<'a>> {
+    ) -> Option<OtherFlights<'a>> {
         let Some(flight) = flight else {
-            return Some(Others { whole, own: None });
+            return Some(OtherFlights { whole, own: None });
         };
         let (predicted, spread) = flight.image(&whole.mean, &whole.covariance);
         let root = Cholesky::new(flight.covariance(weights) - spread)?;
@@ -41,7 +41,7 @@ impl<'a> Others<'a> {
             root,
             weighted,
         });
-        Some(Others { whole, own })
+        Some(OtherFlights { whole, own })
     }
 
     /// Means and covariance of weighted sums of the unknowns.

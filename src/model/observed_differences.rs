@@ -17,14 +17,14 @@ use crate::numerics::triangular::solve_lower;
 
 /// Differences on which the data depend, term by term, with the information on them.
 #[derive(Clone, Debug)]
-pub struct Touched {
-    pub terms: Vec<TouchedTerm>,
+pub struct ObservedDifferences {
+    pub terms: Vec<ObservedTerm>,
     pub information: Information,
 }
 
 /// Differences of one term on which the data depend.
 #[derive(Clone, Debug)]
-pub struct TouchedTerm {
+pub struct ObservedTerm {
     /// Index of the first of them among those of all terms.
     pub start: usize,
     /// Prior covariance between them.
@@ -36,7 +36,7 @@ pub struct TouchedTerm {
     pub scale: ScalePrior,
 }
 
-impl TouchedTerm {
+impl ObservedTerm {
     /// Number of differences that the data touch.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -44,20 +44,24 @@ impl TouchedTerm {
     }
 }
 
-impl Touched {
+impl ObservedDifferences {
     /// Selects the differences about which there is information.
     #[must_use]
-    pub fn new(terms: &[Term], unknowns: &Unknowns, information: &Information) -> Touched {
+    pub fn new(
+        terms: &[Term],
+        unknowns: &Unknowns,
+        information: &Information,
+    ) -> ObservedDifferences {
         let Information { matrix, vector } = information;
         let mut places = Vec::new();
-        let mut touched = Vec::with_capacity(terms.len());
+        let mut observed = Vec::with_capacity(terms.len());
         for (term, first) in terms.iter().zip(&unknowns.starts) {
             let points = 0..term.prior.grid.len();
             let (start, every): (usize, Vec<usize>) = (places.len(), points.clone().collect());
-            let is_touched = |point: &usize| matrix[(first + point, first + point)] != 0.0;
-            let own: Vec<usize> = points.filter(is_touched).collect();
+            let is_observed = |point: &usize| matrix[(first + point, first + point)] != 0.0;
+            let own: Vec<usize> = points.filter(is_observed).collect();
             places.extend(own.iter().map(|point| first + point));
-            touched.push(TouchedTerm {
+            observed.push(ObservedTerm {
                 start,
                 covariance: term.prior.covariance.select(&own, &own),
                 with_all: term.prior.covariance.select(&every, &own),
@@ -65,8 +69,8 @@ impl Touched {
                 scale: term.prior.scale,
             });
         }
-        Touched {
-            terms: touched,
+        ObservedDifferences {
+            terms: observed,
             information: Information {
                 matrix: matrix.select_rows(&places).select_columns(&places),
                 vector: vector.select_rows(&places),
