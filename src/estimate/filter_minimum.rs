@@ -1,4 +1,4 @@
-//! Minimum of the cost of filter error, and why there is none.
+//! Minimum of the cost of filter error, or the reason why none was found.
 
 use std::cmp::Ordering;
 use std::fmt;

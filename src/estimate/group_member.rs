@@ -154,7 +154,7 @@ impl Task<'_> {
         }
     }
 
-    /// Standard uncertainty of each bias, where calibration knows it.
+    /// Standard uncertainty of each bias, if calibration gives one.
     fn bias_uncertainties(&self, model: &Model) -> Vec<Option<f64>> {
         let uncertainty = |output: Output| {
             let known = self.context.settings.calibration.get(output.signal())?;

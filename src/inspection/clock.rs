@@ -36,7 +36,7 @@ pub fn find_clock(recordings: &[Recording]) -> Option<ClockColumn> {
         .map(|(_, clock)| clock)
 }
 
-/// A column as a clock, with the weight of its name; `None` for a column that is none.
+/// A column as a clock, with the weight of its name; `None` for a column that is no clock.
 fn clock(recordings: &[Recording], name: &str) -> Option<(f64, ClockColumn)> {
     let columns = recordings.iter().filter_map(|r| r.column(name));
     let mut steps = Vec::new();

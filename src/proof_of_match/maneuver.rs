@@ -88,7 +88,7 @@ pub fn fly_again(basis: &ProofInputs, flown: &RecordedManeuver) -> Matched {
 /// model.
 ///
 /// # Errors
-/// The reason why there is none.
+/// The reason why no such difference exists.
 pub fn decisive_difference(
     basis: &ProofInputs,
     flown: &RecordedManeuver,

@@ -226,7 +226,7 @@ impl Conditioner {
         self.settled
     }
 
-    /// Takes the next samples as recorded, NaN where there is none.
+    /// Takes the next samples as recorded; a missing sample is NaN.
     pub fn push(&mut self, recorded: &[f64]) {
         match self.without_beyond(recorded) {
             Some(recorded) => self.convert(&recorded),

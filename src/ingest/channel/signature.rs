@@ -1,6 +1,6 @@
 //! Signature of a record: the values measured at every full ten seconds of its clock. Two records
-//! whose signatures have times in common hold the same rows, whatever the names and beginnings of
-//! their files.
+//! with equal signatures at their common times hold the same rows, even if their files differ in
+//! name and beginning.
 
 use std::collections::BTreeMap;
 

@@ -205,7 +205,7 @@ impl BlockMeans {
         changed
     }
 
-    /// Mean of a signal over a block; NaN where there is none.
+    /// Mean of a signal over a block; NaN if the block has too few samples.
     pub fn mean(&self, signal: &str, block: usize) -> f64 {
         let own = self.means.get(signal);
         let mean = own.and_then(|own| Some(own.means.get(block)? * own.factor));

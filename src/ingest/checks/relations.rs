@@ -1,6 +1,6 @@
 //! Kinematic relations between channels: each has two sides that are equal for any aerodynamics.
 //!
-//! The sides are compared in integrated form over windows, so that no noise is differentiated. A
+//! The sides are compared in integrated form over windows, which avoids differentiating noise. A
 //! side is the change of a state plus the integral of a rate over the window, per second. With `v =
 //! (u, v, w)` and `f` the specific force,
 //!

@@ -103,7 +103,7 @@ impl ColumnSource for Counted {
     }
 }
 
-/// Most readings of a survey, whatever the clock.
+/// Largest number of readings that a survey of any clock may make.
 const MOST_READINGS: usize = 10_000;
 
 /// Largest number of rows that a survey reads, per row and binary logarithm of the rows.

@@ -5,8 +5,8 @@
 //! size² + θ² (Cauchy's distribution by reweighting) for an error that is surely larger than
 //! ordinary. An error that several instruments could explain thus goes to one. After the
 //! reweighting, the error that the data alone put most surely beyond the ordinary is freed of its
-//! prior, until there is none. An error that comes out as large as a fault, but is less certain,
-//! gets the ordinary prior again.
+//! prior, until no such error is left. An error that comes out as large as a fault, but is less
+//! certain, gets the ordinary prior again.
 
 use rayon::prelude::*;
 

@@ -2,7 +2,7 @@
 //! the trim by finite differences.
 //!
 //! Weights after Bryson: one over the square of the allowed deviation. The regulator holds a trim at
-//! any angle of attack, whatever the derivatives are.
+//! any angle of attack and with any derivatives.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
