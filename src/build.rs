@@ -12,8 +12,8 @@ fn main() {
     for file in &files {
         let name = file.to_string_lossy().replace('\\', "/");
         for byte in name.bytes().chain(std::fs::read(file).unwrap_or_default()) {
-            // FNV-1a hash: no protection against tampering, and none is needed to distinguish one state of
-            // the code from another.
+            // FNV-1a hash: no protection against tampering, and none is needed to distinguish one
+            // state of the code from another.
             hash = (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
         }
     }

@@ -40,7 +40,8 @@ impl CampaignHistory<'_> {
     pub fn of(&self, class: &str) -> Experience {
         let (usable, flown) = self.usable(Some(class));
         let (of_all, all) = self.usable(None);
-        // One more maneuver counts as converged: without any maneuver a card is expected to succeed.
+        // One more maneuver counts as converged: without any maneuver a card is expected to
+        // succeed.
         let ordinary = (of_all + 1.0) / (all + 1.0);
         Experience {
             usable: (usable + PRIOR_MANEUVERS * ordinary) / (flown + PRIOR_MANEUVERS),

@@ -30,7 +30,8 @@ pub struct CoefficientPosterior {
     pub terms: Vec<Term>,
     pub unknowns: Unknowns,
     pub scales: Vec<Scale>,
-    /// Scales before the last step. The noise between the points of the grids was computed with them.
+    /// Scales before the last step. The noise between the points of the grids was computed with
+    /// them.
     pub noise_scales: Vec<Scale>,
     /// Posterior, including the spread over the scales that the data leave open.
     pub gaussian: Gaussian,

@@ -44,7 +44,8 @@ pub fn estimate_values<D: Bounded>(
     let mut fit = minimise(data, start, table, settings);
     if weights == Weights::Estimated {
         fit = settle_weights(data, fit, resolution, settings);
-        // With settled weights the cost is one half for every fit, so fits are compared by the cost with the table's weights.
+        // With settled weights the cost is one half for every fit, so fits are compared by the cost
+        // with the table's weights.
         let cost = |_| data.sums(&fit.response, &table).cost();
         fit.final_cost = fit.final_cost.map(cost);
     }

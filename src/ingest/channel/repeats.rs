@@ -81,7 +81,8 @@ pub fn stuck_run(values: &[f64], step_s: f64, settings: &Stuck) -> StuckRun {
         values.iter().position(finite).unwrap_or_default(),
         values.iter().rposition(finite).unwrap_or_default(),
     );
-    // The runs at the ends may be parts of longer ones. A stuck channel has no runs of lengths between chance and stuck.
+    // The runs at the ends may be parts of longer ones. A stuck channel has no runs of lengths
+    // between chance and stuck.
     let is_inner = |run: &&Range<usize>| !run.contains(&first) && !run.contains(&last);
     let doubtful = longest / SHORTER_RUNS..longest;
     let is_doubtful = runs

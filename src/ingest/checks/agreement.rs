@@ -448,7 +448,8 @@ mod tests {
         // A response of the gusts' size leaves √(1 − 0.8²), a larger one nothing less.
         assert!((least(8.0, 9.0) - 0.6).abs() < 1e-12);
         assert!(least(20.0, f64::INFINITY).abs() < 1e-12);
-        // A missing correlation is found in light gusts, but not in strong ones to which the aircraft responds.
+        // A missing correlation is found in light gusts, but not in strong ones to which the
+        // aircraft responds.
         let of = |gust, response| {
             let disturbance = Disturbance { gust, response };
             verdict_in(disturbance, Selection::Above(5.0), 0.9, 0.2, 0.3)

@@ -66,7 +66,8 @@ fn an_estimate_moves_by_what_the_other_flights_say_of_what_it_held() {
     let [slope, rate] = &rows(&flown)[1..] else {
         panic!("two rows")
     };
-    // Scales of the whole campaign are almost those of the others: the first has little information on CN_q.
+    // Scales of the whole campaign are almost those of the others: the first has little information
+    // on CN_q.
     assert_relative_eq!(rate.value.unwrap(), value, max_relative = 1e-3);
     let moved = 0.08 - 0.01 * (rate.value.unwrap() - rate.wind_tunnel.unwrap());
     assert_relative_eq!(slope.value.unwrap(), moved, max_relative = 1e-12);
