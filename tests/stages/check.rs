@@ -62,7 +62,7 @@ fn the_shipped_pipeline_is_right_and_says_what_it_would_do() {
         "data/demo/flights: 4 flights",
         "48 derivatives",
         "data/demo/wt_tables.csv",
-        "The configuration is right",
+        "The configuration is valid",
     ] {
         assert!(
             outcome.stdout.contains(word),

@@ -523,7 +523,7 @@ fn init_writes_a_pipeline_whose_questions_check_lists() {
     let right = check();
     assert_eq!(right.code, Some(0), "{}", right.stderr);
     for word in [
-        "The configuration is right",
+        "The configuration is valid",
         "not sure",
         "pitch_surface",
         "roll_pilot",

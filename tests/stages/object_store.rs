@@ -200,7 +200,7 @@ fn the_tables_are_those_of_folders_and_another_machine_finds_all_made() {
     assert_eq!(server.run(&second, "s3://flights"), 0);
     let verified = run(&mut server.command(&second, "verify", "s3://flights"));
     assert!(
-        verified.code == Some(0) && verified.stdout.contains("All of it holds"),
+        verified.code == Some(0) && verified.stdout.contains("The night is valid"),
         "{verified:?}"
     );
     let status = run(&mut server.command(&second, "status", "s3://flights"));
