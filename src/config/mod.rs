@@ -21,6 +21,7 @@ mod tunnel_tables;
 mod written;
 mod yaml_bounds;
 
+pub(crate) use check::cards_in_range;
 pub use checked::Config;
 pub use cluster::ClusterSettings;
 pub use load::Overrides;

@@ -79,6 +79,31 @@ fn a_wrong_card_is_named_with_its_line() {
         ),
         ("seed: 1994", "sed: 1994", "did you mean `seed`?"),
         ("roll: da_deg", "roll: dA_deg", "did you mean `da_deg`?"),
+        (
+            "de_deg: { lower_deg: -24",
+            "de_deg: { lower_deg: 24",
+            "surface `de_deg`: `lower_deg` must not be above `upper_deg`",
+        ),
+        (
+            "de_deg, lower_deg: -15",
+            "de_deg, lower_deg: 15",
+            "trim by `de_deg`: `lower_deg` must not be above `upper_deg`",
+        ),
+        (
+            "rate_deg_s: 40",
+            "rate_deg_s: -40",
+            "`rate_deg_s` must not be negative",
+        ),
+        (
+            "sigma_ft_s: 0.5",
+            "sigma_ft_s: .nan",
+            "`sigma_ft_s` must be a finite number",
+        ),
+        (
+            "parts: 4",
+            "parts: 4000000",
+            "`parts` must lie between 1 and 1000",
+        ),
     ] {
         let text = cards(TWO);
         assert!(text.contains(right), "{right}");

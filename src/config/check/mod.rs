@@ -11,6 +11,8 @@ mod numbers;
 mod ranges;
 mod stages;
 
+pub(crate) use ranges::of_cards as cards_in_range;
+
 use std::collections::BTreeMap;
 
 use super::checked::Config;

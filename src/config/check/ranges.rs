@@ -74,6 +74,18 @@ const OF_CLASS: [(&str, Range); 9] = [
     ("above_alpha_deg", (-180.0, 180.0)),
 ];
 
+/// Ranges of the numbers of test cards by the last name of a key: those that set the amount of work.
+const OF_CARDS: [(&str, Range); 8] = [
+    ("seed", (0.0, 1.9e19)),
+    ("rate_hz", (0.01, 1e4)),
+    ("control_hz", (0.01, 1e5)),
+    ("parts", (1.0, 1000.0)),
+    ("duration_s", (0.0, 3600.0)),
+    ("gradient_ft", (1.0, 1e5)),
+    ("per_s", (0.0, 100.0)),
+    ("realisations", (1.0, 1e6)),
+];
+
 /// Range of other sizes.
 const SIZE: Range = (0.0, 1e12);
 
@@ -92,11 +104,26 @@ pub(super) fn of_class(source: &Source) -> Result<()> {
     check(source, &range_of_class)
 }
 
+/// Checks that the numbers of test cards are in their ranges.
+///
+/// # Errors
+/// [`crate::error::Error`] with file and line of the first number outside its range.
+pub(crate) fn of_cards(source: &Source) -> Result<()> {
+    check(source, &|path| {
+        range_by_name(&OF_CARDS, path, (-SIZE.1, SIZE.1))
+    })
+}
+
 /// Range of the number at a path of keys of a class.
 fn range_of_class(path: &[String]) -> Range {
+    range_by_name(&OF_CLASS, path, SIZE)
+}
+
+/// Range of a number by the last name of its key, or another one.
+fn range_by_name(ranges: &[(&str, Range)], path: &[String], otherwise: Range) -> Range {
     let name = path.last().map_or("", String::as_str);
-    let known = OF_CLASS.iter().find(|(known, _)| *known == name);
-    known.map_or(SIZE, |(_, range)| *range)
+    let known = ranges.iter().find(|(known, _)| *known == name);
+    known.map_or(otherwise, |(_, range)| *range)
 }
 
 /// Range of the number at a path of keys of `pipeline.yaml`.

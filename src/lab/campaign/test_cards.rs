@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::cards::Cards;
 use crate::aero::WindTunnel;
-use crate::config::{Config, Source};
+use crate::config::{Config, Source, cards_in_range};
 use crate::error::{Result, did_you_mean};
 use crate::flight::signal;
 use crate::lab::simulator::{Program, Simulator};
@@ -24,6 +24,7 @@ impl TestCards {
     pub fn read(file: &Path) -> Result<TestCards> {
         let source = Source::read(file.to_owned())?;
         let cards = source.parse()?;
+        cards_in_range(&source)?;
         Ok(TestCards { cards, source })
     }
 

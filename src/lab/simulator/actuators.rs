@@ -26,6 +26,20 @@ pub struct SurfaceState {
 const STEPS: u32 = 4;
 
 impl Actuator {
+    /// Checks the limits.
+    ///
+    /// # Errors
+    /// The message for the first one that is wrong.
+    pub fn check(&self) -> Result<(), String> {
+        if self.lower_deg > self.upper_deg {
+            return Err("`lower_deg` must not be above `upper_deg`".into());
+        }
+        if self.rate_deg_s < 0.0 {
+            return Err("`rate_deg_s` must not be negative".into());
+        }
+        Ok(())
+    }
+
     /// Moves a surface for a time under a constant command, by the midpoint rule.
     #[must_use]
     pub fn advance(&self, surface: SurfaceState, command_deg: f64, time_s: f64) -> SurfaceState {

@@ -174,6 +174,17 @@ impl Settings {
         {
             return Err("`loadings` must be in order of ascending `mass_slug`".into());
         }
+        for (name, actuator) in &self.surfaces {
+            actuator
+                .check()
+                .map_err(|e| format!("surface `{name}`: {e}"))?;
+        }
+        if let Some(trimmer) = self.trim.pitch.iter().find(|t| t.lower_deg > t.upper_deg) {
+            return Err(format!(
+                "trim by `{}`: `lower_deg` must not be above `upper_deg`",
+                trimmer.signal
+            ));
+        }
         let schedules = self.schedules.iter();
         for (name, schedule) in schedules {
             let ascending = schedule.alpha_deg.windows(2).all(|w| w[0] < w[1]);
