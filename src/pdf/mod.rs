@@ -23,7 +23,7 @@
 //! | `note` (`p`), `small` (`div`) | small type |
 //! | `pairs` (`div`) | children two by two |
 //! | `dense` (`table`) | small type, no rules |
-//! | `n` (`th`, `td`) | aligned right |
+//! | `n` (`th`, `td`) | aligned right; in a head, with all cells of the column |
 //! | `weak` `fair` `strong` `flagged` (`td`) | four shades |
 //! | `inline` (`svg`) | a drawing within a line |
 //!

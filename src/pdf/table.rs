@@ -91,20 +91,47 @@ fn lay_out(table: Node, width: f32, fonts: &Fonts) -> (TableLayout, Vec<Row>) {
 }
 
 fn read(table: Node, fonts: &Fonts, size: f32) -> Vec<Row> {
-    table
-        .descendants()
-        .filter(|n| n.has_tag_name("tr"))
+    let numeric = numeric_columns(table);
+    let is_numeric = |column: usize| numeric.get(column).copied().unwrap_or(false);
+    rows_of(table)
         .map(|row| {
-            let is_head = row.parent().is_some_and(|p| p.has_tag_name("thead"));
-            let cells = row
-                .children()
-                .filter(|n| n.has_tag_name("td") || n.has_tag_name("th"))
-                .filter(|n| !is_screen_only(*n))
-                .map(|cell| read_cell(cell, is_head, fonts, size))
+            let is_head = is_head(row);
+            let cells = cells_of(row)
+                .enumerate()
+                .map(|(column, cell)| Cell {
+                    align: if is_numeric(column) || has_class(cell, "n") {
+                        1.0
+                    } else {
+                        0.0
+                    },
+                    ..read_cell(cell, is_head, fonts, size)
+                })
                 .collect();
             Row { is_head, cells }
         })
         .collect()
+}
+
+fn rows_of<'a>(table: Node<'a, 'a>) -> impl Iterator<Item = Node<'a, 'a>> {
+    table.descendants().filter(|n| n.has_tag_name("tr"))
+}
+
+fn is_head(row: Node) -> bool {
+    row.parent().is_some_and(|p| p.has_tag_name("thead"))
+}
+
+fn cells_of<'a>(row: Node<'a, 'a>) -> impl Iterator<Item = Node<'a, 'a>> {
+    row.children()
+        .filter(|n| n.has_tag_name("td") || n.has_tag_name("th"))
+        .filter(|n| !is_screen_only(*n))
+}
+
+/// Columns whose head is aligned right, and therefore their cells.
+fn numeric_columns(table: Node) -> Vec<bool> {
+    let head = rows_of(table).find(|row| is_head(*row));
+    head.map_or_else(Vec::new, |row| {
+        cells_of(row).map(|cell| has_class(cell, "n")).collect()
+    })
 }
 
 fn read_cell(cell: Node, is_head: bool, fonts: &Fonts, size: f32) -> Cell {
@@ -122,7 +149,7 @@ fn read_cell(cell: Node, is_head: bool, fonts: &Fonts, size: f32) -> Cell {
     }
     Cell {
         words: reader.words(),
-        align: if has_class(cell, "n") { 1.0 } else { 0.0 },
+        align: 0.0,
         shade: shade.map(|(_, colour, _)| *colour),
     }
 }
@@ -214,6 +241,17 @@ impl TableLayout {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn cells_are_aligned_as_the_head_of_their_column() {
+        let page = r#"<table><thead><tr><th>a</th><th class="n">b</th></tr></thead>
+            <tbody><tr><td>x</td><td>1</td></tr><tr><td class="n">2</td><td>3</td></tr></tbody></table>"#;
+        let xml = roxmltree::Document::parse(page).unwrap();
+        let rows = read(xml.root_element(), &Fonts::load().unwrap(), 7.0);
+        let aligned = |row: &Row| row.cells.iter().map(|c| c.align > 0.5).collect::<Vec<_>>();
+        let expected = [vec![false, true], vec![false, true], vec![true, true]];
+        assert_eq!(rows.iter().map(aligned).collect::<Vec<_>>(), expected);
+    }
 
     #[test]
     fn columns_share_the_width_that_is_left() {

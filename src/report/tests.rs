@@ -15,14 +15,17 @@ const VOID: [&str; 4] = ["meta", "br", "hr", "input"];
 /// Elements of running text: a paragraph can hold nothing else.
 const PHRASING: [&str; 9] = ["a", "b", "i", "small", "sub", "span", "code", "svg", "br"];
 
-/// Checks that the page is well-formed and nested as HTML allows.
-fn assert_valid(page: &str) {
+fn parsed(page: &str) -> roxmltree::Document<'_> {
     let options = roxmltree::ParsingOptions {
         allow_dtd: true,
         ..Default::default()
     };
-    let document =
-        roxmltree::Document::parse_with_options(page, options).unwrap_or_else(|e| panic!("{e}"));
+    roxmltree::Document::parse_with_options(page, options).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Checks that the page is well-formed and nested as HTML allows.
+fn assert_valid(page: &str) {
+    let document = parsed(page);
     for node in document.descendants().filter(roxmltree::Node::is_element) {
         let name = node.tag_name().name();
         let inside = |ancestor: &str| node.ancestors().skip(1).any(|a| a.has_tag_name(ancestor));
@@ -283,6 +286,48 @@ fn every_maneuver_begins_a_page_and_every_derivative_has_a_figure() {
         page.matches("class=\"derivative\"").count(),
         campaign.order.len()
     );
+}
+
+/// Most elements of a maneuver's page beside the rows of its table. A browser reads 300 such pages before it
+/// has loaded a report.
+const MOST_ELEMENTS: usize = 190;
+
+#[test]
+fn a_page_of_a_maneuver_has_few_elements() {
+    let mut campaign = campaign();
+    let history = &mut campaign.histories[0];
+    history.outputs = vec![history.outputs[0].clone(); 5];
+    history.controls = vec![history.controls[0].clone(); 3];
+    let page = render(&campaign);
+    let document = parsed(&page);
+    let maneuver = document
+        .descendants()
+        .find(|node| node.attribute("id") == Some("m1"))
+        .expect("the page of the first maneuver");
+    let elements = || maneuver.descendants().filter(roxmltree::Node::is_element);
+    let of_kind = |name: &str| elements().filter(|e| e.has_tag_name(name)).count();
+    let (rows, cells) = (of_kind("tr"), of_kind("td"));
+    assert!(rows == 5 && cells == 40, "{rows} rows, {cells} cells");
+    let others = elements().count() - rows - cells;
+    assert!(others <= MOST_ELEMENTS, "{others} elements");
+    let with_attributes = elements()
+        .filter(|e| e.has_tag_name("td") && e.attributes().len() > 0)
+        .count();
+    assert_eq!(with_attributes, 0, "the table aligns its columns");
+}
+
+#[test]
+fn a_long_table_reserves_its_height_before_it_is_laid_out() {
+    let mut campaign = campaign();
+    assert!(!render(&campaign).contains("class=\"scroll long\""));
+    campaign
+        .problems
+        .extend((0..60).map(|i| problem(&format!("reason {i}"))));
+    let rows = campaign.problems.len();
+    let page = render(&campaign);
+    let height = format!("auto {}px", 28 * rows + 50);
+    let start = "<div class=\"scroll long\" style=\"contain-intrinsic-size: ";
+    assert!(page.contains(&format!("{start}{height}\">")), "{rows} rows");
 }
 
 #[test]

@@ -104,6 +104,11 @@ addEventListener('load', function () {
   var all = function (s) { return Array.from(document.querySelectorAll(s)); }, said = [];
   var seen = function (e) { var box = e.getBoundingClientRect(); return box.width !== 0 ? box.height !== 0 : false; };
   said.push('loaded ' + performance.getEntriesByType('resource').length);
+  var laidOut = function (e) { return e.checkVisibility({ contentVisibilityAuto: true }); };
+  var many = function (e) { return 4 * e.filter(laidOut).length > e.length; };
+  said.push('many cells laid out ' + many(all('td')) + ', figures ' + many(all('svg[role=img]')));
+  var last = all('.maneuver').pop(); location.hash = last.id;
+  said.push('reached ' + (50 > Math.abs(last.getBoundingClientRect().top - 50))); scrollTo(0, 0);
   said.push('wide ' + (document.documentElement.scrollWidth > innerWidth));
   var figures = all('svg[role=img]');
   said.push('figures ' + figures.length + ' empty ' + figures.filter(function (f) { return !f.querySelector('path,line'); }).length);
@@ -140,7 +145,9 @@ fn a_browser_shows_the_report_wide_and_narrow_without_errors() {
             .unwrap()
             .0;
         assert!(
-            title.starts_with("loaded 0; wide false; figures "),
+            title.starts_with(
+                "loaded 0; many cells laid out false, figures false; reached true; wide false; figures "
+            ),
             "{size}: {title}"
         );
         assert!(

@@ -4,7 +4,7 @@
 use std::fmt::Write;
 
 use super::scale::Scale;
-use super::strips::{self, MISSING_STYLE, Sizes, Strip, StripColumn};
+use super::strips::{self, MISSING_STYLE, Sizes, Strip, StripColumn, StripDrawing};
 use super::style::{EXCLUDED_COLOUR, FAINT, INK};
 use super::svg_writer::{Alternative, PathStyle, SvgWriter, TextStyle, coordinate, rectangle};
 
@@ -98,7 +98,9 @@ pub fn draw(chart: &Chart) -> String {
     for (lane, row) in chart.lanes.iter().zip(1..) {
         draw_lane(&mut svg, lane, &column, top + LANE * f64::from(row));
     }
-    column.draw(&mut svg, &chart.strips, strips_top);
+    let mut strips = StripDrawing::default();
+    column.draw(&mut strips, &chart.strips, strips_top);
+    strips.write(&mut svg);
     let mut y = strips_bottom + SIZES.time_axis + 4.0;
     for line in wrapped(&chart.notes, width) {
         svg.text((EDGE, y), &line, FAINT_TEXT);

@@ -1,7 +1,7 @@
 //! Strips of the report: one or several columns over one time axis, as a drawing within the page.
 
 use super::scale::Scale;
-use super::strips::{Sizes, Strip, StripColumn};
+use super::strips::{Sizes, Strip, StripColumn, StripDrawing};
 use super::svg_writer::{Alternative, SvgWriter};
 
 /// A drawing of strips.
@@ -29,7 +29,7 @@ const EDGE: f64 = 8.0;
 pub fn draw(figure: &StripFigure) -> String {
     let columns = figure.columns.len().max(1) as f64;
     let width = (figure.width - EDGE - GAP * (columns - 1.0)) / columns;
-    let mut svg = SvgWriter::default();
+    let mut drawing = StripDrawing::default();
     let mut height: f64 = 0.0;
     let mut left = 0.0;
     for strips in &figure.columns {
@@ -40,10 +40,12 @@ pub fn draw(figure: &StripFigure) -> String {
             right: left + width,
             time: figure.time,
         };
-        column.draw(&mut svg, strips, 0.0);
+        column.draw(&mut drawing, strips, 0.0);
         height = height.max(SIZES.strips_height(strips) + SIZES.time_axis);
         left += width + GAP;
     }
+    let mut svg = SvgWriter::default();
+    drawing.write(&mut svg);
     let alternative = Alternative {
         id: &figure.id,
         title: &figure.title,
@@ -103,5 +105,18 @@ mod tests {
             "each column has its axis"
         );
         assert_eq!(svg.matches(r#"<g data-class="c1">"#).count(), 3);
+    }
+
+    #[test]
+    fn everything_alike_is_one_path_however_many_strips() {
+        let mut figure = figure();
+        for strip in figure.columns.iter_mut().flatten() {
+            strip.attributes.clear();
+        }
+        let paths = |figure: &StripFigure| draw(figure).matches("<path").count();
+        assert_eq!(paths(&figure), 4, "grid, lines, dots and frames");
+        let more = figure.columns[0].clone();
+        figure.columns[1].extend(more);
+        assert_eq!(paths(&figure), 4);
     }
 }

@@ -1,13 +1,16 @@
 //! Renderer of strip charts: signals under each other over one time axis.
 //!
 //! A report of five hundred maneuvers has five hundred such drawings. So everything alike in a
-//! column is one path, and lines are written in steps of a tenth.
+//! drawing is one path, and texts that are alike share their attributes.
 
 use std::fmt::Write;
 
+use super::layers::Layers;
 use super::scale::Scale;
 use super::style::{EXCLUDED_COLOUR, FAINT, INK, TOLERANCE_AREA, TOLERANCE_LIMIT};
-use super::svg_writer::{Anchor, PathStyle, SvgWriter, TextStyle, coordinate, polyline, rectangle};
+use super::svg_writer::{
+    Anchor, PathStyle, SvgWriter, TextStyle, coordinate, dot, polyline, rectangle,
+};
 use crate::report::notation::Digits;
 
 /// One signal over time.
@@ -167,16 +170,47 @@ pub struct StripColumn {
     pub time: Scale,
 }
 
-/// Paths and texts of a column that belong to no strip.
+/// Columns of strips in the making.
+#[derive(Default)]
+pub struct StripDrawing {
+    axes: Axes,
+    layers: Layers,
+    /// Strips with attributes, and flags.
+    groups: SvgWriter,
+}
+
+/// Paths and texts that belong to no strip.
 #[derive(Default)]
 struct Axes {
     grid: String,
     frame: String,
-    texts: SvgTexts,
+    tick_labels: SvgTexts,
+    names: SvgTexts,
+    units: SvgTexts,
+    /// Tick labels and title of the time axis.
+    time: SvgTexts,
 }
 
 /// Texts to be written over lines and frame.
-type SvgTexts = Vec<((f64, f64), String, TextStyle<'static>)>;
+type SvgTexts = Vec<((f64, f64), String)>;
+
+impl StripDrawing {
+    /// Writes grid, signals, frames and texts, the later over the former.
+    pub fn write(self, svg: &mut SvgWriter) {
+        svg.path(&self.axes.grid, PathStyle::line("#cccccc", 0.5));
+        self.layers.draw(svg);
+        svg.append(&self.groups);
+        svg.path(&self.axes.frame, PathStyle::line("#000000", 0.8));
+        let anchored = |anchor| TextStyle {
+            anchor,
+            ..TextStyle::default()
+        };
+        svg.texts(&self.axes.tick_labels, anchored(Anchor::End));
+        svg.texts(&self.axes.names, TextStyle::default());
+        svg.texts(&self.axes.units, TextStyle::coloured(FAINT));
+        svg.texts(&self.axes.time, anchored(Anchor::Middle));
+    }
+}
 
 impl StripColumn {
     /// Horizontal place of a time, kept inside the plot area.
@@ -187,41 +221,29 @@ impl StripColumn {
     }
 
     /// Draws strips from a height downwards, with the time axis below the last.
-    pub fn draw(&self, svg: &mut SvgWriter, strips: &[Strip], top: f64) {
-        let mut axes = Axes::default();
-        let mut lines = SvgWriter::default();
+    pub fn draw(&self, drawing: &mut StripDrawing, strips: &[Strip], top: f64) {
         let mut y = top + self.sizes.half_gap;
         for strip in strips {
-            self.axes_of_strip(&mut axes, strip, y);
-            self.signals(&mut lines, strip, y);
+            self.axes_of_strip(&mut drawing.axes, strip, y);
+            self.signals(drawing, strip, y);
             y += strip.height + 2.0 * self.sizes.half_gap;
         }
-        self.time_axis(&mut axes, y - 2.0 * self.sizes.half_gap);
-        svg.path(&axes.grid, PathStyle::line("#cccccc", 0.5));
-        svg.append(&lines);
-        svg.path(&axes.frame, PathStyle::line("#000000", 0.8));
-        for (place, text, style) in axes.texts {
-            svg.text(place, &text, style);
-        }
+        self.time_axis(&mut drawing.axes, y - 2.0 * self.sizes.half_gap);
     }
 
     fn time_axis(&self, axes: &mut Axes, bottom: f64) {
-        let middle = TextStyle {
-            anchor: Anchor::Middle,
-            ..TextStyle::default()
-        };
         for (value, label) in ticks(self.time) {
             let x = self.x(value);
             // Writing into a String cannot fail.
             let _ = write!(axes.frame, "M{} {}v4", coordinate(x), coordinate(bottom));
             let place = (x, bottom + self.sizes.text + 4.0);
-            axes.texts.push((place, label, middle));
+            axes.time.push((place, label));
         }
         let place = (
             0.5 * (self.left + self.right),
             bottom + 2.0 * self.sizes.text + 6.0,
         );
-        axes.texts.push((place, "time, s".to_owned(), middle));
+        axes.time.push((place, "time, s".to_owned()));
     }
 
     /// Grid, frame, ticks, name and unit of one strip.
@@ -233,12 +255,8 @@ impl StripColumn {
             let y = strip.y(top, value);
             let _ = write!(axes.grid, "M{left} {}h{width}", coordinate(y));
             let _ = write!(axes.frame, "M{left} {}h-3", coordinate(y));
-            let style = TextStyle {
-                anchor: Anchor::End,
-                ..TextStyle::default()
-            };
-            axes.texts
-                .push(((self.left - 5.0, y + half_digit), label, style));
+            let place = (self.left - 5.0, y + half_digit);
+            axes.tick_labels.push((place, label));
         }
         for (value, _) in ticks(self.time) {
             let [x, y, height] = [self.x(value), top, strip.height].map(coordinate);
@@ -256,64 +274,63 @@ impl StripColumn {
         } else {
             middle - 1.5
         };
-        let name = ((self.names_left, name_y), strip.name.clone());
-        axes.texts.push((name.0, name.1, TextStyle::default()));
+        let place = (self.names_left, name_y);
+        axes.names.push((place, strip.name.clone()));
         if !strip.unit.is_empty() {
-            let style = TextStyle {
-                colour: Some(FAINT),
-                ..TextStyle::default()
-            };
             let place = (self.names_left, middle + self.sizes.text);
-            axes.texts.push((place, strip.unit.clone(), style));
+            axes.units.push((place, strip.unit.clone()));
         }
     }
 
     /// Lines, dots and flags of one strip.
-    fn signals(&self, svg: &mut SvgWriter, strip: &Strip, top: f64) {
-        if !strip.attributes.is_empty() {
-            let attributes: Vec<(&str, &str)> = strip
-                .attributes
-                .iter()
-                .map(|(name, value)| (*name, value.as_str()))
-                .collect();
-            svg.open_group(&attributes, "");
+    fn signals(&self, drawing: &mut StripDrawing, strip: &Strip, top: f64) {
+        let ends = (top, top + strip.height);
+        if strip.attributes.is_empty() {
+            drawing.layers.add(self.marks(strip, top));
+            self.flags(&mut drawing.groups, &strip.flagged, ends);
+            return;
         }
-        self.tube(svg, strip, top);
-        for line in &strip.lines {
+        let attributes: Vec<(&str, &str)> = strip
+            .attributes
+            .iter()
+            .map(|(name, value)| (*name, value.as_str()))
+            .collect();
+        let mut own = Layers::default();
+        own.add(self.marks(strip, top));
+        drawing.groups.open_group(&attributes, "");
+        own.draw(&mut drawing.groups);
+        self.flags(&mut drawing.groups, &strip.flagged, ends);
+        drawing.groups.close_group();
+    }
+
+    /// Tolerance, lines and dots of one strip, from bottom to top.
+    fn marks(&self, strip: &Strip, top: f64) -> Vec<(PathStyle<'static>, String)> {
+        let dots = strip
+            .dots
+            .iter()
+            .map(|&(time_s, value)| dot((self.x(time_s), strip.y(top, value)), 4.0))
+            .collect();
+        let mut marks = vec![(TUBE_STYLE, self.tube(strip, top))];
+        marks.extend(strip.lines.iter().map(|line| {
             let style = PathStyle {
                 dash: line.dash,
                 ..PathStyle::line(line.colour, line.width)
             };
-            svg.lines(&self.line(line, strip, top), style);
-        }
-        let mut dots = String::new();
-        for &(time_s, value) in &strip.dots {
-            let x = coordinate(self.x(time_s) - 2.0);
-            let y = coordinate(strip.y(top, value) - 2.0);
-            // Writing into a String cannot fail.
-            let _ = write!(dots, "M{x} {y}h4v4h-4z");
-        }
-        svg.path(&dots, PathStyle::filled(EXCLUDED_COLOUR));
-        self.flags(svg, &strip.flagged, (top, top + strip.height));
-        if !strip.attributes.is_empty() {
-            svg.close_group();
-        }
+            (style, self.line(line, strip, top))
+        }));
+        marks.push((PathStyle::filled(EXCLUDED_COLOUR), dots));
+        marks
     }
 
-    /// Area of a tolerance with its outline, which is its limits.
-    fn tube(&self, svg: &mut SvgWriter, strip: &Strip, top: f64) {
+    /// Area of a tolerance; empty without one.
+    fn tube(&self, strip: &Strip, top: f64) -> String {
         if strip.tube.is_empty() {
-            return;
+            return String::new();
         }
         let place = |time_s: f64, value: f64| (self.x(time_s), strip.y(top, value));
         let upper = strip.tube.iter().map(|(t, _, upper)| place(*t, *upper));
         let lower = strip.tube.iter().map(|(t, lower, _)| place(*t, *lower));
-        let area = format!("{}z", polyline(upper.chain(lower.rev())));
-        let style = PathStyle {
-            fill: Some(TOLERANCE_AREA),
-            ..PathStyle::line(TOLERANCE_LIMIT, 0.6)
-        };
-        svg.lines(&area, style);
+        format!("{}z", polyline(upper.chain(lower.rev())))
     }
 
     fn line(&self, line: &StripLine, strip: &Strip, top: f64) -> String {
@@ -371,6 +388,14 @@ fn flag_group(svg: &mut SvgWriter, class: &str, data: &str, style: PathStyle) {
         svg.close_group();
     }
 }
+
+/// Appearance of a tolerance: an area with its outline, which is its limits.
+const TUBE_STYLE: PathStyle<'static> = PathStyle {
+    stroke: Some((TOLERANCE_LIMIT, 0.6)),
+    dash: "",
+    fill: Some(TOLERANCE_AREA),
+    fill_opacity: None,
+};
 
 /// Appearance of missing samples.
 pub const MISSING_STYLE: PathStyle<'static> = PathStyle {

@@ -13,7 +13,7 @@ pub struct SvgWriter {
 }
 
 /// Appearance of a path.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PathStyle<'a> {
     /// Colour and width.
     pub stroke: Option<(&'a str, f64)>,
@@ -128,12 +128,37 @@ impl SvgWriter {
     /// Writes a text at a point of its base line.
     pub fn text(&mut self, (x, y): (f64, f64), text: &str, style: TextStyle) {
         let (x, y) = (coordinate(x), coordinate(y));
+        // Writing into a String cannot fail.
         let _ = write!(self.svg, r#"<text x="{x}" y="{y}""#);
+        self.text_style(style);
+        if style.is_vertical {
+            let _ = write!(self.svg, r#" transform="rotate(-90 {x} {y})""#);
+        }
+        let _ = write!(self.svg, ">{}</text>", escaped(text));
+    }
+
+    /// Writes horizontal texts of one appearance, whose attributes they share.
+    pub fn texts(&mut self, texts: &[((f64, f64), String)], style: TextStyle) {
+        if texts.is_empty() {
+            return;
+        }
+        self.svg.push_str("<g");
+        self.text_style(style);
+        self.svg.push('>');
+        for (place, text) in texts {
+            self.text(*place, text, TextStyle::default());
+        }
+        self.svg.push_str("</g>");
+    }
+
+    /// Writes the attributes of a text's appearance.
+    fn text_style(&mut self, style: TextStyle) {
         match style.anchor {
             Anchor::Start => {}
             Anchor::Middle => self.svg.push_str(r#" text-anchor="middle""#),
             Anchor::End => self.svg.push_str(r#" text-anchor="end""#),
         }
+        // Writing into a String cannot fail.
         if let Some(colour) = style.colour {
             let _ = write!(self.svg, r#" fill="{colour}""#);
         }
@@ -143,10 +168,6 @@ impl SvgWriter {
         if style.is_bold {
             self.svg.push_str(r#" font-weight="bold""#);
         }
-        if style.is_vertical {
-            let _ = write!(self.svg, r#" transform="rotate(-90 {x} {y})""#);
-        }
-        let _ = write!(self.svg, ">{}</text>", escaped(text));
     }
 
     /// Opens a group with attributes, and with a tooltip unless that is empty.
@@ -285,6 +306,14 @@ fn distance_squared(point: (i64, i64), from: (i64, i64), to: (i64, i64)) -> f64 
     (x - share * dx).powi(2) + (y - share * dy).powi(2)
 }
 
+/// Data for [`SvgWriter::lines`] of a square around a point.
+#[must_use]
+pub fn dot((x, y): (f64, f64), side: f64) -> String {
+    let [x, y, side] =
+        [x - 0.5 * side, y - 0.5 * side, side].map(|value| rounded(QUARTERS * value));
+    format!("M{x} {y}h{side}v{side}h-{side}z")
+}
+
 /// Path data of a rectangle.
 #[must_use]
 pub fn rectangle((x, y): (f64, f64), (width, height): (f64, f64)) -> String {
@@ -332,6 +361,24 @@ mod tests {
         assert_eq!(data, "M0 4l1 5 39-21");
         assert_eq!(polyline([(1.0, 2.0)].into_iter()), "M4 8h2");
         assert_eq!(polyline(std::iter::empty()), "");
+    }
+
+    #[test]
+    fn a_dot_is_a_square_around_its_point() {
+        assert_eq!(dot((10.0, 5.0), 4.0), "M32 12h16v16h-16z");
+    }
+
+    #[test]
+    fn texts_alike_share_their_attributes() {
+        let mut svg = SvgWriter::default();
+        let end = TextStyle {
+            anchor: Anchor::End,
+            ..TextStyle::coloured("#555555")
+        };
+        svg.texts(&[((1.0, 2.0), "<".into()), ((3.0, 4.5), "b".into())], end);
+        svg.texts(&[], end);
+        let expected = r##"<g text-anchor="end" fill="#555555"><text x="1" y="2">&lt;</text><text x="3" y="4.5">b</text></g>"##;
+        assert_eq!(svg.svg, expected);
     }
 
     #[test]
