@@ -14,14 +14,14 @@ settings! {
         /// Largest difference that counts as agreement, standard errors of the difference. Larger:
         /// more rows agree, and real differences go unreported.
         pub agreement_z: f64 = 2.0,
-        /// Largest difference that counts as agreement whatever its standard error, percent of the
+        /// Largest difference that counts as agreement at any standard error, percent of the
         /// tunnel's value. The default is about the repeatability of tunnel tests. Larger: more rows
         /// agree.
         pub agreement_pct: f64 = 5.0,
         /// Share of the information below which flight taught nothing about a value, percent. Larger:
         /// more rows with the verdict `nothing learnt`.
         pub learnt_pct: f64 = 10.0,
-        /// Most rows of the table `disagreements`.
+        /// Largest number of rows of the table `disagreements`.
         pub worst: usize = 20,
         /// Folders with the published tables of earlier campaigns or nights. Each adds its trends to
         /// the comparison.

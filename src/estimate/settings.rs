@@ -194,8 +194,8 @@ settings! {
         /// by more than an instrument's ordinary bias. At 0 a fit is doubtful where a constant would
         /// do better. Larger: more fits are doubtful.
         pub r_squared: f64 = 0.0,
-        /// Probability, if both are right, of derivatives as far from equation error as these, below
-        /// which the fit is doubtful. Larger: more fits are doubtful; at 0 none by this.
+        /// Smallest probability of a distance from the equation-error derivatives as large as the
+        /// fit's, if both methods are right; below it the fit is doubtful. Larger: more fits are doubtful; at 0 none by this.
         pub contradiction: f64 = 1e-6,
         /// Largest bias, and largest difference of an initial state from the measured one, in
         /// ordinary biases of the instrument (`instruments: ordinary` of aircraft.yaml). Larger:

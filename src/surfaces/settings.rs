@@ -8,8 +8,8 @@ settings! {
     /// have the same recorder.
     pub struct Settings {
         /// Delays of the surfaces: `apply` shifts surfaces whose delay is sure before the
-        /// derivatives are estimated, `report` only publishes the delays. Either way, what stays
-        /// unknown of a delay is part of `bound_corrected`.
+        /// derivatives are estimated, `report` only publishes the delays. Either way, the
+        /// remaining uncertainty of a delay is part of `bound_corrected`.
         pub delay: Action = Action::Apply,
         /// Smallest delay that is corrected, s. A recorder of ordinary quality has less; the delay
         /// of a surface that the campaign does not determine is taken as zero with this standard

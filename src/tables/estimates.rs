@@ -37,7 +37,7 @@ table! {
         pub condition_number: Option<f64> ["1"],
         /// Share of the output samples that the cost leaves out: bridged, despiked or missing.
         pub left_out: Option<f64> ["1"],
-        /// Square root of the condition number; none where a direction is not determined at all.
+        /// Square root of the condition number; empty if a direction is not determined at all.
         pub largest_condition_index: Option<f64> ["1"],
         /// Groups of nearly collinear parameters, worst first, `; ` between groups. A group has a
         /// condition index of 30 or more and half or more of the variance of two or more
@@ -183,17 +183,17 @@ table! {
         pub unit: String,
         /// Status of the derivative in this maneuver.
         pub status: Status,
-        /// Estimate, also of a fit that did not converge; the value it was held at; none where
+        /// Estimate, also of a fit that did not converge; the value it was held at; empty if
         /// inactive. Held values are the tunnel's, from the stage `model` on those of the posterior of
         /// the other flights (`estimate: held_values`). In the column `unit`.
         pub value: Option<f64>,
-        /// Cramér-Rao bound, with the uncertainty of the held values; none unless estimated and
+        /// Cramér-Rao bound, with the uncertainty of the held values; empty unless estimated and
         /// determined by the data. In the column `unit`.
         pub bound: Option<f64>,
         /// Part of both bounds that comes from the held values, in the column `unit`.
         pub bound_held: Option<f64>,
-        /// Part of `bound_corrected` that comes from errors of calibration and from what stays unknown
-        /// of the surfaces' delays, in the column `unit`; empty where there are none.
+        /// Part of `bound_corrected` that comes from errors of calibration and from the remaining
+        /// uncertainty of the surfaces' delays, in the column `unit`; empty where there are none.
         pub bound_calibration: Option<f64>,
         /// Bound for coloured residuals, noisy surfaces and errors of calibration: the one to use.
         /// In the column `unit`.
@@ -201,9 +201,9 @@ table! {
         /// Tunnel's value at the maneuver's α and Mach number, in the column `unit`.
         pub wind_tunnel: Option<f64>,
         /// H_jj (H⁻¹)_jj: factor by which the other parameters raise the variance. Above 10 it is
-        /// flagged; none where the data do not determine it.
+        /// flagged; empty if the data do not determine it.
         pub variance_inflation: Option<f64> ["1"],
-        /// Root mean square of the regressor about its mean; none for constants.
+        /// Root mean square of the regressor about its mean; empty for constants.
         pub excitation: Option<f64> ["deg, or rad of p b/2V, q c̄/2V or r b/2V"],
         /// Root mean square of derivative × regressor about its mean over that of the whole
         /// coefficient. Parts that cancel make more than 100.

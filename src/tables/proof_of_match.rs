@@ -7,7 +7,7 @@ words! {
     pub enum ModelSource {
         /// The campaign's posterior.
         Posterior = "posterior",
-        /// The trends across angle of attack; the tunnel where there is none.
+        /// The trends across angle of attack; the tunnel for derivatives without a trend.
         Trend = "trend",
         /// The wind-tunnel database.
         Tunnel = "tunnel",

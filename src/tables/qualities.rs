@@ -24,7 +24,7 @@ words! {
         PhugoidFrequency = "phugoid_frequency",
         /// Damping ratio of the phugoid.
         PhugoidDamping = "phugoid_damping",
-        /// Time in which the phugoid doubles; none where it decays.
+        /// Time in which the phugoid doubles; empty if it decays.
         PhugoidTimeToDouble = "phugoid_time_to_double",
         /// Larger zero of pitch attitude to the pitch control, 1/T_θ2.
         AttitudeZero = "attitude_zero",
@@ -42,11 +42,11 @@ words! {
         PhiBeta = "phi_beta",
         /// Square of the Dutch roll's frequency times |φ/β|.
         DutchRollBank = "dutch_roll_bank",
-        /// Time constant of the roll mode; none where it diverges.
+        /// Time constant of the roll mode; empty if it diverges.
         RollTimeConstant = "roll_time_constant",
         /// Inverse time constant 1/T of the spiral; negative where it diverges.
         SpiralRate = "spiral_rate",
-        /// Time in which the spiral doubles; none where it decays.
+        /// Time in which the spiral doubles; empty if it decays.
         SpiralTimeToDouble = "spiral_time_to_double",
         /// Decay rate ζω of roll and spiral as one oscillation.
         RollSpiralDecay = "roll_spiral_decay",
@@ -113,8 +113,8 @@ table! {
         pub mass_slug: f64 ["slug"],
         /// Angle of the path above the horizon.
         pub path_deg: f64 ["deg"],
-        /// Value at the mean of the posterior; empty where it is none: a time to double of a mode that
-        /// decays, a frequency of a pair of roots that diverges.
+        /// Value at the mean of the posterior; empty if undefined, as the time to double of a mode that
+        /// decays or the frequency of a pair of roots that diverges.
         pub value: Option<f64>,
         /// Standard deviation.
         pub standard_deviation: Option<f64>,

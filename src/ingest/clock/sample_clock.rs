@@ -344,7 +344,7 @@ mod tests {
         let what = with(&[0.0, 0.025, 0.05, 0.075], &settings).unwrap_err();
         assert_eq!(
             what,
-            "the record runs at 40.00 Hz, sampling_rate_hz says 50 Hz"
+            "the record runs at 40.00 Hz, sampling_rate_hz is 50 Hz"
         );
     }
 
