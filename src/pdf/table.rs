@@ -98,13 +98,9 @@ fn read(table: Node, fonts: &Fonts, size: f32) -> Vec<Row> {
             let is_head = is_head(row);
             let cells = cells_of(row)
                 .enumerate()
-                .map(|(column, cell)| Cell {
-                    align: if is_numeric(column) || has_class(cell, "n") {
-                        1.0
-                    } else {
-                        0.0
-                    },
-                    ..read_cell(cell, is_head, fonts, size)
+                .map(|(column, cell)| {
+                    let is_right = is_numeric(column) || has_class(cell, "n");
+                    read_cell(cell, is_head, is_right, fonts, size)
                 })
                 .collect();
             Row { is_head, cells }
@@ -134,7 +130,7 @@ fn numeric_columns(table: Node) -> Vec<bool> {
     })
 }
 
-fn read_cell(cell: Node, is_head: bool, fonts: &Fonts, size: f32) -> Cell {
+fn read_cell(cell: Node, is_head: bool, is_right: bool, fonts: &Fonts, size: f32) -> Cell {
     let shade = SHADES.iter().find(|(class, ..)| has_class(cell, class));
     let mut style = Style::of_size(size);
     if shade.is_some_and(|(_, _, has_white_text)| *has_white_text) {
@@ -149,7 +145,7 @@ fn read_cell(cell: Node, is_head: bool, fonts: &Fonts, size: f32) -> Cell {
     }
     Cell {
         words: reader.words(),
-        align: 0.0,
+        align: if is_right { 1.0 } else { 0.0 },
         shade: shade.map(|(_, colour, _)| *colour),
     }
 }

@@ -136,9 +136,8 @@ fn range(path: &[String]) -> Range {
     if SIGNED.contains(&name) {
         return (f64::MIN, f64::MAX);
     }
-    let by_name = BY_NAME.iter().find(|(known, _)| *known == name);
-    let by_ending = || BY_ENDING.iter().find(|(ending, _)| name.ends_with(ending));
-    by_name.or_else(by_ending).map_or(SIZE, |(_, range)| *range)
+    let by_ending = BY_ENDING.iter().find(|(ending, _)| name.ends_with(ending));
+    range_by_name(&BY_NAME, path, by_ending.map_or(SIZE, |(_, range)| *range))
 }
 
 fn check(source: &Source, range: &dyn Fn(&[String]) -> Range) -> Result<()> {

@@ -42,7 +42,7 @@ impl<'a> Recognition<'a> {
 
     /// Sorts the maneuvers by time and removes overlaps.
     ///
-    /// Of two excitations whose inputs overlap, the longer one is kept. Excitation of no class is
+    /// Keeps the longer of two excitations whose inputs overlap. Excitation of no class is
     /// removed if it overlaps a maneuver, or longer excitation of no class, of which it is a part.
     pub fn remove_overlaps(&mut self) {
         self.found
