@@ -16,7 +16,7 @@ pub const REJECTED: u8 = 2;
 /// Exit code of something that moved, is stale or missing.
 pub const ATTENTION: u8 = 3;
 
-/// Exit code of a command as typed that harvest does not have (`EX_USAGE`).
+/// Exit code for a wrong command line: an unknown command, option or value (`EX_USAGE`).
 pub const USAGE: u8 = 64;
 
 /// Exit code of work that another try may complete (`EX_TEMPFAIL`).

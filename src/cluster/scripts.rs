@@ -148,7 +148,7 @@ fn command(
     }
 }
 
-/// Directives for the scheduler.
+/// First lines of a job's script, which request its resources: `#SBATCH …` or `#PBS …`.
 fn directives(
     engine: Scheduler,
     settings: &ClusterSettings,

@@ -213,7 +213,8 @@ fn flights(conductor: &Conductor) -> Vec<DealtWork> {
 /// Work on maneuvers, with the corrections that all flights together decide.
 type ManeuverWork = (Vec<DealtWork>, Vec<DelayCorrection>, Vec<FlightCorrections>);
 
-/// Every maneuver of the campaign, and the corrections of surfaces and instruments.
+/// Lists the maneuvers of the campaign as work for shards, with the corrections of surfaces and
+/// instruments, which need the evidence of all flights.
 fn maneuvers(conductor: &mut Conductor) -> Result<ManeuverWork> {
     let config = conductor.runner.config;
     let mut campaign = conductor.campaign(Stage::Segment)?;

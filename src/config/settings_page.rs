@@ -42,7 +42,8 @@ fn source(text: &str) -> Source {
     Source::of("pipeline.yaml", text)
 }
 
-/// All keys of the files, instruments last.
+/// Sections of the page: name and keys of each stage of `pipeline.yaml`, then `instruments:` of
+/// `aircraft.yaml`.
 fn sections() -> Vec<(&'static str, Vec<Key>)> {
     let mut sections: Vec<(&'static str, Vec<Key>)> = Vec::new();
     for key in PipelineFile::keys() {

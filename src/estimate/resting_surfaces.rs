@@ -12,8 +12,8 @@ use crate::flight::signal;
 use crate::maneuver::{Class, Status};
 use crate::output_error::identifiability::excitation;
 
-/// Largest ratio of a resting surface's excitation to its noise from sample to sample. Both are the
-/// noise of its transducer, and differ by chance.
+/// Largest ratio, for a surface at rest, of its rms about the mean to its noise, which the
+/// differences of successive samples give. At rest both are the noise of the transducer.
 const AT_REST: f64 = 1.5;
 
 /// Largest noise of a transducer, deg rms. Inputs of 2 Hz, recorded at 10 Hz, differ from sample to sample as
@@ -49,8 +49,8 @@ impl Task<'_> {
     }
 }
 
-/// True for samples whose scatter about their mean is that from sample to sample, as in white
-/// noise.
+/// `true` if samples show no motion: their scatter about the mean is small, and no larger than white
+/// noise with their differences from sample to sample would have.
 fn is_noise(samples: &[f64]) -> bool {
     let steps = samples.windows(2).map(|pair| (pair[1] - pair[0]).powi(2));
     let count = samples.len().saturating_sub(1).max(1) as f64;

@@ -22,7 +22,8 @@ use crate::output_error::equation_error::{self, Regression};
 use crate::output_error::{Fit, Measurements, Outcome, consider, cost, estimation};
 use crate::tables::StartingValues;
 
-/// Remark on a fit by output error that filter error does not improve.
+/// Remark on a fit by output error that is kept because its residuals are coloured noise of the
+/// sensors, and not gusts.
 const OF_SENSORS: &str = "; the residuals are coloured noise of the sensors";
 
 /// Reason why a derivative that the class estimates is inactive in a maneuver.

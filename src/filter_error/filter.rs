@@ -204,7 +204,8 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         [own, &noise.parameters(E::FELT_RATES.len())].concat()
     }
 
-    /// Computes a pass with sensitivities.
+    /// Runs the filter over the maneuver: innovations, their sensitivities to all parameters, and the
+    /// sums of cost, gradient and information.
     ///
     /// # Errors
     /// [`Diverged`] when the state leaves its bounds or the filter has no finite gain.

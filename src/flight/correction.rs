@@ -90,7 +90,7 @@ impl Correction {
         self.truth(reading)
     }
 
-    /// True value behind a reading.
+    /// Corrects a reading for bias and scale error.
     fn truth(&self, reading: f64) -> f64 {
         (reading - self.bias) / (1.0 + self.scale)
     }

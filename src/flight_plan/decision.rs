@@ -1,44 +1,67 @@
-//! Decision that a flight is to bring: between which limits a quantity lies.
+//! Probability that the next flight decides between which limits a quantity lies: the level of a
+//! flying quality, or the tolerances of a proof of match.
 //!
-//! The quantity is x = g + n. g is a linear combination of the derivatives; by tonight's posterior
-//! it is normal with mean m and standard deviation σ. n is independent, with standard deviation ν,
-//! which no flight lowers. The quantity is decided once x lies between two neighbouring limits with
-//! a stated probability p.
+//! # Symbols
 //!
-//! A flight that lowers the standard deviation of g to σ′ moves its mean to m′. Before the flight
-//! m′ is normal with mean m and variance τ² = σ² − σ′². With s² = σ′² + ν² the interval from l to u
-//! is decided if
+//! All but Φ, p and z are in the unit of the quantity.
+//!
+//! | symbol | quantity |
+//! |---|---|
+//! | x = g + n | the quantity |
+//! | g | its part that is linear in the derivatives |
+//! | m, σ | mean and standard deviation of g in tonight's posterior |
+//! | m′, σ′ | the same after the flight |
+//! | τ | standard deviation of m′ as seen before the flight |
+//! | n, ν | independent part with mean zero, and its standard deviation, which no flight lowers |
+//! | s | standard deviation of x after the flight |
+//! | l, u | neighbouring limits |
+//! | p | probability from which x counts as decided, over a half |
+//! | Φ, z | distribution function of the standard normal distribution; Φ(z) = p |
+//!
+//! # Decision
+//!
+//! x is *decided* if it lies between two neighbouring limits with the probability p or more. After
+//! the flight x is normal with the mean m′ and the variance s² = σ′² + ν², so the interval from l to
+//! u is decided if
 //!
 //! Φ((u − m′)/s) − Φ((l − m′)/s) ≥ p.
 //!
-//! The left side falls with the distance of m′ from the interval's middle, so this holds for m′
-//! from a to b. The flight decides with the probability Σ Φ((b − m)/τ) − Φ((a − m)/τ) over the
-//! intervals, which do not overlap for p over a half. With one limit at the distance d of the mean,
-//! and without n, it is Φ((d − zσ′)/τ) + Φ(−(d + zσ′)/τ), where Φ(z) = p.
+//! The left side falls as m′ moves away from the middle of the interval. The condition therefore
+//! holds for every m′ from some a to some b, the *deciding means* of this interval. They do not
+//! overlap with those of another interval, since p is over a half.
+//!
+//! # Probability before the flight
+//!
+//! m′ is not known before the flight. It is normal with the mean m and the variance τ² = σ² − σ′²,
+//! what the flight takes from the variance of g. The probability that the flight decides is the sum
+//! over all intervals of
+//!
+//! Φ((b − m)/τ) − Φ((a − m)/τ).
+//!
+//! For one limit at a distance d from m, and ν = 0, the sum is Φ((d − zσ′)/τ) + Φ(−(d + zσ′)/τ).
 
 use crate::numerics::normal;
 
-/// Halvings of an interval by which a root is found.
+/// Halvings of an interval in a search: to 2⁻⁶⁰ of its length, the last digit.
 const HALVINGS: usize = 60;
 
-/// Quantity to be decided.
+/// Quantity x to be decided, in its own unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Decision {
-    /// Mean by tonight's posterior.
+    /// Mean m in tonight's posterior.
     pub mean: f64,
-    /// Ascending limits.
+    /// Limits in ascending order; below the first and above the last are intervals too.
     pub limits: Vec<f64>,
-    /// Standard deviation ν, which no flight lowers.
+    /// Standard deviation ν of the part n, which no flight lowers.
     pub rest: f64,
-    /// Probability p that decides, over a half.
+    /// Probability p from which the quantity counts as decided, over a half.
     pub share: f64,
-    /// `true` if the limits lie about the mean and move with it.
+    /// `true` if the limits move with the mean, so that the standard deviation alone decides.
     pub follows_mean: bool,
 }
 
 impl Decision {
-    /// The most probable interval, and its probability, for this standard deviation of the
-    /// derivatives' part.
+    /// Limits of the most probable interval, and its probability, if g has this standard deviation.
     #[must_use]
     pub fn most_probable(&self, deviation: f64) -> ((f64, f64), f64) {
         let spread = deviation.hypot(self.rest);
@@ -56,7 +79,7 @@ impl Decision {
         self.most_probable(deviation).1 >= self.share
     }
 
-    /// Probability that a flight decides the quantity by changing the standard deviation from
+    /// Probability that a flight decides the quantity if it lowers the standard deviation of g from
     /// `before` to `after`.
     #[must_use]
     pub fn decided(&self, before: f64, after: f64) -> f64 {
@@ -74,14 +97,15 @@ impl Decision {
         probability.sum::<f64>().clamp(0.0, 1.0)
     }
 
-    /// `true` if the quantity is not decided yet, and exact derivatives might decide it.
+    /// `true` if the quantity is undecided with the standard deviation `before` of g, and exact
+    /// derivatives might decide it.
     #[must_use]
     pub fn is_open(&self, before: f64) -> bool {
         !self.is_decided(before) && self.decided(before, 0.0) > 0.0
     }
 
-    /// Largest standard deviation after a flight that decides with the stated probability; zero where
-    /// none does.
+    /// Largest standard deviation of g after a flight that decides the quantity with the probability
+    /// p; zero if no flight does.
     #[must_use]
     pub fn wanted(&self, before: f64) -> f64 {
         largest_up_to(before, |after| self.decided(before, after) >= self.share)
@@ -93,7 +117,8 @@ impl Decision {
         lows.zip(limits.chain([f64::INFINITY]))
     }
 
-    /// Range of means for which an interval is decided; `None` if it is too narrow for the spread.
+    /// Deciding means a and b of the interval from `low` to `high`, for the standard deviation
+    /// `spread` of x. `None` if the interval is too narrow to have any.
     fn deciding(&self, (low, high): (f64, f64), spread: f64) -> Option<(f64, f64)> {
         let distance = normal::quantile(self.share) * spread;
         match (low.is_finite(), high.is_finite()) {

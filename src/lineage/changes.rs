@@ -102,7 +102,7 @@ pub struct Changes {
     /// `true` if a value moved, vanished or changed, an instrument changed, the rest of the campaign
     /// contradicts a part, or the nights cannot be compared. New maneuvers alone are no alert.
     pub alert: bool,
-    /// Reason why the values of the two nights cannot be compared; `None` if they are.
+    /// Reason why the values of the two nights cannot be compared; `None` if they can be.
     #[serde(default)]
     pub not_compared: Option<String>,
     /// Differences of flights, configuration and code.

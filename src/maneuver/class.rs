@@ -84,8 +84,8 @@ pub struct Recognition {
     /// Signal → number of its steps. A signal without an entry may step any number of times.
     #[serde(default)]
     pub steps: BTreeMap<String, StepCount>,
-    /// Signal → true where it moves during the maneuver (a thrust-vectoring vane). A signal that is
-    /// not recorded decides nothing.
+    /// Signal → `true` if it moves during a maneuver of the class, `false` if it rests (a
+    /// thrust-vectoring vane). A signal that is not recorded neither excludes nor confirms the class.
     #[serde(default)]
     pub moves: BTreeMap<String, bool>,
     /// Signal → its pulses.

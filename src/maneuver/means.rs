@@ -15,6 +15,6 @@ pub struct Means {
     pub iy_slug_ft2: f64,
     pub iz_slug_ft2: f64,
     pub ixz_slug_ft2: f64,
-    /// Surfaces and vanes of the model, by signal, deg.
+    /// Mean deflection of each surface and vane of the model, by signal, deg.
     pub surfaces_deg: BTreeMap<String, f64>,
 }

@@ -1,10 +1,20 @@
-//! Spread of the posterior's mean over the scales that the data leave uncertain.
+//! Uncertainty of the scales as a part of the posterior's covariance.
 //!
-//! Sizes and lengths are the most probable ones, θ. With H the second derivatives of −log of their
-//! posterior and H = V Λ Vᵀ, the mean m is computed at θ ± √3 v/√λ for each direction v. The three
-//! values have the weights 1/6, 2/3, 1/6 of the Gauss-Hermite rule. The published mean is that of
-//! θ, so their mean square about it is added to the covariance. In conditions without data the mean
-//! does not depend on the scales, and the tunnel's uncertainty stays as stated.
+//! The posterior of the differences holds for the most probable scales
+//! ([`scales`](super::scales)). Other scales would give another mean; this file adds the variance of
+//! the mean over the scales.
+//!
+//! | symbol | quantity |
+//! |---|---|
+//! | θ | logarithms of the most probable sizes and lengths |
+//! | m(θ) | posterior mean of the differences for these scales |
+//! | H | second derivatives of minus the log posterior of the scales, at θ |
+//! | v, κ | eigenvector of H, and its eigenvalue: the scales are uncertain by 1/√κ along v |
+//!
+//! Along each v the mean is computed at θ and at θ ± √(3/κ) v. These are the points of the
+//! Gauss-Hermite rule with three points, whose weights are 1/6, 2/3 and 1/6. The published mean is
+//! m(θ), so 1/6 of the squares of both differences from m(θ) is added to the covariance. Without
+//! data m does not depend on the scales, and the tunnel's uncertainty stays as stated.
 
 use nalgebra::DVector;
 
@@ -13,14 +23,15 @@ use super::posterior::Gaussian;
 use super::scale_prior::Scale;
 use super::scales::{LEAST_VARIANCE, logarithms_of, negative_log_posterior, scales_of};
 
-/// Least second derivative along a direction: that of the widest prior of a scale.
+/// Least eigenvalue of H that is used, so that points stay where the prior allows scales: a little
+/// below 1/0.8² = 1.56, that of the widest prior of a scale.
 const LEAST_CURVATURE: f64 = 1.5;
 
-/// Weight of the outer points.
+/// Weight of each outer point of the Gauss-Hermite rule.
 const OUTER: f64 = 1.0 / 6.0;
 
-/// Adds the spread to the covariance of a Gaussian at the most probable scales. A direction in
-/// which the posterior cannot be computed is skipped.
+/// Adds the variance of the mean over the scales to the posterior `whole` at the most probable
+/// `scales`. An eigenvector along which the mean cannot be computed is left out.
 pub fn add_open_scales(observed: &ObservedDifferences, scales: &[Scale], whole: &mut Gaussian) {
     let at = logarithms_of(scales);
     let mean = |logarithms: &DVector<f64>| observed.mean(&scales_of(logarithms), LEAST_VARIANCE);

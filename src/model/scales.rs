@@ -1,18 +1,35 @@
-//! Sizes and lengths of the differences, by the marginal likelihood.
+//! Most probable scales of the differences between flight and tunnel.
 //!
-//! With Λ and η the normal equations of the differences, whose other unknowns are marginalised, and
-//! C = R Rᵀ their prior covariance, the log marginal likelihood is, but for a constant,
+//! The difference of a derivative from the tunnel is a random function of the flight condition, with
+//! two *scales*: its size, as a multiple of the table's size or of its stated uncertainty, and the
+//! length in deg of α over which it changes. The most probable scales have the largest product of
+//! prior and marginal likelihood of all estimates.
 //!
-//! −½ log |B| + ½ ηᵀ P η,  B = I + Rᵀ Λ R,  P = R B⁻¹ Rᵀ.
+//! | symbol | quantity |
+//! |---|---|
+//! | d | differences at the points of the grids, each in the unit of its derivative |
+//! | Λ, η | information matrix and vector of the estimates on d: Λ d = η at their maximum |
+//! | C = R Rᵀ | prior covariance of d for given scales, and a root of it |
+//! | B = I + Rᵀ Λ R | information on R⁻¹ d of prior and estimates |
+//! | P = R B⁻¹ Rᵀ | posterior covariance of d; P η is its mean |
+//! | a = η − Λ P η | part of η that the posterior mean does not explain (innovation) |
+//! | M = Λ − Λ P Λ | covariance of a for data that the scales predict |
+//! | f | minus the log of the marginal likelihood, without constants |
 //!
-//! With a = η − Λ P η, M = Λ − Λ P Λ and subscripts for derivatives by logarithms of scales, f =
-//! −log of it has
+//! All other unknowns are marginalised in Λ and η. In these symbols
 //!
-//! f_i = ½ tr(M C_i) − ½ aᵀ C_i a, f_ij = −½ tr(M C_i M C_j) + aᵀ C_i M C_j a + ½ tr(M C_ij) − ½ aᵀ
-//! C_ij a,
+//! f = ½ log |B| − ½ ηᵀ P η.
 //!
-//! since M_j = −M C_j M and a_j = −M C_j a. For data that the scales predict, the mean of a aᵀ is
-//! M, and that of f_ij is ½ tr(M C_i M C_j), which is never negative.
+//! Subscripts i and j are derivatives along the logarithms of two scales. With M_j = −M C_j M and
+//! a_j = −M C_j a,
+//!
+//! f_i = ½ tr(M C_i) − ½ aᵀ C_i a,
+//!
+//! f_ij = −½ tr(M C_i M C_j) + aᵀ C_i M C_j a + ½ tr(M C_ij) − ½ aᵀ C_ij a.
+//!
+//! The expectation of f_ij over data that the scales predict is ½ tr(M C_i M C_j), since that of
+//! a aᵀ is M. This expectation is never negative; it replaces f_ij where f_ij is not positive
+//! definite.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -21,23 +38,23 @@ use super::scale_prior::Scale;
 use super::term::Term;
 use crate::numerics::minimise::{LocalExpansion, minimum};
 
-/// Share of a term's largest variance below which the search ignores a direction: such directions
-/// change a difference by a thousandth of its deviation.
+/// Share of a term's largest prior variance below which a direction of its differences is ignored:
+/// it changes a difference by at most a thousandth of its standard deviation.
 pub const LEAST_VARIANCE: f64 = 1e-6;
 
-/// Steps of the search.
+/// Largest number of Newton steps of the search for the scales.
 const STEPS: usize = 60;
 
 /// Distance from the minimum at which the search ends, in standard deviations of the scales.
 const TOLERANCE: f64 = 0.01;
 
-/// Centres of the priors.
+/// Medians of the priors of all scales, from which the search starts.
 #[must_use]
 pub fn centres(terms: &[Term]) -> Vec<Scale> {
     terms.iter().map(|t| t.prior.scale.centre).collect()
 }
 
-/// Most probable scales, from a start.
+/// Finds the most probable scales by Newton's method from `start`.
 #[must_use]
 pub fn most_probable(observed: &ObservedDifferences, start: &[Scale]) -> Vec<Scale> {
     let negative = |logarithms: &DVector<f64>| {
@@ -65,8 +82,9 @@ pub fn scales_of(logarithms: &DVector<f64>) -> Vec<Scale> {
         .collect()
 }
 
-/// −log of marginal likelihood times prior, with its derivatives by the logarithms of the scales.
-/// Directions below `least` of a term's largest variance are ignored.
+/// Minus the log of marginal likelihood times prior, with its derivatives along the logarithms of
+/// size and length of each term. Directions below the share `least` of a term's largest prior
+/// variance are ignored. `None` if the value or a derivative is not finite.
 #[must_use]
 pub fn negative_log_posterior(
     observed: &ObservedDifferences,
@@ -95,14 +113,16 @@ pub fn negative_log_posterior(
     (value.is_finite() && curvature.iter().all(|c| c.is_finite())).then_some(local)
 }
 
-/// Changes of the likelihood with the size and the length of one term.
+/// Products of one term's C_i from which the derivatives of f along its size and length follow. C is
+/// proportional to the square of the size, so its derivative along log size is 2 C.
 struct Changes<'a> {
     term: &'a ObservedTerm,
-    /// M C_i, all rows.
+    /// Columns of M C_i at the term's differences, along log size and log length.
     images: [DMatrix<f64>; 2],
-    /// C_i a.
+    /// C_i a, along log size and log length.
     moved: [DVector<f64>; 2],
-    /// ½ tr(M C_ij) − ½ aᵀ C_ij a of a matrix in the place of C_ij: C, and its derivatives by the length.
+    /// ½ tr(M X) − ½ aᵀ X a, with X the covariance C, its first and its second derivative along log
+    /// length.
     halves: [f64; 3],
 }
 
@@ -123,7 +143,8 @@ impl<'a> Changes<'a> {
         }
     }
 
-    /// Adds the products of first derivatives with those of an earlier term, or of the same.
+    /// Adds to the second derivatives of f the terms with M C_i M C_j, for i of this term and j of an
+    /// earlier term or the same one.
     fn add_pair(
         &self,
         other: &Changes,
@@ -146,8 +167,8 @@ impl<'a> Changes<'a> {
         }
     }
 
-    /// Adds the first derivatives, the terms from second derivatives of the covariance, and the
-    /// prior.
+    /// Adds the first derivatives of f, the terms of f_ij with C_ij, and the prior of this term's
+    /// scales.
     fn add_single(&self, scale: &Scale, i: usize, local: &mut LocalExpansion) {
         let [value, by_length, by_length_twice] = self.halves;
         let penalty = self.term.scale.penalty(scale);

@@ -17,7 +17,7 @@ const DRAWING_MARGIN: f32 = 3.0;
 const LEADING: f32 = 1.35;
 /// Distance of the base line from the top of its line, in sizes of type.
 const ASCENT: f32 = 1.02;
-/// Half the height of an `x`, in sizes of type: the middle of inline drawings.
+/// Height above the base line of the middle of inline drawings, in font sizes.
 const MIDDLE: f32 = 0.36;
 /// Sign before the number of a link's page.
 const ARROW: &str = "\u{2192}";
@@ -160,7 +160,8 @@ impl<'a> InlineReader<'a> {
         self.add(Part::Drawing(Arc::new(drawing)), width, link);
     }
 
-    /// Adds room for a page number of up to three digits.
+    /// Reserves room behind a link for the number of its target's page, of up to three digits, which
+    /// pagination fills in.
     fn add_page_of(&mut self, target: &str, style: Style) {
         let style = Style {
             size: 0.72 * style.size,

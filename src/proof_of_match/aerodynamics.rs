@@ -17,10 +17,10 @@ use crate::units::DEG;
 /// Number of coefficients: CN, Cm, CA, CY, Cl, Cn.
 pub const COEFFICIENTS: usize = 6;
 
-/// Coefficient and sign of the force along each body axis.
+/// Force along body x, y and z: index of its coefficient and sign, X = −CA, Y = CY, Z = −CN.
 pub const FORCE: [(usize, f64); 3] = [(2, -1.0), (3, 1.0), (0, -1.0)];
 
-/// Coefficient of the moment about each body axis.
+/// Moment about body x, y and z: index of its coefficient, Cl, Cm, Cn.
 pub const MOMENT: [usize; 3] = [4, 1, 5];
 
 /// Recorded signals of a build-up, each once: surfaces and vanes. The flow itself comes from the
@@ -222,7 +222,7 @@ pub struct AboutTrim<'a> {
 #[derive(Clone, Debug)]
 struct TrimmedTerm {
     derivative: usize,
-    /// Index among the factors.
+    /// Index of the term's factor in [`AboutTrim::values`].
     factor: usize,
     is_along_alpha: bool,
     /// Factor at the trim; along α the integral of the derivative there.

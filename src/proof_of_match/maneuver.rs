@@ -283,7 +283,8 @@ impl<'a> Flight<'a> {
         }
     }
 
-    /// Adds the rows of a model.
+    /// Judges the run of one simulator, and adds its verdict, its row for each tolerance and its
+    /// histories to `matched`.
     fn judge(
         &self,
         model: ModelSource,

@@ -105,7 +105,7 @@ pub struct Raised {
 }
 
 impl Specification {
-    /// Configurations of the aircraft that are judged.
+    /// Airframes that are judged: without feedback, and also with it if the specification has gains.
     #[must_use]
     pub fn airframes(&self) -> Vec<Airframe> {
         if self.feedback.is_empty() {

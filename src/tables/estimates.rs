@@ -300,9 +300,10 @@ table! {
 words! {
     /// Kind of a correlated pair.
     pub enum CorrelationKind {
-        /// Two regressors, by their histories over the maneuver (Figures 3, 10 and 11).
+        /// Correlation of the time histories of two regressors over the maneuver (the paper's Figures
+        /// 3, 10 and 11).
         Regressors = "regressors",
-        /// Two estimates, by the inverse of the information matrix.
+        /// Correlation of the errors of two estimates, from the inverse of the information matrix.
         Estimates = "estimates",
     }
 }

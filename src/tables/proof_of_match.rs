@@ -101,7 +101,7 @@ table! {
     pub struct MatchRow in "match" per "maneuver, model and tolerance" {
         /// Maneuver.
         pub maneuver_id: String,
-        /// Flight, or stretch of a flight.
+        /// Id of the flight; a later stretch of a flight has a number, `flight_001.2`.
         pub flight_id: String,
         /// Class of the maneuver.
         pub class: String,

@@ -1,32 +1,60 @@
 //! Weighted least squares of a polynomial or spline in α, its order, and the scatter between
 //! maneuvers.
 //!
-//! Maneuver i has the estimate yᵢ at αᵢ with the bound bᵢ. The model is yᵢ = Σ cⱼ Pⱼ(αᵢ) +
-//! maneuver's own deviation + error, with the functions of [`Basis`], deviations of standard
-//! deviation τ, errors of standard deviation bᵢ. Weights are 1/(bᵢ² + τ²). τ² is the value for
-//! which the weighted sum of squared residuals equals their degrees of freedom, Σ r²/(b² + τ²) = Σ
-//! (1 − hᵢ) (Paule and Mandel 1982), or zero if the sum is smaller without τ². hᵢ is the leverage
-//! of an estimate on its own trend; Σ (1 − hᵢ) is n − p over all maneuvers. A class of
-//! `OWN_SCATTER` maneuvers has a τ of its own. The scatter of a class with wrong values, for
-//! example because of a wrong held value, thus does not affect the others.
+//! # Symbols
 //!
-//! One outlier must not distort the trend or τ: [`RobustSolution`] has the weights, and the
-//! covariance of the coefficients. A bound smaller than the share `BOUND_FLOOR` of the group's
-//! median bound is raised to it, since bounds themselves are uncertain by a factor of a few. The
-//! interval takes Student's t with n − p degrees of freedom (Hartung and Knapp 2001). It is never
-//! narrower than the interval from the bounds alone.
+//! Angles are in deg; y, b, τ and λ are in the derivative's unit.
 //!
-//! A trend of few coefficients may not follow the derivative. Maneuvers of one flown α differ by
-//! their own deviations only. Their mean residuals also differ from α to α by lack of fit, λ (Paule
-//! and Mandel's equation for the means). Lack of fit does not average out: λ² is part of the
-//! variance of the trend at every α. If no α was flown twice, all scatter beyond the bounds is lack
-//! of fit.
+//! | symbol | quantity |
+//! |---|---|
+//! | n, p | number of maneuvers, number of coefficients |
+//! | αᵢ, yᵢ, bᵢ | angle of attack, estimate and bound (a standard deviation) of maneuver i |
+//! | Pⱼ, cⱼ | function j of the [`Basis`], and its coefficient |
+//! | rᵢ | residual of maneuver i: estimate less trend |
+//! | τ | standard deviation of the maneuvers' own deviations from the derivative |
+//! | hᵢ | leverage: share of an estimate in the trend's value at its own α, from 0 to 1 |
+//! | λ | lack of fit: standard deviation of the derivative about a curve of p coefficients |
 //!
-//! A criterion chooses the order, and its choice is uncertain. The other orders contribute to the
-//! variance with their Akaike weights, exp(−Δ/2) (Burnham and Anderson's unconditional variance),
-//! each with its own variance and its distance from the chosen trend. A criterion also smooths,
-//! which leaves a bias as large as the errors. Therefore no standard error is smaller than that
-//! with one more coefficient (undersmoothing, Hall 1992).
+//! # Weights and scatter
+//!
+//! An estimate is the trend plus the maneuver's own deviation uᵢ plus its error eᵢ. Their standard
+//! deviations are τ and bᵢ:
+//!
+//! yᵢ = Σ cⱼ Pⱼ(αᵢ) + uᵢ + eᵢ.
+//!
+//! The weight of an estimate is one over its variance, 1/(bᵢ² + τ²). τ² is chosen so that the
+//! weighted sum of squared residuals equals their degrees of freedom (Paule and Mandel 1982):
+//!
+//! Σ rᵢ²/(bᵢ² + τ²) = Σ (1 − hᵢ).
+//!
+//! Over all maneuvers the right side is n − p. If the left side is smaller without τ², τ² is zero. A
+//! class of at least `OWN_SCATTER` maneuvers has a τ of its own. A class with wrong values, for
+//! example because of a wrong held value, thus does not change the weights of the others.
+//!
+//! # Outliers and intervals
+//!
+//! [`RobustSolution`] limits the influence of an outlier on the trend and on τ. A bound below the
+//! share `BOUND_FLOOR` of the group's median bound is raised to that share, because a bound is
+//! itself uncertain by a factor of a few. The 95 % band is Student's t with n − p degrees of freedom
+//! times the standard error (Hartung and Knapp 2001). The standard error is never smaller than the
+//! one from the bounds alone.
+//!
+//! # Lack of fit
+//!
+//! Maneuvers at one flown α differ from each other by their own deviations and errors only. The mean
+//! residuals of the flown α differ also by the lack of fit. λ² is the variance of these means that
+//! deviations and errors do not explain, by the same equation of Paule and Mandel. More maneuvers do
+//! not reduce it, so it is added to the variance of the trend at every α. If no α was flown twice,
+//! all scatter beyond the bounds counts as lack of fit.
+//!
+//! # Order
+//!
+//! An information criterion chooses the order; the choice is uncertain. The variance is therefore
+//! averaged over all orders: each adds its own variance and the square of its distance from the
+//! chosen trend. Its share is proportional to exp(−Δ/2), with Δ its criterion less the chosen one's
+//! (Burnham and Anderson's unconditional variance). A criterion also prefers smooth curves, which
+//! leaves a bias as large as the standard error. No standard error is therefore smaller than that of
+//! the fit with one more coefficient (undersmoothing, Hall 1992).
 
 use nalgebra::{DMatrix, DVector};
 
@@ -50,12 +78,12 @@ pub(super) struct TrendFit {
     covariance: DMatrix<f64>,
     /// Covariance from the bounds alone, without scatter.
     covariance_of_bounds: DMatrix<f64>,
-    /// λ².
+    /// Squared lack of fit λ²: variance of the derivative about the curve.
     lack_of_fit2: f64,
-    /// τ² of each point, in the points' order.
+    /// Scatter variance τ² of the stratum of each point, in the points' order.
     scatter2: Vec<f64>,
-    /// Standard deviation of one more estimate, from the median maneuver's bound and the maneuvers'
-    /// own deviations.
+    /// Standard deviation of the estimate of one further maneuver about the derivative: its own
+    /// deviation, and an error of the median bound.
     deviation_of_one_more: f64,
     degrees_of_freedom: usize,
     criterion: f64,
@@ -72,8 +100,8 @@ pub(super) struct Trend {
 }
 
 impl Trend {
-    /// The trend through points sorted by α: the lower order on a tie; `None` if no order has a
-    /// solution.
+    /// Fits every order to points sorted by α, and takes the one with the least criterion: the lower
+    /// one on a tie. `None` if no order has a solution.
     pub(super) fn through(
         points: &[Point],
         settings: &Settings,
@@ -90,7 +118,7 @@ impl Trend {
                 }
             })?
             .clone();
-        // Of three maneuvers the criterion has no finite value.
+        // With three maneuvers only the mean is allowed, and its AICc is infinite.
         let likelihood = |fit: &TrendFit| {
             if fit.criterion.total_cmp(&best.criterion).is_eq() {
                 1.0
@@ -130,11 +158,12 @@ impl Trend {
 impl TrendFit {
     /// The fits of every order that the data allow. Points are sorted by α.
     ///
-    /// At least two degrees of freedom remain for the residuals, and there are no more coefficients
-    /// than distinct α. With several maneuvers at each α, a trend may thus pass through the middle
-    /// of every cluster, which it must if a derivative bends between them. Besides polynomials
-    /// there are splines. If the analyst gives knots, they are used, with polynomials up to the
-    /// third order; otherwise the knots are each, or every second, flown α.
+    /// A fit is allowed if at least two degrees of freedom remain for the residuals, and if it has no
+    /// more coefficients than flown α. With several maneuvers at each flown α, the curve may thus
+    /// pass through the mean at every one, as it must if the derivative bends between them.
+    /// Candidates are polynomials and splines. With knots from the analyst, both go up to the third
+    /// order. Without them the knots are the flown α between the ends: every one or every second one
+    /// with straight lines, every second one with cubics.
     fn all(points: &[Point], settings: &Settings, knots_deg: &[f64]) -> Vec<TrendFit> {
         let (Some(first), Some(last)) = (points.first(), points.last()) else {
             return Vec::new();
@@ -222,12 +251,13 @@ impl TrendFit {
         &self.residuals
     }
 
-    /// τ of the median maneuver.
+    /// Scatter τ of the median maneuver, in the derivative's unit.
     pub(super) fn scatter(&self) -> f64 {
         upper_median(self.scatter2.iter().copied()).map_or(0.0, f64::sqrt)
     }
 
-    /// Standard deviation of one more estimate from the derivative.
+    /// Standard deviation of the estimate of one further maneuver about the derivative, without the
+    /// error of the trend.
     pub(super) fn deviation_of_one_more(&self) -> f64 {
         self.deviation_of_one_more
     }
@@ -239,8 +269,8 @@ impl TrendFit {
     }
 }
 
-/// Minus twice the log-likelihood of one residual. It is constant for outliers, so that no order is
-/// chosen for coming nearer to one.
+/// Minus twice the log-likelihood of one residual r of variance v: ln v + r²/v, with r²/v limited to
+/// [`OUTLYING`]². An order thus gains nothing by a curve that passes nearer to an outlier.
 fn deviance((residual, variance): (f64, f64)) -> f64 {
     variance.ln() + (residual * residual / variance).min(OUTLYING * OUTLYING)
 }

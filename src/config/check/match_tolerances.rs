@@ -10,7 +10,7 @@ use crate::tables::ModelSource;
 /// Longest time over which initial state and trim may be matched, s: more would be a fit.
 const LONGEST_TRIM_S: f64 = 5.0;
 
-/// Least number of draws that give a probability to some per cent.
+/// Least number of draws: the standard error of a probability of one half is then 11 %.
 const LEAST_DRAWS: usize = 20;
 
 /// Largest number of draws: each takes some tens of thousands of multiplications a maneuver.

@@ -107,7 +107,8 @@ fn names(config: &Config, source: &Source) -> Result<()> {
     Ok(())
 }
 
-/// Checks the numbers of trends and comparison.
+/// Checks that the knots of trends are finite, and that outlier limit, published step and agreement
+/// limit are positive.
 fn trends(config: &Config, source: &Source) -> Result<()> {
     let (trend, compare) = (&config.trend, &config.compare);
     let of_groups = trend.groups.iter();

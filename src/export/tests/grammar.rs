@@ -77,7 +77,7 @@ const MODELS: [(&str, &str, &str); 37] = [
     ("signalValue", "#text", ""),
 ];
 
-/// All that is wrong with a document.
+/// Violations of the grammar by a document, in words.
 pub(super) fn faults(text: &str) -> Vec<String> {
     let document = Document::parse_with_options(
         text,

@@ -1,15 +1,43 @@
-//! Noise of the inputs in the score of a window.
+//! Uncertainty of a window's parameters from the noise of its inputs.
 //!
-//! Rates and accelerations drive the equations, so their white noise is integrated: the outputs go
-//! along a random walk, which a fit takes for biases and scale errors. A sample of input `i` with the
-//! noise n at the time t moves the state by B(t) h n, and an output at a later time by
-//! C(k) Φ(k, 0) Φ(t, 0)⁻¹ B(t) h n, where C(k) Φ(k, 0) is the output's sensitivity to the initial
-//! state. The score Σ Sᵀ R⁻¹ v so changes by g(t) n with
+//! The rates and accelerations (the *inputs*) drive the equations of motion, so their white noise is
+//! integrated. The reconstructed outputs then drift along a random walk. A fit over one short window
+//! mistakes the drift for biases and scale errors, and the information of the outputs alone would
+//! promise too small bounds.
 //!
-//! g(t) = [Σ over k > t of S(k)ᵀ R⁻¹ C(k) Φ(k, 0)] Φ(t, 0)⁻¹ B(t) h,
+//! # Symbols
 //!
-//! and has the covariance M = Σ over t of g Q gᵀ beside the H of the outputs' own noise. An estimate
-//! H⁻¹ Sᵀ R⁻¹ v then has the covariance H⁻¹ (H + M) H⁻¹: its information is H (H + M)⁻¹ H.
+//! t and k count samples of the window.
+//!
+//! | symbol | quantity | unit |
+//! |---|---|---|
+//! | h | time between samples | s |
+//! | n(t), Q | noise of an input's sample, and its variance | the input's, squared |
+//! | x(t) | state | ft/s, rad, ft |
+//! | B(t) | slopes ∂ẋ/∂input | |
+//! | Φ(t, 0) | slopes ∂x(t)/∂x(0) along the initial state | |
+//! | C(k) | slopes of an output's reading along the state | |
+//! | v(k), R | residual of an output, and the variance of its noise | the output's, squared |
+//! | S(k) | slopes of the reading along the parameters | |
+//! | score | Σ over k of S(k)ᵀ R⁻¹ v(k), the gradient of the log-likelihood | 1/parameter |
+//! | H | information Σ Sᵀ R⁻¹ S: covariance of the score from the outputs' noise | |
+//! | g(t) | change of the score per unit of n(t) | |
+//! | M | covariance of the score from the inputs' noise | |
+//!
+//! # Covariance of the score
+//!
+//! The noise n(t) moves the state by B(t) h n(t) at once. At a later sample k it moves the reading by
+//! C(k) Φ(k, 0) Φ(t, 0)⁻¹ B(t) h n(t). C(k) Φ(k, 0) is the sensitivity of the reading to the initial
+//! state, which the reconstruction has. The score therefore changes by g(t) n(t) with
+//!
+//! g(t) = [Σ over k > t of S(k)ᵀ R⁻¹ C(k) Φ(k, 0)] Φ(t, 0)⁻¹ B(t) h.
+//!
+//! Noise at different times is independent, so the covariance is M = Σ over t of g(t) Q g(t)ᵀ.
+//!
+//! # Information
+//!
+//! An estimate is H⁻¹ times the score. The score has the covariance H + M, the estimate H⁻¹ (H + M)
+//! H⁻¹, and the information on it is H (H + M)⁻¹ H.
 
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
@@ -23,16 +51,17 @@ use super::window::{Window, input_factor};
 use super::window_sums::{ALL, LinearisedWindow, ReducedInformation, place_among_all};
 use crate::numerics::symmetric;
 
-/// Length of the blocks whose samples respond alike to the noise, s: short against the motion.
+/// Length of the blocks of samples that share one g, s: short against the periods of an aircraft's
+/// motion, 1 s and more.
 const BLOCK_S: f64 = 0.2;
 
-/// Least information on a parameter, as a share of that of its ordinary size: keeps H + M positive
-/// definite along directions that no output has.
+/// Information added to each parameter, as a share of one over the square of its ordinary size. It
+/// keeps H + M positive definite for combinations of parameters that no output depends on.
 const LEAST_INFORMATION: f64 = 1e-6;
 
-/// Covariance of the score on the shared parameters from the noise of the inputs, the window's own
-/// parameters eliminated. `weights` are 1/R of the outputs, and `information` is that of the
-/// outputs. `None` if the motion does not determine the initial state.
+/// Covariance M of the score on the parameters that all windows share, with the window's own
+/// parameters eliminated. `weights` are 1/R of the outputs; `information` is H of the outputs' noise.
+/// `None` if Φ is singular at some block, so that noise has no equivalent initial state.
 pub fn score_covariance(
     window: &Window,
     linearised: &LinearisedWindow,
@@ -53,7 +82,8 @@ pub fn score_covariance(
     Some(&scores * scores.transpose())
 }
 
-/// Replaces each block's products by the sum over later blocks, from the middle of the block on.
+/// Replaces the products of each block by their sum over all later samples: the later blocks, and the
+/// second half of the block itself.
 fn sum_later(products: &mut DMatrix<f64>) {
     let mut later = vec![0.0; ALL * STATES];
     let blocks = products.as_mut_slice().chunks_exact_mut(ALL * STATES);
@@ -66,9 +96,9 @@ fn sum_later(products: &mut DMatrix<f64>) {
     }
 }
 
-/// Completes the scores of all blocks so that they agree with the score of a bias: constant noise
-/// is a bias b, whose score is H b. Otherwise combinations of scores with almost no information in
-/// the outputs would seem to separate noise from bias.
+/// Corrects the scores of all blocks so that their sum for constant noise is exactly the score H b of
+/// a bias b. Blocks approximate the sum; without the correction, combinations of parameters with
+/// almost no information would seem to separate noise from bias.
 fn make_consistent(scores: &mut DMatrix<f64>, window: &Window, information: &DMatrix<f64>) {
     let length = block_length(window);
     let samples = |block: usize| length.min(window.samples - block * length) as f64;
@@ -155,8 +185,9 @@ fn add_scaled(sums: &mut [f64], values: &[f64], factor: f64) {
     }
 }
 
-/// Moves of the initial state that act like one standard deviation of each input's noise, block by
-/// block: Φ(t, 0)⁻¹ B(t) h σ √samples at the middle of a block. `None` if Φ is singular.
+/// Changes of the initial state that act like the noise of a block, for each block and input:
+/// Φ(t, 0)⁻¹ B(t) h σ √N at the block's middle t, with σ the noise's standard deviation and N the
+/// number of samples. `None` if Φ is singular.
 fn moves_of_start(window: &Window, linearised: &LinearisedWindow) -> Option<Vec<DMatrix<f64>>> {
     let (length, spacing) = (block_length(window), window.samples_per_node());
     let slopes = &linearised.sensitivities;

@@ -1,13 +1,23 @@
 //! Flight-path reconstruction of one window for given errors of its instruments, with
 //! sensitivities.
 //!
-//! An input is corrected before it drives the equations, x(t) = (y(t + delay) − bias)/(1 + scale).
-//! States are integrated from point to point, a twentieth of a second. Within a step an input is the
-//! parabola through both points that has the input's own mean, so that no part of an integral is lost.
-//! Readings between points are interpolated. Sensitivities change as slowly as the aircraft moves, so
-//! they obey the linearised equations over two steps, from node to node. The inputs' slopes enter by
-//! their means: then a delay moves an integral of an input exactly as it moves the input, however noisy
-//! that is.
+//! The *inputs* are the rates and accelerations, which drive the equations; the *outputs* are the
+//! other instruments, which the reconstructed motion predicts. With y(t) the recorded and x(t) the
+//! true value of an input, in rad/s or ft/s², and bias (same unit), scale (a ratio) and delay (s) the
+//! errors of its instrument,
+//!
+//! x(t) = (y(t + delay) − bias)/(1 + scale).
+//!
+//! Two grids of time are used:
+//!
+//! - *Points*, a twentieth of a second apart, to which Runge-Kutta steps integrate the states.
+//!   Within a step an input is a parabola: through its values at both points, and with the mean of
+//!   its samples, so that its integral is exact. Readings between points are interpolated.
+//! - *Nodes*, every second point, at which sensitivities are computed from the linearised equations.
+//!   They change as slowly as the aircraft moves.
+//!
+//! The slopes of an input along its errors enter the linearised equations by their means over a step
+//! between nodes. The computed effect of a delay on an integral is then exact for noisy inputs too.
 
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 #![expect(
@@ -26,33 +36,37 @@ use crate::flight::interpolation_kernel::InterpolationKernel;
 use crate::numerics::runge_kutta::{POINT, STAGES, reaches_s, weights_s};
 use crate::numerics::simd::{load, store};
 
-/// Parameters of a window alone: its initial state, and the change of the wind north, east and
-/// down, ft/s².
+/// Number of parameters of a window alone: its initial state, and the rates of change of the wind.
 pub const LOCAL: usize = STATES + WIND;
+/// Number of wind parameters: rates of change of the wind north, east and down, ft/s².
 pub const WIND: usize = 3;
-/// Parameters that the states depend on: the local ones, then bias, scale and delay of each input.
+/// Number of parameters that the states depend on: the local ones, then bias, scale and delay of each
+/// input.
 pub const DRIVING: usize = LOCAL + INPUTS * KINDS;
-/// Parameters that one output depends on: those of the states, then its own bias, scale and delay.
+/// Number of parameters that one output depends on: those of the states, then its own bias, scale and
+/// delay.
 pub const ROW: usize = DRIVING + KINDS;
 /// Length of a row in whole vectors.
 pub const WIDE: usize = ROW.next_multiple_of(8);
 
+/// Values of a window's own parameters.
 pub type LocalParameters = [f64; LOCAL];
+/// Slopes of one state or reading along the parameters, padded to whole vectors.
 pub type Row = [f64; WIDE];
 
-/// Motion of a window that its inputs make, at its points.
+/// Reconstructed motion of a window at its points.
 #[derive(Clone, Debug)]
 pub struct Path {
     inputs: CorrectedInputs,
     states: Vec<State>,
-    /// Readings of the output instruments without their own errors.
+    /// Reading of each output at the points, as an instrument without errors would give it.
     pub readings: [Vec<f64>; OUTPUTS],
 }
 
 /// Sensitivities of a window at its nodes.
 #[derive(Clone, Debug)]
 pub struct PathSensitivities {
-    /// Slopes of what the output instruments read, with their own errors, along the parameters of a row.
+    /// At each node, slopes of each output's reading, errors included, along the parameters of a row.
     pub rows: Vec<[Row; OUTPUTS]>,
     /// Slopes of the states along the initial state.
     pub transitions: Vec<SMatrix<f64, STATES, STATES>>,
@@ -67,7 +81,7 @@ struct CorrectedInputs {
     values: Vec<Inputs>,
     /// Slopes in time at points, per s.
     slopes: Vec<Inputs>,
-    /// Change with the bias of the instrument.
+    /// Slope of the corrected input along the instrument's bias.
     by_bias: Inputs,
     /// Scale factors of the instruments, 1 + scale.
     gains: Inputs,
@@ -278,7 +292,8 @@ impl Linearisation<'_> {
         end
     }
 
-    /// Sensitivities of what the instruments read at a node.
+    /// Sensitivities of the readings at a node: through the states, through the body rates that a
+    /// reading contains, and along the output's own bias, scale and delay.
     #[inline(always)]
     fn reading_rows<S: Simd>(&self, simd: S, node: usize, s: &Sensitivities) -> [Row; OUTPUTS] {
         let Path {
@@ -313,8 +328,8 @@ impl Linearisation<'_> {
     }
 }
 
-/// Slope of values at one of them, per step: the fourth-order difference. The end values stand for
-/// those beyond.
+/// Slope of a series at index `k`, per step, by the fourth-order central difference. Beyond an end
+/// the end value is repeated.
 #[inline(always)]
 fn slope_at(values: &[f64], k: usize) -> f64 {
     let last = values.len() - 1;
@@ -434,7 +449,7 @@ impl CorrectedInputs {
         }
     }
 
-    /// Slopes at a point.
+    /// Slopes of the corrected inputs along bias, scale and delay at a point.
     #[inline(always)]
     fn by_error(&self, point: usize) -> ByError {
         let mut by_error = [[0.0; KINDS]; INPUTS];
@@ -445,7 +460,8 @@ impl CorrectedInputs {
         by_error
     }
 
-    /// Means of the slopes over the two steps from a point, `length_s` long together.
+    /// Means of these slopes over the two steps from a point, together `length_s` long, by Simpson's
+    /// rule for the scale; the mean slope in time is the rise over the time.
     #[inline(always)]
     fn mean_by_error(&self, point: usize, length_s: f64) -> ByError {
         let values = &self.values[2 * point..2 * point + 5];
@@ -461,8 +477,8 @@ impl CorrectedInputs {
     }
 }
 
-/// Mean of a signal from the second of some samples to the last but one: the trapezoids, corrected by
-/// the slopes at both ends (Gregory), exact for cubics.
+/// Mean of a signal between its second sample and its last but one, by the trapezoidal rule with
+/// Gregory's correction for the slopes at both ends. It is exact for cubics.
 fn mean_over_step(samples: &[f64]) -> f64 {
     let last = samples.len() - 2;
     let sum: f64 = samples[1..=last].iter().sum();
@@ -471,8 +487,8 @@ fn mean_over_step(samples: &[f64]) -> f64 {
     (trapezoids - (rise(last) - rise(1)) / 24.0) / (last - 1) as f64
 }
 
-/// Place among the shared parameters of a column of an output's row; the columns before `LOCAL` are
-/// local parameters.
+/// Index among the parameters shared by all windows of column `column` in the row of output `o`.
+/// Columns before [`LOCAL`] are the window's own parameters and have no such index.
 pub fn shared_place(column: usize, o: usize) -> usize {
     if column < DRIVING {
         column - LOCAL

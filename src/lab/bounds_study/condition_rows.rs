@@ -12,7 +12,8 @@ use crate::tables::ConditionRow;
 /// Class of the row of all classes.
 pub const ALL_CLASSES: &str = "all";
 
-/// Build-up and true tables, by which errors are scaled.
+/// True derivatives, for errors in percent of each derivative's root mean square, and the build-up,
+/// which separates constants from slopes.
 #[derive(Clone, Copy)]
 pub struct Scales<'a> {
     pub buildup: &'a Buildup,

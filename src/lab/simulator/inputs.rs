@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TestInput {
-    /// Surface, pilot control or `thrust_lbf`.
+    /// Signal that the input moves: a surface, a pilot control, or `thrust_lbf`.
     pub signal: String,
     /// Amplitude of the first pulse, in the signal's unit; the sign alternates from pulse to pulse.
     pub size: f64,

@@ -9,7 +9,7 @@
 pub(crate) struct Autoregression {
     /// Coefficients a_1, a_2, …
     pub coefficients: Vec<f64>,
-    /// Variance of e.
+    /// Variance of the innovations e, in the square of the output's unit.
     pub innovation: f64,
 }
 

@@ -1,15 +1,35 @@
-//! Covariance of the estimates under coloured residuals (after Morelli and Klein 1997): H⁻¹ [Σ Sᵀ W
-//! R W S] H⁻¹ with R the autocovariance of the noise. Every variance is a sum of squares and has
-//! its degrees of freedom ([`degrees_of_freedom`](super::degrees_of_freedom)).
+//! Covariance of the estimates under coloured residuals (after Morelli and Klein 1997).
 //!
-//! Residuals are not the noise: the parameters absorb part of it, most where it is slow. With C = S
-//! H⁻¹ W the change of the estimates with each value, the residuals are (I − S Cᵀ) times the noise,
-//! and their covariance is (I − S Cᵀ) R (I − C Sᵀ). The absorbed part is R C Sᵀ + S Cᵀ R − S K Sᵀ,
-//! with K = Cᵀ R C the parameters' covariance. It is added back in rounds until R settles. R of
-//! each output belongs to an autoregressive process, by which the changes are filtered.
+//! | symbol | quantity | unit |
+//! |---|---|---|
+//! | S | sensitivities of one output's samples to the parameters | output/parameter |
+//! | W | weight of the output in the cost | 1/output² |
+//! | H = Σ Sᵀ W S | information matrix, summed over the outputs | 1/parameter² |
+//! | R | autocovariance of the output's noise between any two samples | output² |
+//! | C = S H⁻¹ W | change of the estimates with each sample of the output | parameter/output |
+//! | K = Cᵀ R C | covariance of the estimates from the output's noise | parameter² |
 //!
-//! For most outputs the process is white. Then nothing is filtered: R C Sᵀ is S H⁻¹ Sᵀ times a
-//! number. White noise that has settled is kept while the iteration for other outputs continues.
+//! S has a row for each sample. The covariance of the estimates is the sum of K over the outputs,
+//! H⁻¹ [Σ Sᵀ W R W S] H⁻¹. Every variance is a sum of squares with degrees of freedom of its own
+//! ([`degrees_of_freedom`](super::degrees_of_freedom)).
+//!
+//! # Noise from residuals
+//!
+//! The fit follows part of the noise, most where the noise is slow: it is *absorbed* by the
+//! parameters. The residuals are (I − S Cᵀ) times the noise, so their covariance is
+//! (I − S Cᵀ) R (I − C Sᵀ). It is smaller than R by the absorbed part,
+//!
+//! R C Sᵀ + S Cᵀ R − S K Sᵀ.
+//!
+//! R is found in rounds: the absorbed part for the present R is added to the covariance of the
+//! residuals, and an autoregressive process is fitted to the sum, until R settles.
+//!
+//! # Cost
+//!
+//! The samples are means over blocks ([`BlockSeries`]); noise within the blocks is white. For
+//! coloured noise C is filtered by the process, which replaces products with R. For white noise
+//! R C Sᵀ is S H⁻¹ Sᵀ times a number, and nothing is filtered. White noise that has settled is not
+//! computed again while other outputs are iterated.
 
 use std::ops::Range;
 
@@ -26,22 +46,22 @@ use crate::output_error::case::blocks::BlockSums;
 const ROUNDS: usize = 30;
 /// Relative change of an output's long-run variance below which its noise has settled.
 const SETTLED: f64 = 0.01;
-/// Change of the absorbed part, as a share of the variance, below which settled white noise stays.
-/// A bound is only accurate to some hundredths.
+/// Change of the absorbed part, as a share of the variance, below which white noise that has settled
+/// is not computed again: a bound is accurate to some hundredths only.
 const UNCHANGED: f64 = 1e-3;
-/// Least share of white noise that the parameters leave, for which its variance follows from the
-/// residuals in one round.
+/// Share of the noise variance that must remain in the residuals for white noise to be found in one
+/// round, by the ratio of the residuals' variance to that share.
 const MOSTLY_LEFT: f64 = 0.95;
 
-/// Noise of each output.
+/// Estimated noise of each output, in the order of the outputs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ResidualNoise(Vec<OutputNoise>);
 
 #[derive(Clone, Debug, PartialEq)]
 struct OutputNoise {
-    /// Process of the blocks' means.
+    /// Autoregressive process of the block means.
     slow: Autoregression,
-    /// Variance of the samples about their block's mean.
+    /// Variance of the samples about their block mean, in the square of the output's unit.
     fast_variance: f64,
 }
 
@@ -91,8 +111,8 @@ pub fn residual_noise(inverse: &DMatrix<f64>, outputs: &[BlockSeries]) -> Residu
     ResidualNoise(noise.collect())
 }
 
-/// Variance of white noise with the power of the slowest part of these values, and at least the
-/// variance of the values. NaN marks values that do not count.
+/// Variance of the white noise whose spectrum equals that of these values at frequency zero; at least
+/// the mean square of the values. Values that are NaN do not count.
 #[must_use]
 pub fn slow_noise_level(values: &[f64], step_s: f64) -> f64 {
     let counted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
@@ -106,8 +126,8 @@ pub fn slow_noise_level(values: &[f64], step_s: f64) -> f64 {
     level.max(square / (counted.len() as f64).max(1.0))
 }
 
-/// Log-likelihood that an autoregressive process of these values gains over white noise, less the
-/// penalty for its coefficients. NaN marks values that do not count.
+/// Gain in log-likelihood, in nats, of an autoregressive process over white noise as the description
+/// of these values, less the penalty for its coefficients. Values that are NaN do not count.
 #[must_use]
 pub fn likelihood_gain(values: &[f64]) -> f64 {
     let finite: Vec<f64> = values
@@ -139,7 +159,7 @@ fn finite_sums(values: &[f64]) -> BlockSums {
     }
 }
 
-/// Covariance Σ Sᵀ W R W S of the gradient under a noise.
+/// Covariance Σ Sᵀ W R W S of the cost's gradient for the given noise of the outputs.
 #[must_use]
 pub fn gradient_covariance(outputs: &[BlockSeries], noise: &ResidualNoise) -> DMatrix<f64> {
     let parameters = outputs.first().map_or(0, |o| o.between.columns());
@@ -190,7 +210,7 @@ fn total_covariance(outputs: &[NoiseIteration], parameters: usize) -> AlignedMat
     sum
 }
 
-/// Iteration for the noise of one output, and its effect on the parameters.
+/// Estimate of one output's noise while its rounds run, and the covariance that it causes.
 struct NoiseIteration<'a> {
     series: &'a BlockSeries,
     inverse: &'a AlignedMatrix,
@@ -198,7 +218,7 @@ struct NoiseIteration<'a> {
     pairs: Vec<f64>,
     /// Autocovariances of the residuals at lags 0, 1, …
     observed: Vec<f64>,
-    /// Noise of the blocks' means.
+    /// Present estimate of the process of the block means.
     slow: Autoregression,
     /// Variance of the blocks' means.
     variance: f64,
@@ -208,11 +228,12 @@ struct NoiseIteration<'a> {
     by_slow: AlignedMatrix,
     /// `by_slow` if the blocks' means were white with unit variance.
     by_white: AlignedMatrix,
-    /// C: change of the parameters with each block's mean; `None` until the noise is coloured.
+    /// C, the change of the estimates with each block mean; `None` until the noise is coloured.
     changes: Option<AlignedMatrix>,
-    /// R C at unit innovation; `None` for white noise.
+    /// R C of the process with innovations of variance one; `None` for white noise.
     spread: Option<AlignedMatrix>,
-    /// Variance of S K Sᵀ when the absorbed part was last added back.
+    /// Mean variance of the block means that the parameters absorb (diagonal of S K Sᵀ), in the round
+    /// in which the absorbed part was last added.
     absorbed_variance: f64,
     settled: bool,
 }
@@ -265,9 +286,9 @@ impl<'a> NoiseIteration<'a> {
         self.variance = autocovariances.first().copied().unwrap_or(0.0);
     }
 
-    /// Adds back the part that the parameters, of this covariance, absorb. White noise is set at
-    /// once to the variance that leaves the observed residuals; then only other outputs can change
-    /// it.
+    /// Runs one round: adds the part that parameters of this covariance absorb to the residuals'
+    /// autocovariances, and fits the noise to the sum. For white noise the variance that leaves the
+    /// observed residuals is computed directly, so only the other outputs can change it later.
     fn iterate(&mut self, covariance: &AlignedMatrix) {
         let (pairs, length) = (self.pairs[0], self.series.block_length);
         let absorbed_variance = covariance.dot(&self.series.between) / (length * length * pairs);
@@ -293,7 +314,7 @@ impl<'a> NoiseIteration<'a> {
         self.settled = (expected - found).abs() <= SETTLED * found;
     }
 
-    /// Sums of R C Sᵀ + S Cᵀ R − S K Sᵀ along its diagonals.
+    /// Absorbed part R C Sᵀ + S Cᵀ R − S K Sᵀ, summed over all pairs of blocks at each lag.
     fn absorbed(&mut self, covariance: &AlignedMatrix) -> Vec<f64> {
         let (series, lags) = (self.series, self.series.lags());
         let (sums, length) = (&series.sensitivities, series.block_length);

@@ -1,18 +1,33 @@
-//! Places of the parameters in the lanes of the processor's vectors. Derivatives and initial
-//! states, which the integration depends on, lie side by side. A bias shifts an output and needs no
-//! lane of the integration.
+//! Order of the parameters in the lanes of the kernel's vectors.
 //!
-//! The derivatives of one coefficient form a group of whole vectors, so one coefficient's slope
-//! serves all lanes of a vector. Derivatives along a state come first, in the order of the states,
-//! then those along products of a state: the same lanes of each group. All groups are equally long.
-//! Parameters without a regressor, such as initial states, are the last group. Two spare lanes hold
-//! the residual and a one while sums are taken.
+//! Terms of this file:
 //!
-//! Regressors stand in rows, point by point. Where the columns of all coefficients fit into the
-//! widest group, all groups read the same part of a row: most derivatives come three at a time, one
-//! of each coefficient, along the same surface. Lanes without a parameter are computed and ignored.
-//! In a dense layout each group has regressors of its own, zero in the lanes that no derivative
-//! takes; the other parameters take these lanes.
+//! - A *vector* is [`VECTOR`] numbers that the processor computes at once; a *lane* is the place of
+//!   one of them, counted through all vectors. Each lane holds the sensitivities to one parameter.
+//! - A *group* is the lanes of one coefficient's derivatives, in whole vectors.
+//! - A *slot* is a place within a group. The same slot of each group has the same kind of regressor.
+//! - A *row* is the regressors of one point in time; a *column* is one regressor over all points.
+//!
+//! # Lanes
+//!
+//! Lanes are, in order:
+//!
+//! 1. the group of each coefficient. All groups have the same number of lanes. A vector thus contains
+//!    derivatives of one coefficient only, and needs one factor ∂(rates)/∂(coefficient). The first
+//!    slots are derivatives along a state, in the order of the states, then derivatives along a
+//!    state times a measured signal, then those along measured signals;
+//! 2. the group of the parameters without a regressor, such as initial states.
+//!
+//! A bias shifts an output and not the states, so it needs no lane in the integration. Two lanes
+//! without a parameter hold the residual and the number one while sums are taken.
+//!
+//! # Regressors
+//!
+//! Usually each surface has one derivative in each of the three coefficients. Their regressor is the
+//! same column, so all groups read one row of shared columns, if the columns of all coefficients fit
+//! into the widest group. A slot without a derivative is computed and ignored. In a *dense* layout
+//! each group has a row of its own, with zero in the slots without a derivative; parameters without
+//! a regressor take these slots.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -31,9 +46,10 @@ const MOST_STATES: usize = 3;
 /// Groups of lanes: one per coefficient, and the initial states.
 const GROUPS: usize = COEFFICIENTS + 1;
 
-/// Layout of one case.
+/// Lanes of the parameters of one case, and the regressors that each group reads.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct LaneLayout {
+    /// Lanes of each group: one per coefficient, then the parameters without a regressor.
     pub groups: [Range<usize>; GROUPS],
     /// Lane of each parameter in order, without the biases.
     pub parameter_lanes: Vec<usize>,
@@ -43,21 +59,23 @@ pub(crate) struct LaneLayout {
     pub one: usize,
     /// Spare lanes that hold the biases' sensitivities where these are kept.
     pub biases: Vec<usize>,
-    /// Lanes in use of each vector, from its first.
+    /// Number of lanes of each vector that are computed, counted from its first lane.
     pub used: Vec<usize>,
-    /// Beginning of each group's regressors in a row of regressors.
+    /// Index in a row of the first regressor of each coefficient's group; equal where groups share
+    /// columns.
     pub regressors: [usize; COEFFICIENTS],
-    /// Length of a row of regressors.
+    /// Number of regressors in a row.
     pub row: usize,
-    /// Columns that make up a row of regressors: (place in the row, column).
+    /// Columns of regressors in a row: (index in the row, column).
     pub columns: Vec<(usize, usize)>,
-    /// Slots of products of a state: (slot in each group, state).
+    /// Slots of derivatives along a state times a measured signal: (slot in each group, state).
     pub products: Vec<(usize, usize)>,
 }
 
 impl LaneLayout {
-    /// Layout for these terms, sorted by coefficient. `followed` are the states that regressors can
-    /// be proportional to.
+    /// Layout of the derivatives `terms`, sorted by coefficient, and of the numbers `initial_states`
+    /// and `biases` of other parameters. `followed` are the states of the axis that regressors can be
+    /// proportional to.
     pub fn new(
         terms: &[Term],
         followed: &[usize],
@@ -71,7 +89,8 @@ impl LaneLayout {
         layout
     }
 
-    /// Layout that fills the groups of the coefficients with the other parameters, which are many.
+    /// Layout for many parameters without a regressor (`others`): they take the slots of the groups
+    /// in which no derivative stands, and the rest follows in the last group.
     pub fn dense(terms: &[Term], followed: &[usize], others: usize) -> LaneLayout {
         let slots = GroupSlots::new(terms, followed).apart(terms);
         let mut layout = LaneLayout::with_terms(terms, followed, &slots);
@@ -122,7 +141,7 @@ impl LaneLayout {
         self.columns.dedup();
     }
 
-    /// Places parameters behind the groups of the coefficients.
+    /// Puts `count` parameters without a regressor into the last group.
     fn place_others(&mut self, count: usize) {
         let first = self.groups[COEFFICIENTS - 1].end;
         self.groups[COEFFICIENTS] = first..first + padded(count);
@@ -168,14 +187,16 @@ fn padded(count: usize) -> usize {
     count.next_multiple_of(VECTOR)
 }
 
-/// Slots of a group: the followed states, their products, then columns of regressors.
+/// Slots that all groups have in common: derivatives along a state, along a state times a measured
+/// signal, then along measured signals.
 struct GroupSlots {
-    /// State of each of the first slots, and the column of its factor where a term has it.
+    /// First slots of every group: state, and the column of the signal it is multiplied by; `None` as
+    /// long as no derivative needs the slot.
     along_states: Vec<(usize, Option<usize>)>,
     columns: [Vec<usize>; COEFFICIENTS],
     /// Lanes of a group.
     width: usize,
-    /// All groups have the columns of all coefficients.
+    /// `true` if all groups have the columns of all coefficients, and read one row.
     shared: bool,
 }
 
@@ -201,7 +222,7 @@ impl GroupSlots {
         }
     }
 
-    /// Slots of groups that share no columns.
+    /// The same slots with columns of its own in each group.
     fn apart(self, terms: &[Term]) -> GroupSlots {
         GroupSlots {
             columns: std::array::from_fn(|k| columns_of(terms, k)),
@@ -225,8 +246,8 @@ impl GroupSlots {
     }
 }
 
-/// Slots along states: one for each followed state, for the first column of its factors, and one for
-/// each further column.
+/// Slots of derivatives along a state. Each followed state has one, which the first derivative along
+/// it takes with its column; a derivative along the same state with another column adds a slot.
 fn slots_along_states(terms: &[Term], followed: &[usize]) -> Vec<(usize, Option<usize>)> {
     let mut slots: Vec<(usize, Option<usize>)> = followed.iter().map(|s| (*s, None)).collect();
     for term in terms {
@@ -243,7 +264,7 @@ fn slots_along_states(terms: &[Term], followed: &[usize]) -> Vec<(usize, Option<
     slots
 }
 
-/// Columns of the terms of one coefficient that no state is a factor of.
+/// Columns of one coefficient's derivatives along measured signals alone.
 fn columns_of(terms: &[Term], coefficient: usize) -> Vec<usize> {
     let own = terms
         .iter()

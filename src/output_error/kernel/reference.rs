@@ -133,7 +133,9 @@ impl<'a, const NX: usize, E: Equations<NX>> Reference<'a, NX, E> {
         runge_kutta::step(from, self.window.step_s, slope, Augmented::plus)
     }
 
-    /// Rates of the states (2.1-2.3, 3.1-3.4) and of their sensitivities, ṡ = A s + B_k r.
+    /// Rates of the states (2.1-2.3, 3.1-3.4) and of their sensitivities s to each derivative:
+    /// ṡ = A s + B_k r, with A the slopes of the rates along the states, B_k those along the
+    /// derivative's coefficient k, and r the derivative's regressor.
     fn rates(&self, point: usize, parameters: &[f64], at: &Augmented<NX>) -> Augmented<NX> {
         let c = self.coefficients(point, parameters, &at.x);
         let inputs = E::rate_inputs(self.aircraft, &self.motion[point]);

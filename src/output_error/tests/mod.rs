@@ -329,7 +329,8 @@ impl Noise {
     }
 }
 
-/// Measures the response to `parameters` with noise whose neighbours correlate by `colour`.
+/// Replaces the measurements of a case by its response to `parameters` plus noise whose successive
+/// samples have the correlation `colour`.
 pub(crate) fn measure<const NX: usize, E: Equations<NX>>(
     case: &mut Case<NX, E>,
     parameters: &[f64],

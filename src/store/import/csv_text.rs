@@ -32,7 +32,7 @@ struct Layout {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Delimiter {
     Character(char),
-    /// Any number of spaces and tabs.
+    /// One or more spaces or tabs.
     Space,
 }
 

@@ -31,7 +31,7 @@ struct Source {
     about: ObjectInfo,
     /// Ranges of the object that will be read; read-ahead stops at the end of a range.
     wanted: Vec<Range<u64>>,
-    /// Bytes of the last request, with their start.
+    /// Offset in the object, and bytes, of the last request.
     held: Mutex<(u64, Bytes)>,
 }
 
