@@ -89,8 +89,8 @@ impl Hold {
     /// Warning that goes with a choice.
     #[must_use]
     pub fn warning(self) -> Option<&'static str> {
-        let warning = "estimate: hold: evidence: intervals cover less than with `table` (89 instead of 94 % in simulation): \
-                       state the tunnel's uncertainty";
+        let warning = "estimate: hold: evidence: intervals cover less than with `table` if the tunnel is worse than stated: \
+                       state its uncertainty";
         (self == Hold::Evidence).then_some(warning)
     }
 }

@@ -13,7 +13,8 @@ settings! {
         pub delay: Action = Action::Apply,
         /// Smallest delay that is corrected, s. A recorder of ordinary quality has less; the delay
         /// of a surface that the campaign does not determine is taken as zero with this standard
-        /// deviation. Larger: fewer corrections, wider bounds.
+        /// deviation, rounded up to the next step of the remaining uncertainties. Larger: fewer
+        /// corrections, wider bounds.
         pub least_delay_s: f64 = 0.003,
         /// Size from which a delay is corrected, standard errors. Larger: fewer corrections.
         pub standard_errors: f64 = 4.0,
