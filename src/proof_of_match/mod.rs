@@ -5,7 +5,8 @@
 //! [`aerodynamics`] are the model that flies it, [`free_run`] the flight, [`linear_run`] the slopes
 //! of its outputs, and [`start`] its initial state and trim. [`specification`] has the tolerances,
 //! which are the analyst's data; [`judgement`] compares, and [`dutch_roll`] adds the modes of the
-//! flight's own estimates; [`repeat_flight`] adds the probability that a repeat flight passes, and
+//! flight's own estimates; [`mean_run`] is the run at the posterior's mean with the part of the flight
+//! that it does not explain, [`repeat_flight`] adds the probability that a repeat flight passes, and
 //! [`mod@decisive_difference`] the difference that decides it, as a linear function of the
 //! derivatives.
 
@@ -20,6 +21,7 @@ mod linear_run;
 mod start;
 mod dutch_roll;
 mod judgement;
+mod mean_run;
 mod repeat_flight;
 mod decisive_difference;
 mod maneuver;

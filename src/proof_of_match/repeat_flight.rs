@@ -6,30 +6,30 @@
 //! of the simulator differ by the effects of the errors of its matched start. Both follow from the
 //! slopes of one free run. The noise of the sensors is white and independent, so its part of the
 //! probability is exact for each draw.
+//!
+//! A flight may differ from the mean by more than these parts explain, for example if a derivative
+//! varies in a way that the posterior smooths, or the equations lack an effect. This *deficiency*
+//! belongs to the aircraft, so a repeat flight shows it again.
 
-use nalgebra::DMatrix;
 use pulp::Arch;
 
 use super::dutch_roll::{DutchRoll, LateralModes};
-use super::free_run::{FreeRun, STATES, Simulation};
+use super::free_run::{FreeRun, Simulation};
 use super::judgement::{Judged, Simulated, allowed_outside};
-use super::linear_run::{Histories, LinearRun, Parameter};
+use super::linear_run::Histories;
+use super::mean_run::{MeanRun, of_places};
 use super::outputs::{Outputs, place};
 use super::recording::Recording;
 use super::specification::Tolerance;
 use super::start::MatchedStart;
-use crate::aero::{Axis, Buildup, Regressor};
-use crate::model::{LocalKind, LocalPosterior, LocalValue};
+use crate::aero::{Axis, Buildup};
+use crate::model::LocalPosterior;
 use crate::numerics::normal;
 use crate::numerics::random::RandomStream;
 use crate::numerics::root::continuous_root;
-use crate::numerics::sample_count::whole_steps;
 
 /// Seed of the draws.
 const SEED: u64 = 60;
-
-/// Longest step of the run with slopes, s. Probabilities differ by 0.2 % rms from those of steps of a quarter.
-const LONGEST_STEP_S: f64 = 0.1;
 
 /// Distance from the limit beyond which noise has no effect, standard deviations.
 const CERTAIN: f64 = 5.0;
@@ -38,8 +38,8 @@ const CERTAIN: f64 = 5.0;
 #[derive(Clone, Debug)]
 pub struct Repeats {
     stride: usize,
-    /// Outputs at the mean of the posterior.
-    mean: Vec<Outputs>,
+    /// Expected outputs of a repeat flight: those at the mean of the posterior, and the deficiency.
+    expected: Vec<Outputs>,
     /// Slopes of the outputs along the derivatives and the parameters of the start.
     slopes: Vec<Histories>,
     /// Repeat flights, which all models share.
@@ -72,60 +72,6 @@ impl Probabilities {
     }
 }
 
-/// Run about which flights repeat, with the slopes of its outputs.
-#[derive(Debug)]
-pub struct MeanRun {
-    pub stride: usize,
-    pub run: FreeRun,
-    /// Slopes along the derivatives, and after them along the start's own parameters.
-    slopes: Vec<Histories>,
-    /// Indices of the derivatives, among the values of the posterior and in the build-up.
-    pub derivatives: Vec<(usize, usize)>,
-    /// Covariance of the start's own parameters.
-    pub start_covariance: DMatrix<f64>,
-}
-
-impl MeanRun {
-    /// Flies the mean of a posterior; `None` if its start is not determined.
-    #[must_use]
-    pub fn of(
-        (simulation, start): (&Simulation, &MatchedStart),
-        posterior: &LocalPosterior,
-        (buildup, axis): (&Buildup, Axis),
-    ) -> Option<MeanRun> {
-        let covariance = start.covariance.as_ref()?;
-        let recording = simulation.recording;
-        let stride = stride(recording);
-        let derivatives = moving(posterior, buildup);
-        let own = start_parameters(axis);
-        let moved = derivatives.iter().map(|(_, d)| Parameter::Derivative(*d));
-        let parameters: Vec<Parameter> = moved.chain(own.map(Parameter::Start)).collect();
-        let steps = (recording.samples, stride);
-        let LinearRun { run, slopes } =
-            simulation.fly_with_slopes((&start.start, &parameters), steps);
-        Some(MeanRun {
-            stride,
-            run,
-            slopes,
-            derivatives,
-            start_covariance: of_places(covariance, &own),
-        })
-    }
-
-    /// Slopes along the derivatives, and along the parameters of the start.
-    #[must_use]
-    pub fn slopes_by_kind(&self) -> (&[Histories], &[Histories]) {
-        self.slopes.split_at(self.derivatives.len())
-    }
-}
-
-/// Samples in a step of the run with slopes.
-fn stride(recording: &Recording) -> usize {
-    whole_steps(LONGEST_STEP_S, recording.step_s)
-        .min(recording.samples)
-        .max(1)
-}
-
 /// Draws repeat flights about the mean of a posterior, whose run in short steps is `mean`; `None`
 /// if the start is not determined or the axis has no posterior.
 #[must_use]
@@ -140,10 +86,19 @@ pub fn repeats(
     if about.derivatives.is_empty() {
         return None;
     }
-    let (values, derivatives): (Vec<usize>, Vec<usize>) = about.derivatives.into_iter().unzip();
+    let recording = simulation.recording;
+    let (values, derivatives): (Vec<usize>, Vec<usize>) = about.derivatives.iter().copied().unzip();
     let root = continuous_root(&of_places(&posterior.covariance, &values));
     let root_of_start = continuous_root(&about.start_covariance);
-    let mut stream = RandomStream::new(SEED, &simulation.recording.start_s.to_string());
+    // Long steps do for the slopes; the mean is compared with runs in short ones.
+    let mut expected: Vec<Outputs> = mean.outputs.iter().copied().step_by(about.stride).collect();
+    let deficiency = about.deficiency(recording, &expected, [&root, &root_of_start]);
+    for (expected, deficiency) in expected.iter_mut().zip(deficiency) {
+        for (output, own) in deficiency.into_iter().enumerate() {
+            expected[output] += own;
+        }
+    }
+    let mut stream = RandomStream::new(SEED, &recording.start_s.to_string());
     let draw = |_| {
         let drawn = stream.deviations(&root);
         let dutch_roll = modes.and_then(|modes| {
@@ -164,38 +119,9 @@ pub fn repeats(
     Some(Repeats {
         slopes: about.slopes,
         stride: about.stride,
-        // Long steps do for the slopes; the mean is compared with runs in short ones.
-        mean: mean.outputs.iter().copied().step_by(about.stride).collect(),
+        expected,
         draws,
     })
-}
-
-/// Indices of the derivatives that affect a simulation, among the values of a posterior and in the
-/// build-up.
-#[must_use]
-pub fn moving(posterior: &LocalPosterior, buildup: &Buildup) -> Vec<(usize, usize)> {
-    let index = |value: &LocalValue| {
-        let is_slope = value.kind == LocalKind::Derivative && !value.is_mach_slope;
-        let mut derivatives = buildup.derivatives.iter();
-        let index = derivatives.position(|d| is_slope && d.name == value.derivative)?;
-        (buildup.derivatives[index].regressor != Regressor::Constant).then_some(index)
-    };
-    let values = posterior.values.iter().enumerate();
-    values.filter_map(|(i, v)| Some((i, index(v)?))).collect()
-}
-
-/// Parameters of a start that an axis determines.
-fn start_parameters(axis: Axis) -> [usize; 7] {
-    // α, airspeed, q, θ with CN, Cm, CA; β, p, r, φ with CY, Cl, Cn.
-    match axis {
-        Axis::Longitudinal => [0, 2, 4, 6, STATES, STATES + 1, STATES + 2],
-        Axis::Lateral => [1, 3, 5, 7, STATES + 3, STATES + 4, STATES + 5],
-    }
-}
-
-/// Covariance of the quantities at some indices.
-fn of_places(covariance: &DMatrix<f64>, places: &[usize]) -> DMatrix<f64> {
-    covariance.select_rows(places).select_columns(places)
 }
 
 impl Repeats {
@@ -213,7 +139,7 @@ impl Repeats {
             tolerances: vec![0.0; judged.len()],
             whole: 0.0,
         };
-        if simulated.run.has_departed || self.mean.len() * self.stride < recording.samples {
+        if simulated.run.has_departed || self.expected.len() * self.stride < recording.samples {
             return sums;
         }
         let limits = judged.iter().map(|own| {
@@ -244,11 +170,16 @@ impl Repeats {
         sums.clamped()
     }
 
-    /// Difference of a model's run from the mean of the posterior.
+    /// Difference of the expected repeat flight from a model's run.
     fn bias(&self, run: &FreeRun) -> Histories {
         let own = run.outputs.iter().step_by(self.stride);
-        let pairs = self.mean.iter().zip(own);
-        std::array::from_fn(|i| pairs.clone().map(|(mean, own)| mean[i] - own[i]).collect())
+        let pairs = self.expected.iter().zip(own);
+        std::array::from_fn(|i| {
+            pairs
+                .clone()
+                .map(|(expected, own)| expected[i] - own[i])
+                .collect()
+        })
     }
 
     /// Drawn differences of one output at every `stride`-th sample.

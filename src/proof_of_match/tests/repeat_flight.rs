@@ -138,6 +138,28 @@ fn stated_probabilities_are_the_shares_of_repeat_flights_that_pass() {
     );
 }
 
+#[test]
+fn a_deficiency_of_the_posterior_is_expected_again_in_the_repeat_flight() {
+    let flown = flown("PPSS", 10.0);
+    let record = noisy(&flown, 3);
+    // The posterior is sure of a wrong derivative.
+    let local = posterior(&flown, 1.0);
+    let mean = truth(&flown, "Cm_alpha", 1.6);
+    let judged = |model: WindTunnel| {
+        let models = (model, &mean, Some(&local));
+        let verdict = proof_with(&flown, &record, models, &specification())
+            .verdicts
+            .remove(0);
+        (verdict.verdict, 0.01 * verdict.repeat_pct.unwrap())
+    };
+    let (verdict, probability) = judged(mean.clone());
+    assert_eq!(verdict, MatchVerdict::Outside);
+    assert!(probability < 0.05, "{probability}");
+    let (verdict, probability) = judged(truth(&flown, "", 1.0));
+    assert_eq!(verdict, MatchVerdict::Inside);
+    assert!(probability > 0.95, "{probability}");
+}
+
 /// Forecast of one repeat flight, and whether it passes.
 fn forecast(flown: &FlownManeuver, error_pct: f64, seed: u32) -> (f64, bool) {
     let local = posterior(flown, error_pct);

@@ -1,0 +1,157 @@
+//! Free run at the mean of a posterior, with the slopes of its outputs along the derivatives and the
+//! parameters of its start, and the deficiency of a flight against it.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::free_run::{FreeRun, STATES, Simulation};
+use super::linear_run::{Histories, LinearRun, Parameter};
+use super::outputs::{COUNT, Outputs};
+use super::recording::Recording;
+use super::start::MatchedStart;
+use crate::aero::{Axis, Buildup, Regressor};
+use crate::model::{LocalKind, LocalPosterior, LocalValue};
+use crate::numerics::sample_count::whole_steps;
+
+/// Longest step of the run with slopes, s. Probabilities differ by 0.2 % rms from those of steps of a quarter.
+const LONGEST_STEP_S: f64 = 0.1;
+
+/// Root mean square of the differences between flight and mean up to which posterior, start and noise
+/// explain them, in standard deviations: few directions carry the deviations, so that they reach two
+/// by chance.
+const EXPLAINED_DEVIATIONS: f64 = 2.0;
+
+/// Run about which flights repeat, with the slopes of its outputs.
+#[derive(Debug)]
+pub struct MeanRun {
+    pub stride: usize,
+    pub run: FreeRun,
+    /// Slopes along the derivatives, and after them along the start's own parameters.
+    pub slopes: Vec<Histories>,
+    /// Indices of the derivatives, among the values of the posterior and in the build-up.
+    pub derivatives: Vec<(usize, usize)>,
+    /// Covariance of the start's own parameters.
+    pub start_covariance: DMatrix<f64>,
+}
+
+impl MeanRun {
+    /// Flies the mean of a posterior; `None` if its start is not determined.
+    #[must_use]
+    pub fn of(
+        (simulation, start): (&Simulation, &MatchedStart),
+        posterior: &LocalPosterior,
+        (buildup, axis): (&Buildup, Axis),
+    ) -> Option<MeanRun> {
+        let covariance = start.covariance.as_ref()?;
+        let recording = simulation.recording;
+        let stride = stride(recording);
+        let derivatives = moving(posterior, buildup);
+        let own = start_parameters(axis);
+        let moved = derivatives.iter().map(|(_, d)| Parameter::Derivative(*d));
+        let parameters: Vec<Parameter> = moved.chain(own.map(Parameter::Start)).collect();
+        let steps = (recording.samples, stride);
+        let LinearRun { run, slopes } =
+            simulation.fly_with_slopes((&start.start, &parameters), steps);
+        Some(MeanRun {
+            stride,
+            run,
+            slopes,
+            derivatives,
+            start_covariance: of_places(covariance, &own),
+        })
+    }
+
+    /// Slopes along the derivatives, and along the parameters of the start.
+    #[must_use]
+    pub fn slopes_by_kind(&self) -> (&[Histories], &[Histories]) {
+        self.slopes.split_at(self.derivatives.len())
+    }
+
+    /// Deficiency of the run at every `stride`-th sample, whose outputs are `mean`: measured less
+    /// computed outputs, reduced by the share of their mean square that deviations of the derivatives,
+    /// start and noise explain. `roots` are those of the covariances of derivatives and start.
+    #[must_use]
+    pub fn deficiency(
+        &self,
+        recording: &Recording,
+        mean: &[Outputs],
+        roots: [&DMatrix<f64>; 2],
+    ) -> Vec<Outputs> {
+        let flown = mean.len().min(self.run.outputs.len());
+        let mut deficiency = vec![[0.0; COUNT]; mean.len()];
+        for output in 0..COUNT {
+            let (mut observed, mut explained) = (0.0, 0.0);
+            for (sample, computed) in mean[..flown].iter().enumerate() {
+                let recorded = sample * self.stride;
+                if recording.repaired[recorded][output] {
+                    continue;
+                }
+                let difference = recording.measured[recorded][output] - computed[output];
+                deficiency[sample][output] = difference;
+                observed += difference * difference;
+                explained += self.variance((output, sample), roots)
+                    + recording.noise[output] * recording.noise[output];
+            }
+            let limit = EXPLAINED_DEVIATIONS * EXPLAINED_DEVIATIONS * explained;
+            let share = if observed > limit {
+                1.0 - limit / observed
+            } else {
+                0.0
+            };
+            for own in &mut deficiency {
+                own[output] *= share;
+            }
+        }
+        deficiency
+    }
+
+    /// Variance of an output at a sample by the deviations of derivatives and start.
+    fn variance(&self, (output, sample): (usize, usize), roots: [&DMatrix<f64>; 2]) -> f64 {
+        let (by_derivative, by_start) = self.slopes_by_kind();
+        let of_kind = |(slopes, root): (&[Histories], &DMatrix<f64>)| {
+            let slopes = slopes.iter().map(|own| own[output][sample]);
+            root.tr_mul(&DVector::from_iterator(root.nrows(), slopes))
+                .norm_squared()
+        };
+        [by_derivative, by_start]
+            .into_iter()
+            .zip(roots)
+            .map(of_kind)
+            .sum()
+    }
+}
+
+/// Samples in a step of the run with slopes.
+fn stride(recording: &Recording) -> usize {
+    whole_steps(LONGEST_STEP_S, recording.step_s)
+        .min(recording.samples)
+        .max(1)
+}
+
+/// Indices of the derivatives that affect a simulation, among the values of a posterior and in the
+/// build-up.
+#[must_use]
+pub fn moving(posterior: &LocalPosterior, buildup: &Buildup) -> Vec<(usize, usize)> {
+    let index = |value: &LocalValue| {
+        let is_slope = value.kind == LocalKind::Derivative && !value.is_mach_slope;
+        let mut derivatives = buildup.derivatives.iter();
+        let index = derivatives.position(|d| is_slope && d.name == value.derivative)?;
+        (buildup.derivatives[index].regressor != Regressor::Constant).then_some(index)
+    };
+    let values = posterior.values.iter().enumerate();
+    values.filter_map(|(i, v)| Some((i, index(v)?))).collect()
+}
+
+/// Parameters of a start that an axis determines.
+fn start_parameters(axis: Axis) -> [usize; 7] {
+    // α, airspeed, q, θ with CN, Cm, CA; β, p, r, φ with CY, Cl, Cn.
+    match axis {
+        Axis::Longitudinal => [0, 2, 4, 6, STATES, STATES + 1, STATES + 2],
+        Axis::Lateral => [1, 3, 5, 7, STATES + 3, STATES + 4, STATES + 5],
+    }
+}
+
+/// Covariance of the quantities at some indices.
+#[must_use]
+pub fn of_places(covariance: &DMatrix<f64>, places: &[usize]) -> DMatrix<f64> {
+    covariance.select_rows(places).select_columns(places)
+}
