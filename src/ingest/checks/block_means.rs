@@ -207,9 +207,32 @@ impl BlockMeans {
 
     /// Mean of a signal over a block; NaN if the block has too few samples.
     pub fn mean(&self, signal: &str, block: usize) -> f64 {
+        self.means_of(signal).mean(block)
+    }
+
+    /// Means of one signal over all blocks.
+    pub fn means_of(&self, signal: &str) -> SignalMeans<'_> {
         let own = self.means.get(signal);
-        let mean = own.and_then(|own| Some(own.means.get(block)? * own.factor));
-        mean.unwrap_or(f64::NAN)
+        SignalMeans {
+            means: own.map_or(&[], |own| &own.means),
+            factor: own.map_or(1.0, |own| own.factor),
+        }
+    }
+}
+
+/// Block means of one signal; none if it is not recorded.
+#[derive(Clone, Copy, Debug)]
+pub struct SignalMeans<'a> {
+    means: &'a [f64],
+    factor: f64,
+}
+
+impl SignalMeans<'_> {
+    /// Mean over a block; NaN if the block has too few samples, or the signal is not recorded.
+    pub fn mean(&self, block: usize) -> f64 {
+        self.means
+            .get(block)
+            .map_or(f64::NAN, |mean| mean * self.factor)
     }
 }
 

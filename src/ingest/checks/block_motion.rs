@@ -4,7 +4,7 @@
 //! Angles are rad, everything else ft, s and g. Velocities u, v, w are V's components from the
 //! angles at the c.g.
 
-use super::block_means::BlockMeans;
+use super::block_means::{BlockMeans, SignalMeans};
 use crate::aircraft::{Aircraft, Flow, Position};
 use crate::earth::{Air, air, gravity_ft_s2};
 use crate::flight::signal;
@@ -41,44 +41,92 @@ pub struct BlockMotion {
     pub arms: [[f64; 3]; 3],
 }
 
-impl BlockMotion {
+/// Signals of a motion, in the order in which [`Motions::in_block`] reads them.
+const SIGNALS: [&str; 19] = [
+    signal::VELOCITY,
+    signal::P,
+    signal::Q,
+    signal::R,
+    signal::ALPHA_VANE,
+    signal::BETA_VANE,
+    signal::THETA,
+    signal::PHI,
+    signal::PSI,
+    signal::ALTITUDE,
+    signal::AN,
+    signal::AX,
+    signal::AY,
+    signal::MACH,
+    signal::QBAR,
+    signal::MASS,
+    signal::X_CG,
+    signal::Y_CG,
+    signal::Z_CG,
+];
+
+/// Motions in all blocks of a flight. Its signals are found once: the checks of a faulty flight
+/// compute all motions some hundred times.
+#[derive(Debug)]
+pub struct Motions<'a> {
+    signals: [SignalMeans<'a>; SIGNALS.len()],
+    aircraft: &'a Aircraft,
+    least_velocity_ft_s: f64,
+}
+
+impl<'a> Motions<'a> {
+    pub fn new(blocks: &'a BlockMeans, aircraft: &'a Aircraft, settings: &Checks) -> Motions<'a> {
+        Motions {
+            signals: SIGNALS.map(|signal| blocks.means_of(signal)),
+            aircraft,
+            least_velocity_ft_s: settings.least_velocity_ft_s,
+        }
+    }
+
     /// Motion in a block; `None` if the aircraft is not flying.
-    pub fn of(
-        blocks: &BlockMeans,
-        block: usize,
-        aircraft: &Aircraft,
-        settings: &Checks,
-    ) -> Option<BlockMotion> {
-        let mean = |signal| blocks.mean(signal, block);
-        let angle = |signal| mean(signal) / DEG;
-        let velocity = mean(signal::VELOCITY);
-        if velocity.abs() < settings.least_velocity_ft_s {
+    pub fn in_block(&self, block: usize) -> Option<BlockMotion> {
+        let [
+            velocity,
+            p,
+            q,
+            r,
+            alpha_vane,
+            beta_vane,
+            theta,
+            phi,
+            psi,
+            altitude,
+            an,
+            ax,
+            ay,
+            mach,
+            qbar,
+            mass,
+            x_ft,
+            y_ft,
+            z_ft,
+        ] = self.signals.map(|signal| signal.mean(block));
+        if velocity.abs() < self.least_velocity_ft_s {
             return None;
         }
-        let rates = [angle(signal::P), angle(signal::Q), angle(signal::R)];
-        let cg = Position {
-            x_ft: mean(signal::X_CG),
-            y_ft: mean(signal::Y_CG),
-            z_ft: mean(signal::Z_CG),
-        };
+        let rates = [p / DEG, q / DEG, r / DEG];
+        let cg = Position { x_ft, y_ft, z_ft };
         let at_vanes = Flow {
-            alpha: angle(signal::ALPHA_VANE),
-            beta: angle(signal::BETA_VANE),
+            alpha: alpha_vane / DEG,
+            beta: beta_vane / DEG,
             velocity,
             rates,
         };
+        let aircraft = self.aircraft;
         let sensors = &aircraft.sensors;
         let flow = sensors.flow_at_cg(&at_vanes, cg);
         let (sin_alpha, cos_alpha) = flow.alpha.sin_cos();
         let (sin_beta, cos_beta) = flow.beta.sin_cos();
-        let (theta, phi) = (angle(signal::THETA), angle(signal::PHI));
-        let altitude = mean(signal::ALTITUDE);
-        let qbar = mean(signal::QBAR);
+        let (theta, phi) = (theta / DEG, phi / DEG);
         Some(BlockMotion {
             rates,
             theta,
             phi,
-            psi: angle(signal::PSI),
+            psi: psi / DEG,
             velocity,
             uvw: [
                 velocity * cos_alpha * cos_beta,
@@ -87,18 +135,19 @@ impl BlockMotion {
             ],
             altitude,
             gravity: body_gravity(gravity_ft_s2(aircraft.latitude_deg, altitude), theta, phi),
-            an: mean(signal::AN),
-            ax: mean(signal::AX),
-            ay: mean(signal::AY),
-            mach: mean(signal::MACH),
+            an,
+            ax,
+            ay,
+            mach,
             qbar,
-            side_force: mean(signal::MASS) * mean(signal::AY) * G0_FT_S2
-                / (qbar * aircraft.wing_area_ft2),
+            side_force: mass * ay * G0_FT_S2 / (qbar * aircraft.wing_area_ft2),
             air: air(altitude),
             arms: [sensors.an.arm(cg), sensors.ax.arm(cg), sensors.ay.arm(cg)],
         })
     }
+}
 
+impl BlockMotion {
     /// Specific force forward, right and down as the accelerometers read it, ft/s², without the
     /// effect of their arms.
     pub fn specific_force(&self) -> [f64; 3] {

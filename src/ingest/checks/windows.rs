@@ -1,7 +1,7 @@
 //! Both sides of the kinematic relations in every window of a record.
 
 use super::block_means::BlockMeans;
-use super::block_motion::BlockMotion;
+use super::block_motion::{BlockMotion, Motions};
 use super::relations::{Relation, Side};
 use crate::aircraft::Aircraft;
 use crate::ingest::settings::Checks;
@@ -34,9 +34,10 @@ pub fn relation_pairs(
 ) -> Vec<RelationPairs> {
     let length = whole_steps(settings.window_s, blocks.block_s).max(1);
     let mut pairs = vec![RelationPairs::default(); relations.len()];
+    let motions = Motions::new(blocks, aircraft, settings);
     let mut motion: Vec<Option<BlockMotion>> = Vec::with_capacity(length + 1);
     for block in 0..blocks.count {
-        motion.push(BlockMotion::of(blocks, block, aircraft, settings));
+        motion.push(motions.in_block(block));
         if let [.., Some(before), Some(now)] = motion.as_slice() {
             for (relation, pairs) in relations.iter().zip(&mut pairs) {
                 if relation.disturbed_by_gusts().is_some() {
