@@ -12,6 +12,25 @@ pub struct Air {
     pub kelvin: f64,
 }
 
+impl Air {
+    /// Air of the same pressure with a measured temperature: ρ = p/(R T), speed of sound √(γ R T).
+    /// An altimeter reads the pressure, so at a pressure altitude the pressure is that of the standard
+    /// atmosphere on any day. Without a finite temperature the air stays as it is.
+    #[must_use]
+    pub fn at_temperature(self, kelvin: f64) -> Air {
+        let ratio = kelvin / self.kelvin;
+        if !ratio.is_finite() {
+            return self;
+        }
+        Air {
+            density_slug_ft3: self.density_slug_ft3 / ratio,
+            sound_ft_s: self.sound_ft_s * ratio.sqrt(),
+            kelvin,
+            ..self
+        }
+    }
+}
+
 /// kg/m³ in a slug/ft³.
 const KG_M3_PER_SLUG_FT3: f64 = 515.378_818_393_2;
 /// Pascals in a pound-force per square foot.

@@ -19,6 +19,9 @@ pub const PHI: &str = "phi_deg";
 /// True heading; optional. The checks of units and signs compare it with r, and flight-path
 /// reconstruction uses it.
 pub const PSI: &str = "psi_deg";
+/// Static temperature of the air; optional. Without it the air has the temperature of the standard
+/// atmosphere at its altitude.
+pub const AIR_TEMPERATURE: &str = "air_kelvin";
 pub const AN: &str = "an_g";
 pub const AX: &str = "ax_g";
 pub const AY: &str = "ay_g";

@@ -14,15 +14,16 @@ use crate::earth::air;
 pub enum StandIn {
     /// One value throughout, in the signal's unit.
     Value(f64),
-    /// V over the speed of sound of the standard atmosphere.
+    /// V over the speed of sound. The air is that of the standard atmosphere, with the recorded
+    /// temperature where there is one, here and in the following.
     MachOfVelocity,
-    /// Mach number times the speed of sound of the standard atmosphere.
+    /// Mach number times the speed of sound.
     VelocityOfMach,
-    /// √(2 q̄/ρ) in the standard atmosphere.
+    /// √(2 q̄/ρ).
     VelocityOfPressure,
-    /// ρ V²/2 in the standard atmosphere.
+    /// ρ V²/2.
     PressureOfVelocity,
-    /// Altitude of the standard atmosphere with the density 2 q̄/V².
+    /// Altitude at which the density is 2 q̄/V².
     AltitudeOfPressure,
     /// Pitch attitude of level flight: θ = α.
     ThetaOfAlpha,
@@ -89,16 +90,18 @@ impl StandIn {
         }
     }
 
-    /// Values from those of the sources, sample by sample.
-    fn value(self, sources: &[f64]) -> f64 {
+    /// Value at a sample from those of the sources, in air of a temperature (K), or of that of the
+    /// standard atmosphere if it is not finite.
+    fn value(self, sources: &[f64], kelvin: f64) -> f64 {
         let [a, b] = [0, 1].map(|i| sources.get(i).copied().unwrap_or(f64::NAN));
+        let air = |altitude_ft: f64| air(altitude_ft).at_temperature(kelvin);
         match self {
             StandIn::Value(value) => value,
             StandIn::MachOfVelocity => a / air(b).sound_ft_s,
             StandIn::VelocityOfMach => a * air(b).sound_ft_s,
             StandIn::VelocityOfPressure => (2.0 * a / air(b).density_slug_ft3).sqrt(),
             StandIn::PressureOfVelocity => 0.5 * air(b).density_slug_ft3 * a * a,
-            StandIn::AltitudeOfPressure => altitude_ft(2.0 * b / (a * a)),
+            StandIn::AltitudeOfPressure => altitude_ft(2.0 * b / (a * a), kelvin),
             StandIn::ThetaOfAlpha => a,
         }
     }
@@ -113,9 +116,11 @@ impl StandIn {
         let Some(sources) = sources else {
             return;
         };
+        let temperatures = record.values(s::AIR_TEMPERATURE);
         let value = |k: usize| {
             let at_sample: Vec<f64> = sources.iter().map(|values| values[k]).collect();
-            self.value(&at_sample)
+            let kelvin = temperatures.map_or(f64::NAN, |values| values[k]);
+            self.value(&at_sample, kelvin)
         };
         let values: Vec<f64> = (0..record.samples).map(value).collect();
         record
@@ -130,17 +135,18 @@ const ALTITUDES_FT: (f64, f64) = (-2_000.0, 100_000.0);
 /// Halvings of that range: to less than a thousandth of a foot.
 const HALVINGS: usize = 28;
 
-/// Altitude of the standard atmosphere with a density, ft; NaN for a density of no altitude.
-fn altitude_ft(density_slug_ft3: f64) -> f64 {
+/// Altitude with a density, ft, in air of a temperature (K), or of that of the standard atmosphere if
+/// it is not finite; NaN for a density of no altitude.
+fn altitude_ft(density_slug_ft3: f64, kelvin: f64) -> f64 {
     let (mut low, mut high) = ALTITUDES_FT;
-    let is_inside = air(high).density_slug_ft3 <= density_slug_ft3
-        && density_slug_ft3 <= air(low).density_slug_ft3;
+    let density = |altitude_ft: f64| air(altitude_ft).at_temperature(kelvin).density_slug_ft3;
+    let is_inside = density(high) <= density_slug_ft3 && density_slug_ft3 <= density(low);
     if !is_inside {
         return f64::NAN;
     }
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
-        if air(middle).density_slug_ft3 > density_slug_ft3 {
+        if density(middle) > density_slug_ft3 {
             low = middle;
         } else {
             high = middle;
@@ -267,7 +273,31 @@ mod tests {
     }
 
     #[test]
+    fn a_recorded_temperature_replaces_that_of_the_standard_atmosphere() {
+        let (altitude, velocity, kelvin) = (25_000.0, 500.0, 263.6);
+        // p = 785.33 lbf/ft² at 25,000 ft; R = 1716.56 ft lbf/(slug °R), γ = 1.4; °R = 1.8 K.
+        let density = 785.33 / (1_716.56 * 1.8 * kelvin);
+        let sound = f64::sqrt(1.4 * 1_716.56 * 1.8 * kelvin);
+        let all = [
+            (s::ALTITUDE, altitude),
+            (s::VELOCITY, velocity),
+            (s::QBAR, 0.5 * density * velocity * velocity),
+            (s::MACH, velocity / sound),
+        ];
+        for (lacking, truth) in all {
+            let mut given: Vec<(&str, f64)> =
+                all.into_iter().filter(|(n, _)| *n != lacking).collect();
+            given.push((s::AIR_TEMPERATURE, kelvin));
+            let mut record = record(&given);
+            let stand_in = StandIn::of(lacking, all_but(&[lacking])).unwrap();
+            stand_in.fill(lacking, &mut record);
+            let value = record.values(lacking).unwrap()[1];
+            assert_relative_eq!(value, truth, max_relative = 1e-3);
+        }
+    }
+
+    #[test]
     fn a_density_of_no_altitude_has_no_altitude() {
-        assert!(altitude_ft(1.0).is_nan() && altitude_ft(f64::NAN).is_nan());
+        assert!(altitude_ft(1.0, f64::NAN).is_nan() && altitude_ft(f64::NAN, 250.0).is_nan());
     }
 }

@@ -4,6 +4,7 @@ use super::common_error::CommonError;
 use super::error_series::ErrorSeries;
 use super::history::{Change, Shape, change};
 use crate::error::{Problem, ProblemStage};
+use crate::flight::signal;
 use crate::tables::{
     ALL_FLIGHTS, CommonErrorVerdict, InstrumentError, InstrumentTrend, InstrumentTrendRow,
 };
@@ -146,15 +147,25 @@ impl ExaminedSeries {
         if self.is_wrong_in_every_flight() {
             let reason = format!(
                 "`{}` disagrees with the other channels in every flight: {} over {} flights (scatter {}). Check its \
-                 calibration, its unit and its position in aircraft.yaml",
+                 calibration, its unit and its position in aircraft.yaml{}",
                 series.channel,
                 self.in_words(common.mean, common.bound),
                 series.samples.len() - common.far.len(),
                 self.number(common.scatter),
+                self.other_cause(),
             );
             problems.push(problem(ALL_FLIGHTS, reason));
         }
         problems
+    }
+
+    /// Cause of a common error that is not the instrument's, in words.
+    fn other_cause(&self) -> &'static str {
+        if [signal::QBAR, signal::MACH].contains(&self.series.signal.as_str()) {
+            ", and the temperature of the air"
+        } else {
+            ""
+        }
     }
 
     /// An error with its bound in words.

@@ -48,7 +48,8 @@ fn plan<'a>(
     let mut plans: BTreeMap<&str, ChannelPlan> = BTreeMap::new();
     let mut absent: Vec<(&str, Refusal)> = Vec::new();
     let is_useless = |signal: &str| {
-        let is_known = signal == signal::PSI || signal::REQUIRED.contains(&signal);
+        let is_known = [signal::PSI, signal::AIR_TEMPERATURE].contains(&signal)
+            || signal::REQUIRED.contains(&signal);
         is_known && !signal::is_indispensable(signal)
     };
     let time = context

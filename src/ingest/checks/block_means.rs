@@ -15,6 +15,7 @@ const USED: &[&str] = &[
     signal::VELOCITY,
     signal::MACH,
     signal::ALTITUDE,
+    signal::AIR_TEMPERATURE,
     signal::P,
     signal::Q,
     signal::R,

@@ -34,7 +34,7 @@ pub struct BlockMotion {
     pub qbar: f64,
     /// Side force that the lateral accelerometer reads, over dynamic pressure and wing area.
     pub side_force: f64,
-    /// Standard atmosphere at the altitude.
+    /// Air at the altitude, with the recorded temperature where there is one.
     pub air: Air,
     /// Arms from the c.g. to the accelerometers (normal, axial, lateral), ft forward, right and
     /// down.
@@ -42,7 +42,7 @@ pub struct BlockMotion {
 }
 
 /// Signals of a motion, in the order in which [`Motions::in_block`] reads them.
-const SIGNALS: [&str; 19] = [
+const SIGNALS: [&str; 20] = [
     signal::VELOCITY,
     signal::P,
     signal::Q,
@@ -53,6 +53,7 @@ const SIGNALS: [&str; 19] = [
     signal::PHI,
     signal::PSI,
     signal::ALTITUDE,
+    signal::AIR_TEMPERATURE,
     signal::AN,
     signal::AX,
     signal::AY,
@@ -95,6 +96,7 @@ impl<'a> Motions<'a> {
             phi,
             psi,
             altitude,
+            air_temperature,
             an,
             ax,
             ay,
@@ -141,7 +143,7 @@ impl<'a> Motions<'a> {
             mach,
             qbar,
             side_force: mass * ay * G0_FT_S2 / (qbar * aircraft.wing_area_ft2),
-            air: air(altitude),
+            air: air(altitude).at_temperature(air_temperature),
             arms: [sensors.an.arm(cg), sensors.ax.arm(cg), sensors.ay.arm(cg)],
         })
     }

@@ -41,6 +41,8 @@ pub struct MeasuredTerms {
     pub horizon: Vector3<f64>,
     /// Rotation from north, east, down to body axes.
     pub to_body: Matrix3<f64>,
+    /// Recorded temperature of the air over that of the standard atmosphere; one without a record.
+    pub temperature_ratio: f64,
 }
 
 /// p, q, r (rad/s) and specific force forward, right, down at the sensors (ft/s²).
@@ -250,6 +252,7 @@ pub fn readings(
     let speed = v.norm();
     let flow = flow(v, speed, omega);
     let air = air(x[6]);
+    let air = air.at_temperature(terms.temperature_ratio * air.kelvin);
     [
         DEG * aircraft.sensors.alpha_reading(&flow, terms.cg).angle,
         DEG * aircraft.sensors.beta_reading(&flow, terms.cg).angle,
@@ -290,7 +293,7 @@ pub fn reading_slopes(
     let flow = flow(v, speed, omega);
     let alpha_by = Vector3::new(-v.z, 0.0, v.x) / across2;
     let beta_by = (Vector3::y() - unit * unit.y) / (speed * flow.beta.cos());
-    let air = AirWithSlopes::at(x[6]);
+    let air = AirWithSlopes::at(x[6], terms.temperature_ratio);
     let mut by_velocity = SMatrix::<f64, OUTPUTS, 3>::zeros();
     let mut by_rates = SMatrix::<f64, OUTPUTS, 3>::zeros();
     let vanes = [
@@ -326,7 +329,7 @@ pub fn reading_slopes(
 /// its layers, long against rounding.
 const SLOPE_REACH_FT: f64 = 5.0;
 
-/// Standard atmosphere at an altitude with its slopes per ft.
+/// Air at an altitude with its slopes per ft.
 struct AirWithSlopes {
     density: f64,
     density_slope: f64,
@@ -335,7 +338,11 @@ struct AirWithSlopes {
 }
 
 impl AirWithSlopes {
-    fn at(altitude_ft: f64) -> AirWithSlopes {
+    fn at(altitude_ft: f64, temperature_ratio: f64) -> AirWithSlopes {
+        let air = |altitude_ft: f64| {
+            let standard = air(altitude_ft);
+            standard.at_temperature(temperature_ratio * standard.kelvin)
+        };
         let here = air(altitude_ft);
         let up = air(altitude_ft + SLOPE_REACH_FT);
         let down = air(altitude_ft - SLOPE_REACH_FT);

@@ -64,6 +64,19 @@ pub struct ErrorEstimate {
     pub applied: bool,
 }
 
+/// Least relative difference of the temperature from the standard atmosphere's that is named: 5 K,
+/// by which the derivatives change less than by an ordinary error of q̄.
+const SURELY_AIR: f64 = 0.02;
+
+/// Largest relative difference of the temperature: the extremes on record (MIL-STD-210C) are within 20 %
+/// of the standard atmosphere's.
+const MOST_AIR: f64 = 0.2;
+
+/// Size of both scale errors from which they are certain, and difference up to which they agree, in
+/// bounds.
+const SURE_BOUNDS: f64 = 4.0;
+const AGREEING_BOUNDS: f64 = 3.0;
+
 /// Estimated errors of one instrument; `None` for an error that the flight does not determine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InstrumentFinding {
@@ -76,6 +89,8 @@ pub struct InstrumentFinding {
     pub speed_ft_s: Option<f64>,
     /// Evidence of the flight alone on its errors.
     pub evidence: Vec<ErrorEvidence>,
+    /// Temperature of the air over that of the standard atmosphere, if it explains the scale error.
+    pub air_temperature: Option<f64>,
 }
 
 /// Findings on all recorded instruments of a flight.
@@ -111,9 +126,43 @@ impl Findings {
                     estimates,
                     speed_ft_s: errors.and_then(|errors| errors.speed_ft_s),
                     evidence,
+                    air_temperature: None,
                 })
         };
-        Findings((0..INSTRUMENTS).filter_map(finding).collect())
+        let mut findings = Findings((0..INSTRUMENTS).filter_map(finding).collect());
+        if !recorded.iter().any(|s| s == signal::AIR_TEMPERATURE) {
+            findings.leave_to_air_temperature();
+        }
+        findings
+    }
+
+    /// Withdraws corrections of q̄ and Mach whose scale errors are those of another temperature of the
+    /// air than the standard atmosphere's. With T times that temperature, q̄ at a speed and a pressure
+    /// altitude is 1/T times as large, and Mach 1/√T times.
+    fn leave_to_air_temperature(&mut self) {
+        let scale = |signal: &str| {
+            let finding = self.0.iter().find(|f| f.signal == signal)?;
+            finding.estimates[Kind::Scale as usize]
+        };
+        let (Some(pressure), Some(mach)) = (scale(signal::QBAR), scale(signal::MACH)) else {
+            return;
+        };
+        let (by_pressure, by_mach) = (-pressure.value.ln_1p(), -2.0 * mach.value.ln_1p());
+        let bound = pressure.bound.hypot(2.0 * mach.bound);
+        let is_sure = |log: f64, bound: f64| log.abs() > SURELY_AIR.max(SURE_BOUNDS * bound);
+        let agree = (by_pressure - by_mach).abs() <= AGREEING_BOUNDS * bound;
+        let is_air = is_sure(by_pressure, pressure.bound) && is_sure(by_mach, 2.0 * mach.bound);
+        if !(is_air && agree && by_pressure.abs() < MOST_AIR) {
+            return;
+        }
+        for finding in &mut self.0 {
+            if [signal::QBAR, signal::MACH].contains(&finding.signal) {
+                finding.air_temperature = Some(by_pressure.exp());
+                for estimate in finding.estimates.iter_mut().flatten() {
+                    (estimate.applied, estimate.fault) = (false, false);
+                }
+            }
+        }
     }
 
     /// `true` if an instrument has a fault.
@@ -208,15 +257,20 @@ impl Findings {
     /// A problem for each instrument with a fault.
     #[must_use]
     pub fn problems(&self, flight_id: &str) -> Vec<Problem> {
-        let faulty = self.0.iter().filter(|f| !f.faults().is_empty());
-        faulty
-            .map(|f| Problem {
+        let reason = |f: &InstrumentFinding| {
+            let of_fault = || format!("{}; {}", f.fault_sentence(), f.consequence());
+            let is_faulty = !f.faults().is_empty();
+            is_faulty.then(of_fault).or_else(|| f.air_sentence())
+        };
+        let problem = |f: &InstrumentFinding| {
+            Some(Problem {
                 stage: ProblemStage::Ingest,
                 flight_id: flight_id.to_owned(),
                 place: format!("channel `{}`", f.channel),
-                reason: format!("{}; {}", f.fault_sentence(), f.consequence()),
+                reason: reason(f)?,
             })
-            .collect()
+        };
+        self.0.iter().filter_map(problem).collect()
     }
 
     /// All faults in one sentence; `None` without a fault.
@@ -371,6 +425,20 @@ impl InstrumentFinding {
         .replace("is reads", "reads")
     }
 
+    /// Temperature of the air that explains the scale error of q̄, in words.
+    fn air_sentence(&self) -> Option<String> {
+        let ratio = self.air_temperature?;
+        let scale = self.estimates[Kind::Scale as usize]?;
+        Some(format!(
+            "`{}` reads {:.3} times what it should in the standard atmosphere, as in air of {:.0} % of its temperature. \
+             The channel is left as recorded: record the temperature of the air (signal `{}`)",
+            self.channel,
+            1.0 + scale.value,
+            100.0 * ratio,
+            signal::AIR_TEMPERATURE
+        ))
+    }
+
     /// Position that explains the delay of a vane. The flow at a distance x ahead of the c.g. is α − q x/V,
     /// and in a pitching motion with q ≈ α̇ that is α(t − x/V); likewise β + r x/V with r ≈ −β̇.
     fn vane_position(&self) -> Option<String> {
@@ -475,6 +543,41 @@ mod tests {
     }
 
     #[test]
+    fn scale_errors_of_a_warm_day_correct_nothing_and_name_the_temperature() {
+        let instrument = |signal: &str| SIGNALS.iter().position(|s| *s == signal).unwrap();
+        let of_scales = |pressure: f64, mach: f64, others: &[&str]| {
+            let j = place(instrument(signal::QBAR), Kind::Scale);
+            let mut errors = errors(j, pressure, 0.002);
+            errors.values[place(instrument(signal::MACH), Kind::Scale)] = mach;
+            let channels = [signal::QBAR, signal::MACH]
+                .map(|signal| (signal.to_owned(), Channel::plain(signal, "1")));
+            let recorded = [signal::QBAR, signal::MACH].iter().chain(others);
+            let recorded: Vec<String> = recorded.map(|s| (*s).to_owned()).collect();
+            let settings = Compatibility::default();
+            Findings::of(
+                Some(&errors),
+                &BTreeMap::from(channels),
+                &recorded,
+                &settings,
+            )
+        };
+        let scales = |findings: &Findings| {
+            let of = |c: &Correction| (c.signal.clone(), c.scale);
+            findings.corrections().iter().map(of).collect::<Vec<_>>()
+        };
+        // 10 % warmer.
+        let (pressure, mach) = (1.0 / 1.1 - 1.0, 1.0 / f64::sqrt(1.1) - 1.0);
+        let warm = of_scales(pressure, mach, &[]);
+        assert_eq!(scales(&warm), []);
+        let problem = &warm.problems("f")[0];
+        assert!(problem.reason.contains("110 %"), "{problem:?}");
+        let recorded = of_scales(pressure, mach, &[signal::AIR_TEMPERATURE]);
+        assert_eq!(scales(&recorded).len(), 2);
+        let of_one_instrument = of_scales(pressure, 0.0, &[]);
+        assert_eq!(scales(&of_one_instrument)[0].1, pressure);
+    }
+
+    #[test]
     fn the_delay_of_a_vane_is_told_with_the_position_that_explains_it() {
         let finding = |signal: &'static str, delay_s: f64| InstrumentFinding {
             signal,
@@ -483,6 +586,7 @@ mod tests {
             estimates: [None, None, Some(estimated(Kind::Delay, delay_s, 0.002))],
             speed_ft_s: Some(170.0),
             evidence: vec![],
+            air_temperature: None,
         };
         let ahead = finding(signal::ALPHA_VANE, 0.088).fault_sentence();
         assert!(ahead.contains("15.0 ft further ahead"), "{ahead}");

@@ -72,6 +72,7 @@ fn measured_terms() -> MeasuredTerms {
         earth: Vector3::new(4e-5, -2e-5, 5e-5),
         horizon: Vector3::new(6e-5, -4e-5, 3e-5),
         to_body: Matrix3::identity(),
+        temperature_ratio: 1.08,
     }
 }
 
@@ -938,6 +939,7 @@ fn marks_move_with_an_applied_correction() {
         estimates: [fault(1.0), fault(1.0), fault(2.0 * STEP_S)],
         speed_ft_s: None,
         evidence: vec![],
+        air_temperature: None,
     }]);
     findings
         .corrections()

@@ -9,7 +9,7 @@ use super::equations::{MeasuredTerms, State};
 use super::parameters::{INPUTS, INSTRUMENTS, OUTPUTS, SIGNALS, lacks_input};
 use super::settings::Compatibility;
 use crate::aircraft::{Aircraft, Flow, Position};
-use crate::earth::gravity_ft_s2;
+use crate::earth::{air, gravity_ft_s2};
 use crate::flight::{Mark, Record, signal as s};
 use crate::output_error::surface_noise::white_variance;
 use crate::units::{DEG, G0_FT_S2};
@@ -364,6 +364,12 @@ fn measured_terms(record: &Record, samples: &[usize], aircraft: &Aircraft) -> Ve
     ]
     .map(|name| record.values(name).unwrap_or_default());
     let (sensors, heading) = (&aircraft.sensors, record.values(s::PSI).is_some());
+    let temperatures = record.values(s::AIR_TEMPERATURE);
+    let temperature_ratio = |k: usize, altitude_ft: f64| {
+        let recorded = temperatures.and_then(|values| values.get(k));
+        let ratio = recorded.map(|kelvin| kelvin / air(altitude_ft).kelvin);
+        ratio.filter(|ratio| ratio.is_finite()).unwrap_or(1.0)
+    };
     let terms = |k: &usize| {
         let now = columns.map(|values| values.get(*k).copied().unwrap_or(0.0));
         let [
@@ -389,6 +395,7 @@ fn measured_terms(record: &Record, samples: &[usize], aircraft: &Aircraft) -> Ve
             gravity: gravity_ft_s2(aircraft.latitude_deg, altitude),
             arms: [sensors.ax.arm(cg), sensors.ay.arm(cg), sensors.an.arm(cg)],
             cg,
+            temperature_ratio: temperature_ratio(*k, altitude),
             ..rotation_terms(aircraft, attitude, along * speed, heading)
         }
     };
@@ -424,6 +431,7 @@ pub fn rotation_terms(
         earth,
         horizon: earth + to_body * round,
         to_body,
+        temperature_ratio: 1.0,
     }
 }
 
