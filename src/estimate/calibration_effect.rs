@@ -2,8 +2,9 @@
 
 use nalgebra::DVector;
 
+use super::context::Context;
 use super::prepared_case::PreparedCase;
-use super::task::Task;
+use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
 use crate::dynamics::{Equations, OUTPUTS};
 use crate::output_error::calibration_errors::{Fitted, Misreading};
@@ -13,63 +14,65 @@ use crate::output_error::{Diverged, Fit, calibration_errors};
 pub(super) const NOT_COUNTED: &str =
     "; errors of calibration are not in its bounds: with them the integration diverges";
 
-impl<'a> Task<'a> {
-    /// Adds the effect of calibration errors to the corrected covariance of a fit.
-    pub(super) fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
-        &self,
-        prepared: &PreparedCase<'a, NX, E>,
-        fit: &mut Fit,
+/// Adds the effect of calibration errors to the corrected covariance of a fit.
+pub(super) fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
+    context: &Context,
+    prepared: &PreparedCase<NX, E>,
+    fit: &mut Fit,
+) {
+    let is_exact = context.settings.calibration.is_empty() && context.delays.is_empty();
+    if fit.covariance_corrected.is_none() || is_exact {
+        return;
+    }
+    let errors = misreadings(context, &prepared.window);
+    match gradient_shifts(
+        context.aircraft,
+        prepared,
+        &errors,
+        &fit.values,
+        &fit.weights,
     ) {
-        let context = self.context;
-        let is_exact = context.settings.calibration.is_empty() && context.delays.is_empty();
-        if fit.covariance_corrected.is_none() || is_exact {
-            return;
+        Ok(shifts) => {
+            calibration_errors::add_calibration_errors(&prepared.case, &errors, &shifts, fit);
         }
-        let errors = self.misreadings(&prepared.window);
-        match self.gradient_shifts(prepared, &errors, &fit.values, &fit.weights) {
-            Ok(shifts) => {
-                calibration_errors::add_calibration_errors(&prepared.case, &errors, &shifts, fit);
-            }
-            Err(Diverged { .. }) => fit.reason.push_str(NOT_COUNTED),
-        }
+        Err(Diverged { .. }) => fit.reason.push_str(NOT_COUNTED),
     }
+}
 
-    /// Errors of one standard deviation each of the signals of a window.
-    pub(super) fn misreadings(&self, window: &Window) -> Vec<Misreading<'a>> {
-        // A signal that the maneuver does not use has no effect.
-        let is_used = |signal: &str| !window.signal(signal).is_empty();
-        let calibration = self.context.settings.calibration.iter();
-        let used = calibration.filter(|(signal, _)| is_used(signal));
-        let readings = used.flat_map(|(signal, c)| c.misreadings(signal));
-        let delays = self.context.delays.iter().filter(|d| is_used(&d.surface));
-        let late = delays.map(|d| Misreading::late(&d.surface, d.uncertainty_s));
-        readings.chain(late).collect()
-    }
+/// Errors of one standard deviation each of the signals of a window.
+pub(super) fn misreadings<'a>(context: &'a Context<'a>, window: &Window) -> Vec<Misreading<'a>> {
+    // A signal that the maneuver does not use has no effect.
+    let is_used = |signal: &str| !window.signal(signal).is_empty();
+    let calibration = context.settings.calibration.iter();
+    let used = calibration.filter(|(signal, _)| is_used(signal));
+    let readings = used.flat_map(|(signal, c)| c.misreadings(signal));
+    let delays = context.delays.iter().filter(|d| is_used(&d.surface));
+    let late = delays.map(|d| Misreading::late(&d.surface, d.uncertainty_s));
+    readings.chain(late).collect()
+}
 
-    /// Change of the gradient with one standard deviation of each calibration error, in the order of
-    /// the maneuver's parameters.
-    pub(super) fn gradient_shifts<const NX: usize, E: Equations<NX>>(
-        &self,
-        prepared: &PreparedCase<'a, NX, E>,
-        errors: &[Misreading],
-        values: &[f64],
-        weights: &[f64; OUTPUTS],
-    ) -> Result<Vec<DVector<f64>>, Diverged> {
-        let aircraft = self.context.aircraft;
-        let PreparedCase {
-            window,
-            model,
-            case,
-            ..
-        } = prepared;
-        Fitted {
-            aircraft,
-            window,
-            model,
-            case,
-            values,
-            weights,
-        }
-        .gradient_shifts(errors)
+/// Change of the gradient with one standard deviation of each calibration error, in the order of
+/// the maneuver's parameters.
+pub(super) fn gradient_shifts<const NX: usize, E: Equations<NX>>(
+    aircraft: &Aircraft,
+    prepared: &PreparedCase<NX, E>,
+    errors: &[Misreading],
+    values: &[f64],
+    weights: &[f64; OUTPUTS],
+) -> Result<Vec<DVector<f64>>, Diverged> {
+    let PreparedCase {
+        window,
+        model,
+        case,
+        ..
+    } = prepared;
+    Fitted {
+        aircraft,
+        window,
+        model,
+        case,
+        values,
+        weights,
     }
+    .gradient_shifts(errors)
 }

@@ -22,57 +22,54 @@ struct RegressorHistory<'a> {
     history: Vec<f64>,
 }
 
-impl Task<'_> {
-    /// Adds the diagnostics of a fit of `model` to its rows; `information` is that of its parameters.
-    pub(super) fn add_diagnostics<const NX: usize, E: Equations<NX>>(
-        &self,
-        case: &Case<NX, E>,
-        window: &Window,
-        model: &Model,
-        information: Option<&DMatrix<f64>>,
-        estimated: &mut Estimated,
-    ) {
-        let flown = self.regressor_histories::<NX, E>(case, window, model);
-        estimated.correlations = self.regressor_correlations(&flown, window);
+/// A fit whose diagnostics are to be made.
+pub(super) struct Diagnostics<'d, 'm, const NX: usize, E: Equations<NX>> {
+    pub task: &'d Task<'m>,
+    pub case: &'d Case<NX, E>,
+    pub window: &'d Window,
+    pub model: &'d Model<'m>,
+}
+
+impl<'m, const NX: usize, E: Equations<NX>> Diagnostics<'_, 'm, NX, E> {
+    /// Adds the diagnostics of the fit to its rows; `information` is that of its parameters.
+    pub fn add_to(&self, information: Option<&DMatrix<f64>>, estimated: &mut Estimated) {
+        let flown = self.regressor_histories();
+        estimated.correlations = self.regressor_correlations(&flown);
         self.add_excitation(&flown, &mut estimated.estimates);
-        let Some(information) = information else {
-            return;
-        };
-        let settings = self.context.settings;
+        if let Some(information) = information {
+            self.add_collinearity(information, estimated);
+        }
+    }
+
+    /// Adds variance inflation, the largest condition index, near-collinear groups and the
+    /// correlations of the estimates.
+    fn add_collinearity(&self, information: &DMatrix<f64>, estimated: &mut Estimated) {
+        let settings = self.task.context.settings;
         let limits = &settings.identifiability;
         let Some(measured) =
             collinearity(information, settings.iteration.max_condition_number, limits)
         else {
             return;
         };
-        for (name, inflation) in case.names.iter().zip(&measured.inflation) {
-            if let Some(row) = estimated
-                .estimates
-                .iter_mut()
-                .find(|row| row.derivative == *name)
-            {
+        let names = &self.case.names;
+        for (name, inflation) in names.iter().zip(&measured.inflation) {
+            let mut rows = estimated.estimates.iter_mut();
+            if let Some(row) = rows.find(|row| row.derivative == *name) {
                 row.variance_inflation = *inflation;
             }
         }
         estimated.fit.largest_condition_index =
             Some(measured.largest_index).filter(|index| index.is_finite());
-        estimated.fit.confounded = groups_in_words(&measured, &case.names);
+        estimated.fit.confounded = groups_in_words(&measured, names);
         if let Some(matrix) = &measured.correlation {
-            estimated.correlations.extend(self.estimate_correlations(
-                &case.names,
-                matrix,
-                limits.published_correlation,
-            ));
+            let correlations = self.estimate_correlations(matrix, limits.published_correlation);
+            estimated.correlations.extend(correlations);
         }
     }
 
     /// Regressors of all derivatives that act in the maneuver, free and held.
-    fn regressor_histories<'m, const NX: usize, E: Equations<NX>>(
-        &self,
-        case: &Case<NX, E>,
-        window: &Window,
-        model: &Model<'m>,
-    ) -> Vec<RegressorHistory<'m>> {
+    fn regressor_histories(&self) -> Vec<RegressorHistory<'m>> {
+        let (window, model) = (self.window, self.model);
         let mut acting: Vec<&'m Derivative> = model
             .free
             .iter()
@@ -81,18 +78,17 @@ impl Task<'_> {
             .collect();
         // In the order of the model, held or not, so that a pair has one name in all maneuvers.
         acting.sort_by_key(|d| {
-            self.context
-                .buildup
-                .derivatives
-                .iter()
-                .position(|other| other.name == d.name)
+            let mut derivatives = self.task.context.buildup.derivatives.iter();
+            derivatives.position(|other| other.name == d.name)
         });
         let all = Model {
             free: acting.clone(),
             held: vec![],
             ..model.clone()
         };
-        let wide = case.with_model(self.context.aircraft, window, &all);
+        let wide = self
+            .case
+            .with_model(self.task.context.aircraft, window, &all);
         let flown = acting.into_iter().filter_map(|derivative| {
             let j = wide.names.iter().position(|n| *n == derivative.name)?;
             let history = wide.measured_regressor(j);
@@ -113,111 +109,120 @@ impl Task<'_> {
 
     /// Adds the excitation of each row, and its contribution to the motion of its coefficient.
     fn add_excitation(&self, flown: &[RegressorHistory], rows: &mut [EstimateRow]) {
-        let value = |name: &str, rows: &[EstimateRow]| {
-            let row = rows.iter().find(|r| r.derivative == name);
-            row.and_then(|r| r.value)
-                .or_else(|| self.tunnel_value(name))
-                .unwrap_or(0.0)
-        };
         for one in flown {
             let name = one.derivative.name.as_str();
-            let mut total = vec![0.0; one.history.len()];
-            for other in flown
-                .iter()
-                .filter(|o| o.derivative.coefficient == one.derivative.coefficient)
-            {
-                let derivative = value(&other.derivative.name, rows);
-                total
-                    .iter_mut()
-                    .zip(&other.history)
-                    .for_each(|(sum, r)| *sum += derivative * r);
-            }
-            let (part, whole) = (
-                value(name, rows).abs() * excitation(&one.history),
-                excitation(&total),
-            );
+            let contribution = self.contribution_pct(one, flown, rows);
             if let Some(row) = rows.iter_mut().find(|r| r.derivative == name) {
                 row.excitation = one.excitation;
-                row.contribution_pct = one
-                    .excitation
-                    .and((whole > 0.0).then(|| 100.0 * part / whole));
+                row.contribution_pct = one.excitation.and(contribution);
             }
         }
+    }
+
+    /// Rms of a derivative's term, percent of that of all terms of its coefficient together; `None`
+    /// for a coefficient at rest.
+    fn contribution_pct(
+        &self,
+        one: &RegressorHistory,
+        flown: &[RegressorHistory],
+        rows: &[EstimateRow],
+    ) -> Option<f64> {
+        let mut total = vec![0.0; one.history.len()];
+        for other in flown
+            .iter()
+            .filter(|o| o.derivative.coefficient == one.derivative.coefficient)
+        {
+            let derivative = self.value_in_fit(&other.derivative.name, rows);
+            total
+                .iter_mut()
+                .zip(&other.history)
+                .for_each(|(sum, r)| *sum += derivative * r);
+        }
+        let term = self.value_in_fit(&one.derivative.name, rows).abs() * excitation(&one.history);
+        let whole = excitation(&total);
+        (whole > 0.0).then(|| 100.0 * term / whole)
+    }
+
+    /// Value of a derivative in the fit: as estimated, or the tunnel's.
+    fn value_in_fit(&self, name: &str, rows: &[EstimateRow]) -> f64 {
+        let row = rows.iter().find(|r| r.derivative == name);
+        row.and_then(|r| r.value)
+            .or_else(|| self.task.tunnel_value(name))
+            .unwrap_or(0.0)
     }
 
     /// Correlations among the distinct regressors of the derivatives that the class estimates or
     /// holds.
-    fn regressor_correlations(
-        &self,
-        flown: &[RegressorHistory],
-        window: &Window,
-    ) -> Vec<CorrelationRow> {
-        let mut seen: Vec<(String, Vec<f64>)> = Vec::new();
+    fn regressor_correlations(&self, flown: &[RegressorHistory]) -> Vec<CorrelationRow> {
+        let mut distinct: Vec<(String, Vec<f64>)> = Vec::new();
         for one in flown {
             let active = matches!(
-                self.status(&one.derivative.name),
+                self.task.status(&one.derivative.name),
                 Some(Status::Estimated | Status::Held)
             );
-            let (name, history) = match &one.derivative.regressor {
-                Regressor::Constant => continue,
-                Regressor::Alpha => ("alpha".to_owned(), one.history.clone()),
-                Regressor::Beta => ("beta".to_owned(), one.history.clone()),
-                Regressor::RollRate => (signal::P.to_owned(), samples(window, signal::P)),
-                Regressor::PitchRate => (signal::Q.to_owned(), samples(window, signal::Q)),
-                Regressor::YawRate => (signal::R.to_owned(), samples(window, signal::R)),
-                Regressor::Surface(name) | Regressor::Vane(name) => {
-                    (name.clone(), samples(window, name))
-                }
-                other => (other.to_string(), one.history.clone()),
+            let Some((name, history)) = self.named_regressor(one) else {
+                continue;
             };
-            if active && !seen.iter().any(|(other, _)| *other == name) {
-                seen.push((name, history));
+            if active && !distinct.iter().any(|(other, _)| *other == name) {
+                distinct.push((name, history));
             }
         }
-        let pairs = (0..seen.len()).flat_map(|i| (i + 1..seen.len()).map(move |j| (i, j)));
         let row = |(i, j): (usize, usize)| {
-            let both = correlation(&seen[i].1, &seen[j].1)?;
-            Some(self.correlation_row(CorrelationKind::Regressors, &seen[i].0, &seen[j].0, both))
+            let ((first, a), (second, b)) = (&distinct[i], &distinct[j]);
+            let both = correlation(a, b)?;
+            Some(self.correlation_row(CorrelationKind::Regressors, [first, second], both))
         };
-        pairs.filter_map(row).collect()
+        pairs(distinct.len()).filter_map(row).collect()
     }
 
-    fn estimate_correlations(
-        &self,
-        names: &[String],
-        matrix: &DMatrix<f64>,
-        least: f64,
-    ) -> Vec<CorrelationRow> {
-        let pairs = (0..names.len()).flat_map(|i| (i + 1..names.len()).map(move |j| (i, j)));
-        pairs
+    /// Name and history of a regressor: of the signal where it is one; `None` for a constant.
+    fn named_regressor(&self, one: &RegressorHistory) -> Option<(String, Vec<f64>)> {
+        let of_signal = |name: &str| (name.to_owned(), samples(self.window, name));
+        Some(match &one.derivative.regressor {
+            Regressor::Constant => return None,
+            Regressor::Alpha => ("alpha".to_owned(), one.history.clone()),
+            Regressor::Beta => ("beta".to_owned(), one.history.clone()),
+            Regressor::RollRate => of_signal(signal::P),
+            Regressor::PitchRate => of_signal(signal::Q),
+            Regressor::YawRate => of_signal(signal::R),
+            Regressor::Surface(name) | Regressor::Vane(name) => of_signal(name),
+            other => (other.to_string(), one.history.clone()),
+        })
+    }
+
+    /// Correlations among the estimates, from a published size on.
+    fn estimate_correlations(&self, matrix: &DMatrix<f64>, least: f64) -> Vec<CorrelationRow> {
+        let names = &self.case.names;
+        pairs(names.len())
             .filter(|&(i, j)| matrix[(i, j)].abs() >= least)
             .map(|(i, j)| {
-                self.correlation_row(
-                    CorrelationKind::Estimates,
-                    &names[i],
-                    &names[j],
-                    matrix[(i, j)],
-                )
+                let both = [names[i].as_str(), names[j].as_str()];
+                self.correlation_row(CorrelationKind::Estimates, both, matrix[(i, j)])
             })
             .collect()
     }
 
+    /// Row of the correlation of two regressors or estimates.
     fn correlation_row(
         &self,
         kind: CorrelationKind,
-        first: &str,
-        second: &str,
+        [first, second]: [&str; 2],
         correlation: f64,
     ) -> CorrelationRow {
         CorrelationRow {
-            maneuver_id: self.maneuver.maneuver_id.clone(),
-            class: self.class.name.clone(),
+            maneuver_id: self.task.maneuver.maneuver_id.clone(),
+            class: self.task.class.name.clone(),
             kind,
             first: first.to_owned(),
             second: second.to_owned(),
             correlation,
         }
     }
+}
+
+/// Pairs of the numbers below a count, each once.
+fn pairs(count: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..count).flat_map(move |i| (i + 1..count).map(move |j| (i, j)))
 }
 
 /// A signal at the samples, without the interpolated points between them.

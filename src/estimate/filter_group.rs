@@ -5,7 +5,7 @@ use std::marker::PhantomData;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::calibration_effect::NOT_COUNTED;
+use super::calibration_effect::{NOT_COUNTED, misreadings};
 use super::filter_minimum::{Minimum, NoMinimum};
 use super::group_member::GroupMember;
 use super::held_slopes::HeldSlopes;
@@ -65,7 +65,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
     }
 
     /// A maneuver by itself.
-    pub fn of_one(task: &Task<'a>, member: GroupMember<'g, 'a, NX, E>) -> Self {
+    pub fn single(task: &Task<'a>, member: GroupMember<'g, 'a, NX, E>) -> Self {
         let parameters = SharedParameters::of_one(&member.prepared.case.names);
         Group::new(task, vec![member], parameters)
     }
@@ -80,7 +80,10 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
     pub fn filters(&self, held: &HeldSlopes, like: Option<&[Filter<NG, G>]>) -> Vec<Filter<NG, G>> {
         let members = self.members.iter().enumerate();
         let filter = |(i, member): (usize, &GroupMember<'g, 'a, NX, E>)| {
-            member.filter(&member.held(held), like.and_then(|like| like.get(i)))
+            member.filter(
+                &member.model_with_slopes(held),
+                like.and_then(|like| like.get(i)),
+            )
         };
         members.map(filter).collect()
     }
@@ -182,11 +185,11 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
     ) -> Option<SlopeFit<NG, G>> {
         let held = slope_fit.held.towards(&effect.slopes, share);
         let near = FilterStart {
-            own: self.moved(slope_fit, &effect.change, share),
+            own: self.moved_parameters(slope_fit, &effect.change, share),
             noise: self.noise(slope_fit),
         };
         let filters = self.filters(&held, Some(&slope_fit.filters));
-        let starts = std::iter::once(near).chain(self.implied(&held));
+        let starts = std::iter::once(near).chain(self.start_by_equation_error(&held));
         let found = starts.filter_map(|start| self.minimum(&filters, &start).ok());
         let found = found.min_by(Minimum::by_cost)?;
         (found.cost() < slope_fit.found.cost() + ALLOWED_RISE)
@@ -195,27 +198,33 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
 
     /// Start by equation error with the slopes held, for a maneuver by itself. Joined maneuvers start
     /// from their own fits.
-    fn implied(&self, held: &HeldSlopes) -> Option<FilterStart> {
+    fn start_by_equation_error(&self, held: &HeldSlopes) -> Option<FilterStart> {
         let [member] = &self.members[..] else {
             return None;
         };
         Some(FilterStart {
-            own: member.implied(held),
+            own: member.start_by_equation_error(held),
             noise: vec![Noise::starting(member.deviations)],
         })
     }
 
     /// Derivatives, biases and initial states of a fit, moved by a share of a change.
-    fn moved(&self, slope_fit: &SlopeFit<NG, G>, change: &DVector<f64>, share: f64) -> Vec<f64> {
-        let both = self.own(slope_fit).iter().zip(change.iter());
+    fn moved_parameters(
+        &self,
+        slope_fit: &SlopeFit<NG, G>,
+        change: &DVector<f64>,
+        share: f64,
+    ) -> Vec<f64> {
+        let both = self.own_parameters(slope_fit).iter().zip(change.iter());
         both.map(|(own, change)| own + share * change).collect()
     }
 
     /// Derivatives, biases and initial states of a fit.
-    fn own<'s>(&self, slope_fit: &'s SlopeFit<NG, G>) -> &'s [f64] {
+    fn own_parameters<'s>(&self, slope_fit: &'s SlopeFit<NG, G>) -> &'s [f64] {
         &slope_fit.parameters()[..self.parameters.names().len()]
     }
 
+    /// Filters of the maneuvers on their shared parameters.
     pub fn joint<'s>(&'s self, slope_fit: &'s SlopeFit<NG, G>) -> JointFilter<'s, NG, G> {
         JointFilter::new(&slope_fit.filters, &self.parameters)
     }
@@ -260,7 +269,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
             iterations: scored.iterations,
             initial_cost: Some(scored.initial_cost),
             final_cost: Some(scored.response.cost),
-            values: self.own(slope_fit).to_vec(),
+            values: self.own_parameters(slope_fit).to_vec(),
             weights: noise[0].outputs.map(|deviation| deviation.powi(-2)),
             response: responses
                 .map(|r| Response::of_outputs(r.predicted.clone()))
@@ -301,8 +310,8 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
             }
             held += &effect.covariance;
         }
-        add(&mut fit.covariance, &held);
-        add(&mut fit.covariance_corrected, &held);
+        add_covariance(&mut fit.covariance, &held);
+        add_covariance(&mut fit.covariance_corrected, &held);
         fit.covariance_held = Some(held);
     }
 
@@ -313,7 +322,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
         let Some(first) = self.members.first() else {
             return;
         };
-        let errors = first.task.misreadings(&first.slopes.window);
+        let errors = misreadings(first.task.context, &first.slopes.window);
         if self.task.context.settings.calibration.is_empty() && errors.is_empty() {
             return;
         }
@@ -336,12 +345,13 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
         let effects = errors.iter().zip(&changes);
         fit.shared_errors
             .extend(effects.map(|(error, change)| error.effect(change)));
-        add(&mut fit.covariance_corrected, &common);
+        add_covariance(&mut fit.covariance_corrected, &common);
         fit.covariance_calibration = Some(common);
     }
 }
 
-fn add(sum: &mut Option<DMatrix<f64>>, part: &DMatrix<f64>) {
+/// Adds to a covariance, if there is one.
+fn add_covariance(sum: &mut Option<DMatrix<f64>>, part: &DMatrix<f64>) {
     if let Some(sum) = sum {
         *sum += part;
     }
@@ -370,6 +380,7 @@ impl<const NG: usize, G: InGusts<NG>> SlopeFit<NG, G> {
         &self.found.scored
     }
 
+    /// Derivatives, biases and initial states, then the noise's parameters.
     fn parameters(&self) -> &[f64] {
         &self.end().parameters
     }

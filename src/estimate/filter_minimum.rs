@@ -18,6 +18,7 @@ impl Minimum {
         self.scored.response.cost
     }
 
+    /// Orders by cost.
     pub fn by_cost(&self, other: &Minimum) -> Ordering {
         self.scored.by_cost(&other.scored)
     }

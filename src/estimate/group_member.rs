@@ -3,18 +3,16 @@
 use nalgebra::DVector;
 
 use super::alpha_slopes::AlphaSlopes;
+use super::fitting::start_from_tunnel;
 use super::held_slopes::HeldSlopes;
+use super::maneuver_filter::{bias_uncertainties, least_deviations, new_filter, noisy_inputs};
 use super::prepared_case::{PreparedCase, all_free};
 use super::task::{Task, values_by_name};
-use super::whiteness::sample_noise;
-use crate::aero::Output;
-use crate::dynamics::motion::Window;
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
 use crate::filter_error::bounds::WidePass;
 use crate::filter_error::filter::Filter;
 use crate::output_error::calibration_errors::Misreading;
-use crate::output_error::surface_noise::noisy_surfaces;
-use crate::output_error::{Case, Diverged, Measurements, Model, NoisyInputs, equation_error};
+use crate::output_error::{Case, Diverged, Measurements, Model, equation_error};
 
 /// Maneuver of a group.
 pub(super) struct GroupMember<'g, 'a, const NX: usize, E: Equations<NX>> {
@@ -32,13 +30,13 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
         GroupMember {
             task: *task,
             prepared,
-            slopes: task.alpha_slopes(&prepared.window, wide),
-            deviations: task.least_deviations(&prepared.case.measurements),
+            slopes: AlphaSlopes::new(task, &prepared.window, wide),
+            deviations: least_deviations(task, &prepared.case.measurements),
         }
     }
 
     /// The maneuver's model with the slopes held.
-    pub fn held<'s>(&'s self, held: &HeldSlopes) -> Model<'s> {
+    pub fn model_with_slopes<'s>(&'s self, held: &HeldSlopes) -> Model<'s> {
         let model: &Model<'s> = &self.prepared.model;
         if held.is_constant() {
             model.clone()
@@ -63,12 +61,12 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
     ) -> Filter<NG, G> {
         let window = &self.slopes.window;
         let Some(filter) = like else {
-            return self.task.filter(self.prepared, window, model);
+            return new_filter(&self.task, self.prepared, window, model);
         };
         let aircraft = self.task.context.aircraft;
-        let biases = self.task.bias_uncertainties(model);
+        let biases = bias_uncertainties(self.task.context.settings, model);
         let filter = filter.with_model(aircraft, window, model, &biases);
-        filter.with_noisy_inputs(self.task.noisy_inputs(self.prepared, window, model))
+        filter.with_noisy_inputs(noisy_inputs(&self.task, self.prepared, window, model))
     }
 
     /// Pass at a fit with the held derivatives and the slopes free as well.
@@ -78,7 +76,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
         filter: &Filter<NG, G>,
         parameters: &[f64],
     ) -> Option<WidePass> {
-        let model = self.held(held);
+        let model = self.model_with_slopes(held);
         let all = all_free(&model);
         let all = if held.is_constant() {
             self.slopes.added_to(&all)
@@ -99,7 +97,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
         filter: &Filter<NG, G>,
         parameters: &[f64],
     ) -> Result<Vec<DVector<f64>>, Diverged> {
-        let model = self.held(held);
+        let model = self.model_with_slopes(held);
         let window = &self.slopes.window;
         let cases = errors.iter().map(|error| {
             let misread_window = error.of_window(window);
@@ -111,63 +109,19 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
     }
 
     /// Starting values by equation error with the slopes held.
-    pub fn implied(&self, held: &HeldSlopes) -> Vec<f64> {
-        let case = self.case_with(&self.held(held));
-        equation_error::start(&case, &self.task.tunnel_start(&self.prepared.case))
+    pub fn start_by_equation_error(&self, held: &HeldSlopes) -> Vec<f64> {
+        let case = self.case_with(&self.model_with_slopes(held));
+        equation_error::start(&case, &start_from_tunnel(&self.task, &self.prepared.case))
     }
 
     /// Equation error with the slopes over α that a fit holds; `None` without any.
     pub fn second_opinion_on(&self, held: &HeldSlopes) -> Option<equation_error::Regression> {
-        let model = self.held(held);
+        let model = self.model_with_slopes(held);
         let uncertainties = self.task.held_uncertainties(&self.prepared.model);
         let regression = |wide: &Case<NX, E>| {
             equation_error::regression(&self.case_with(&model), wide, &uncertainties)
         };
         (!held.is_constant()).then(|| regression(&self.case_with(&all_free(&model))))
-    }
-}
-
-impl Task<'_> {
-    /// Filter of a model in a window of the maneuver.
-    pub(super) fn filter<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
-        &self,
-        prepared: &PreparedCase<NX, E>,
-        window: &Window,
-        model: &Model,
-    ) -> Filter<NG, G> {
-        let measurements = prepared.case.measurements.clone();
-        let biases = self.bias_uncertainties(model);
-        let filter = Filter::new(self.context.aircraft, window, measurements, model, &biases);
-        filter.with_noisy_inputs(self.noisy_inputs(prepared, window, model))
-    }
-
-    /// Noise of the inputs of a model in a window of the maneuver.
-    fn noisy_inputs<const NX: usize, E: Equations<NX>>(
-        &self,
-        prepared: &PreparedCase<NX, E>,
-        window: &Window,
-        model: &Model,
-    ) -> NoisyInputs {
-        NoisyInputs {
-            surfaces: noisy_surfaces(self.context.aircraft, window, model),
-            pressure_variance: prepared.case.noisy_inputs.pressure_variance,
-        }
-    }
-
-    /// Standard uncertainty of each bias, if calibration gives one.
-    fn bias_uncertainties(&self, model: &Model) -> Vec<Option<f64>> {
-        let uncertainty = |output: Output| {
-            let known = self.context.settings.calibration.get(output.signal())?;
-            (known.bias > 0.0).then_some(known.bias)
-        };
-        model.biases.iter().map(|b| uncertainty(b.output)).collect()
-    }
-
-    /// Standard deviations of the outputs' own noise: of the second differences of the measured
-    /// values, and at least the configured resolution.
-    pub(super) fn least_deviations(&self, measurements: &Measurements) -> [f64; OUTPUTS] {
-        let resolution = self.resolution();
-        std::array::from_fn(|o| sample_noise(measurements, o).max(resolution[o]))
     }
 }
 

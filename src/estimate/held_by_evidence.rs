@@ -9,6 +9,7 @@
 
 use std::collections::BTreeMap;
 
+use super::fitting::{StartingPoints, fit_output_error};
 use super::task::Task;
 use crate::aero::{Derivative, Regressor};
 use crate::dynamics::Equations;
@@ -34,14 +35,15 @@ impl HeldChoice {
     /// The class with the maneuver's choice in place of its table.
     pub fn applied_to(&self, class: &Class) -> Class {
         let mut class = class.clone();
-        self.apply(&mut class.statuses);
+        self.apply_to(&mut class.statuses);
         for over in &mut class.overrides {
-            self.apply(&mut over.statuses);
+            self.apply_to(&mut over.statuses);
         }
         class
     }
 
-    fn apply(&self, statuses: &mut BTreeMap<String, Status>) {
+    /// Changes the statuses of a table to those of the choice.
+    fn apply_to(&self, statuses: &mut BTreeMap<String, Status>) {
         for (name, status) in statuses {
             let is_held = self.reasons.contains_key(name);
             match *status {
@@ -49,6 +51,31 @@ impl HeldChoice {
                 Status::Held if !is_held => *status = Status::Estimated,
                 _ => {}
             }
+        }
+    }
+}
+
+/// State of the choice between two rounds.
+struct Choice {
+    /// Parameters that are held.
+    held: Vec<bool>,
+    /// Parameters that were held in an earlier round and are free again.
+    released: Vec<bool>,
+    /// Noise of the least restricted fit that the data determine.
+    noise: Option<ResidualNoise>,
+    candidates: Option<HoldingCandidates>,
+    /// Parameters held in the last fit that converged.
+    last_fitted: Option<Vec<bool>>,
+}
+
+impl Choice {
+    fn all_free(parameters: usize) -> Choice {
+        Choice {
+            held: vec![false; parameters],
+            released: vec![false; parameters],
+            noise: None,
+            candidates: None,
+            last_fitted: None,
         }
     }
 }
@@ -84,7 +111,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
         let uncertainty = wide
             .names
             .iter()
-            .map(|name| task.tunnel_uncertainty(name))
+            .map(|name| tunnel_uncertainty(task, name))
             .collect();
         Ok(Choosing {
             task,
@@ -129,7 +156,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
             .wide
             .names
             .iter()
-            .map(|name| self.value(name, narrow, fit))
+            .map(|name| self.value_at_fit(name, narrow, fit))
             .collect();
         HoldingCandidates::gather(
             &self.wide,
@@ -142,7 +169,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
     }
 
     /// Estimate of a parameter, or the tunnel's value of one that is held.
-    fn value(&self, name: &String, narrow: &Case<NX, E>, fit: &Fit) -> f64 {
+    fn value_at_fit(&self, name: &String, narrow: &Case<NX, E>, fit: &Fit) -> f64 {
         let place = narrow.names.iter().position(|n| n == name);
         place
             .map(|j| fit.values[j])
@@ -154,53 +181,54 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
         self.task.context.settings.iteration.max_condition_number
     }
 
+    /// Fits and chooses in turn until the choice settles.
     fn choose(&self) -> Result<HeldChoice, String> {
-        let mut held = vec![false; self.wide.parameters()];
-        let mut released = held.clone();
-        // Of the least restricted fit that the data determine.
-        let mut noise: Option<ResidualNoise> = None;
-        let mut candidates = None;
-        let mut last_fitted: Option<Vec<bool>> = None;
+        let mut choice = Choice::all_free(self.wide.parameters());
         for round in 0..ROUNDS {
-            let narrow = self.with_held(&held);
-            let (fit, _) = self
-                .task
-                .fit(&narrow, &self.task.starting_points(&narrow)?)?;
-            if fit.outcome == Outcome::NotConverged {
-                if round > 0 {
-                    // Return to the last choice that could be fitted.
-                    held = last_fitted.unwrap_or(held);
+            let narrow = self.with_held(&choice.held);
+            let starts = StartingPoints::new(self.task, &narrow)?;
+            let (fit, _) = fit_output_error(self.task, &narrow, &starts)?;
+            if fit.outcome != Outcome::NotConverged {
+                if self.choose_again(&narrow, &fit, &mut choice) {
                     break;
                 }
+            } else if round == 0 {
                 // With everything free there is no fit: begin with the class's table.
-                held = self.held_by_class();
-                continue;
-            }
-            last_fitted = Some(held.clone());
-            noise = noise
-                .or_else(|| cramer_rao::residual_noise(&narrow, &fit, self.max_condition_number()));
-            let Some(found) = self.candidates(
-                &narrow,
-                &fit,
-                noise.as_ref().unwrap_or(&ResidualNoise::default()),
-            ) else {
-                break;
-            };
-            // Without noise from a determined fit, bounds cannot be judged: fit again first.
-            let next = match noise {
-                Some(_) => found.choose(found.hold_undetermined(held.clone()), &mut released),
-                None => found.hold_undetermined(held.clone()),
-            };
-            let is_settled = next == held;
-            held = next;
-            candidates = Some(found);
-            if is_settled {
+                choice.held = self.held_by_class();
+            } else {
+                // Return to the last choice that could be fitted.
+                choice.held = choice.last_fitted.unwrap_or(choice.held);
                 break;
             }
         }
-        Ok(self.with_reasons(&held, candidates.as_ref()))
+        Ok(self.with_reasons(&choice.held, choice.candidates.as_ref()))
     }
 
+    /// Chooses at a fit. Returns true if the choice is settled, or the fit gives no information.
+    fn choose_again(&self, narrow: &Case<NX, E>, fit: &Fit, choice: &mut Choice) -> bool {
+        choice.last_fitted = Some(choice.held.clone());
+        if choice.noise.is_none() {
+            choice.noise = cramer_rao::residual_noise(narrow, fit, self.max_condition_number());
+        }
+        let no_noise = ResidualNoise::default();
+        let noise = choice.noise.as_ref().unwrap_or(&no_noise);
+        let Some(found) = self.candidates(narrow, fit, noise) else {
+            return true;
+        };
+        // Without noise from a determined fit, bounds cannot be judged: fit again first.
+        let determined = found.hold_undetermined(choice.held.clone());
+        let next = if choice.noise.is_some() {
+            found.choose(determined, &mut choice.released)
+        } else {
+            determined
+        };
+        let is_settled = next == choice.held;
+        choice.held = next;
+        choice.candidates = Some(found);
+        is_settled
+    }
+
+    /// Parameters of `wide` that the class holds.
     fn held_by_class(&self) -> Vec<bool> {
         let names = self.wide.names.iter();
         names
@@ -208,81 +236,25 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
             .collect()
     }
 
+    /// The choice with the reason of each held derivative in words.
     fn with_reasons(&self, held: &[bool], candidates: Option<&HoldingCandidates>) -> HeldChoice {
         let names = &self.wide.names;
         let reason = |j: usize| {
             let because = candidates.and_then(|c| c.reason(held, j));
-            (
-                names[j].clone(),
-                self.task.reason_in_words(names, j, because),
-            )
+            (names[j].clone(), self.reason_in_words(j, because))
         };
         HeldChoice {
             reasons: (0..held.len()).filter(|&j| held[j]).map(reason).collect(),
         }
     }
-}
-
-impl Task<'_> {
-    /// Chooses the derivatives to hold in this maneuver.
-    ///
-    /// # Errors
-    /// The reason why the maneuver is rejected, as in its estimation.
-    pub(super) fn choose_held<const NX: usize, E: Equations<NX>>(
-        &self,
-    ) -> Result<HeldChoice, String> {
-        Choosing::<NX, E>::new(self)?.choose()
-    }
-
-    /// Standard uncertainty of the tunnel's value of a derivative that may be held.
-    ///
-    /// `None` for constants, biases and initial states, for a derivative without a table, and for
-    /// one whose table is all zero and states no uncertainty.
-    fn tunnel_uncertainty(&self, name: &str) -> Option<f64> {
-        let derivative = self.context.buildup.derivative(name)?;
-        if derivative.regressor == Regressor::Constant || self.tunnel_value(name).is_none() {
-            return None;
-        }
-        Some(self.held_uncertainty(derivative)).filter(|u| *u > 0.0)
-    }
-
-    /// Names the undetermined derivatives of a fit that have no tunnel value to be held at; empty
-    /// without any.
-    pub(super) fn undetermined_without_tunnel<const NX: usize, E: Equations<NX>>(
-        &self,
-        case: &Case<NX, E>,
-        fit: &Fit,
-    ) -> String {
-        let names = fit.undetermined.iter().filter_map(|&j| case.names.get(j));
-        let is_derivative = |name: &&String| {
-            self.context.buildup.derivative(name).is_some() && !self.is_constant(name)
-        };
-        let lacking: Vec<&str> = names
-            .filter(is_derivative)
-            .filter(|name| self.tunnel_uncertainty(name).is_none())
-            .map(String::as_str)
-            .collect();
-        match lacking.as_slice() {
-            [] => String::new(),
-            [one] => format!("; {one} has no wind-tunnel value with an uncertainty to be held at"),
-            many => format!(
-                "; none of {} has a wind-tunnel value with an uncertainty to be held at",
-                many.join(", ")
-            ),
-        }
-    }
 
     /// Reason for holding a parameter, in the words of the table `estimates`.
-    fn reason_in_words(
-        &self,
-        names: &[String],
-        parameter: usize,
-        because: Option<HoldingReason>,
-    ) -> String {
+    fn reason_in_words(&self, parameter: usize, because: Option<HoldingReason>) -> String {
+        let names = &self.wide.names;
         match because {
             None => "it was held beside others that are free now".to_owned(),
             Some(HoldingReason::NotExcited) => {
-                match self.context.buildup.derivative(&names[parameter]) {
+                match self.task.context.buildup.derivative(&names[parameter]) {
                     Some(Derivative {
                         regressor: Regressor::Surface(s) | Regressor::Vane(s),
                         ..
@@ -301,7 +273,7 @@ impl Task<'_> {
                 uncertainty,
                 partner,
             }) => {
-                let limit = self.context.settings.identifiability.correlation;
+                let limit = self.task.context.settings.identifiability.correlation;
                 let with = partner.filter(|(_, correlation)| correlation.abs() > limit);
                 let with = with.map_or_else(String::new, |(j, correlation)| {
                     format!("; it would correlate {correlation:.2} with {}", names[j])
@@ -312,5 +284,52 @@ impl Task<'_> {
                 )
             }
         }
+    }
+}
+
+/// Chooses the derivatives to hold in this maneuver.
+///
+/// # Errors
+/// The reason why the maneuver is rejected, as in its estimation.
+pub(super) fn choose_held<const NX: usize, E: Equations<NX>>(
+    task: &Task,
+) -> Result<HeldChoice, String> {
+    Choosing::<NX, E>::new(task)?.choose()
+}
+
+/// Standard uncertainty of the tunnel's value of a derivative that may be held.
+///
+/// `None` for constants, biases and initial states, for a derivative without a table, and for
+/// one whose table is all zero and states no uncertainty.
+fn tunnel_uncertainty(task: &Task, name: &str) -> Option<f64> {
+    let derivative = task.context.buildup.derivative(name)?;
+    if derivative.regressor == Regressor::Constant || task.tunnel_value(name).is_none() {
+        return None;
+    }
+    Some(task.held_uncertainty(derivative)).filter(|u| *u > 0.0)
+}
+
+/// Names the undetermined derivatives of a fit that have no tunnel value to be held at; empty
+/// without any.
+pub(super) fn undetermined_without_tunnel<const NX: usize, E: Equations<NX>>(
+    task: &Task,
+    case: &Case<NX, E>,
+    fit: &Fit,
+) -> String {
+    let names = fit.undetermined.iter().filter_map(|&j| case.names.get(j));
+    let is_derivative =
+        |name: &&String| task.context.buildup.derivative(name).is_some() && !task.is_constant(name);
+    let lacking: Vec<&str> = names
+        .filter(is_derivative)
+        .filter(|name| tunnel_uncertainty(task, name).is_none())
+        .map(String::as_str)
+        .collect();
+    match lacking.as_slice() {
+        [] => String::new(),
+        [one] => format!("; {one} has no wind-tunnel value with an uncertainty to be held at"),
+        many => format!(
+            "; none of {} has a wind-tunnel value with an uncertainty to be held at",
+            many.join(", ")
+        ),
     }
 }

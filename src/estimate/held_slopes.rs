@@ -36,10 +36,13 @@ impl HeldSlopes {
         }
     }
 
+    /// Effect on the estimates of a fit if the slopes are estimated and not held; `None` without
+    /// slopes.
     pub fn effect(&self, pass: &WidePass, bounds: &Bounds) -> Option<SlopeEffect> {
         pass.slope_effect(bounds, &self.names, &self.values)
     }
 
+    /// True if no derivative changes over α.
     pub fn is_constant(&self) -> bool {
         self.values.iter().all(|v| *v == 0.0)
     }

@@ -2,6 +2,7 @@
 
 use super::task::Task;
 use crate::aero::Output;
+use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
 use crate::dynamics::{Equations, OUTPUTS};
 use crate::maneuver::Maneuver;
@@ -19,30 +20,30 @@ pub(super) struct PreparedCase<'a, const NX: usize, E: Equations<NX>> {
     pub left_out: f64,
 }
 
-impl<'a> Task<'a> {
+impl<'a, const NX: usize, E: Equations<NX>> PreparedCase<'a, NX, E> {
     /// Cuts the maneuver out of the record and lays it out for a model.
-    pub(super) fn prepare<const NX: usize, E: Equations<NX>>(
-        &self,
-        model: Model<'a>,
-    ) -> Result<PreparedCase<'a, NX, E>, String> {
-        let range = self.range();
+    ///
+    /// # Errors
+    /// Too many samples are flagged, a signal is missing, or the samples are too few.
+    pub fn new(task: &Task<'a>, model: Model<'a>) -> Result<Self, String> {
+        let range = task.range();
         let derivatives = model
             .free
             .iter()
             .copied()
             .chain(model.held.iter().map(|(d, _)| *d));
         let surfaces: Vec<&str> = derivatives.flat_map(|d| d.regressor.signals()).collect();
-        let settings = self.context.settings;
-        self.check_marked_share(&surfaces)?;
+        let settings = task.context.settings;
+        check_marked_share(task, &surfaces)?;
         let window = Window::cut(
-            self.context.aircraft,
-            self.record,
+            task.context.aircraft,
+            task.record,
             range.clone(),
             surfaces.iter().copied(),
             settings.mass_properties,
         )?;
-        let measurements = self.measurements(&range)?;
-        let mut case = Case::<NX, E>::new(self.context.aircraft, &window, measurements, &model);
+        let measurements = task.measurements(&range)?;
+        let mut case = Case::<NX, E>::new(task.context.aircraft, &window, measurements, &model);
         let counted: usize = case.used().iter().sum();
         let left_out = 1.0 - counted as f64 / (OUTPUTS * case.samples()).max(1) as f64;
         if counted <= case.parameters() {
@@ -52,8 +53,8 @@ impl<'a> Task<'a> {
             ));
         }
         case.noisy_inputs = NoisyInputs {
-            surfaces: noisy_surfaces(self.context.aircraft, &window, &model),
-            pressure_variance: pressure_noise::relative_variance(self.record, range),
+            surfaces: noisy_surfaces(task.context.aircraft, &window, &model),
+            pressure_variance: pressure_noise::relative_variance(task.record, range),
         };
         Ok(PreparedCase {
             model,
@@ -64,47 +65,39 @@ impl<'a> Task<'a> {
         })
     }
 
-    /// Rejects a maneuver with too large a share of flagged samples. Samples interpolated between
-    /// those of a slow channel do not count; the cost leaves them out.
-    fn check_marked_share(&self, surfaces: &[&str]) -> Result<(), String> {
-        let Maneuver { start_s, end_s, .. } = *self.maneuver;
-        let most = self.context.settings.max_marked_share;
-        let outputs = self.record.marked_share(
-            self.class.axis.outputs().map(Output::signal),
-            start_s,
-            end_s,
-        );
-        if outputs > most {
+    /// The case with the held derivatives free as well, for the effect of their errors.
+    pub fn with_held_free(&self, aircraft: &Aircraft) -> Case<NX, E> {
+        self.case
+            .with_model(aircraft, &self.window, &all_free(&self.model))
+    }
+}
+
+/// Rejects a maneuver with too large a share of flagged samples. Samples interpolated between
+/// those of a slow channel do not count; the cost leaves them out.
+fn check_marked_share(task: &Task, surfaces: &[&str]) -> Result<(), String> {
+    let Maneuver { start_s, end_s, .. } = *task.maneuver;
+    let most = task.context.settings.max_marked_share;
+    let outputs = task.record.marked_share(
+        task.class.axis.outputs().map(Output::signal),
+        start_s,
+        end_s,
+    );
+    if outputs > most {
+        return Err(format!(
+            "{:.0}% of its output samples are marked",
+            100.0 * outputs
+        ));
+    }
+    for surface in surfaces {
+        let share = task.record.marked_share([*surface], start_s, end_s);
+        if share > most {
             return Err(format!(
-                "{:.0}% of its output samples are marked",
-                100.0 * outputs
+                "{:.0}% of the samples of `{surface}` are marked",
+                100.0 * share
             ));
         }
-        for surface in surfaces {
-            let share = self.record.marked_share([*surface], start_s, end_s);
-            if share > most {
-                return Err(format!(
-                    "{:.0}% of the samples of `{surface}` are marked",
-                    100.0 * share
-                ));
-            }
-        }
-        Ok(())
     }
-
-    /// The case with the held derivatives free as well, for the effect of their errors.
-    pub(super) fn with_held_free<const NX: usize, E: Equations<NX>>(
-        &self,
-        prepared: &PreparedCase<'a, NX, E>,
-    ) -> Case<NX, E> {
-        let PreparedCase {
-            model,
-            window,
-            case,
-            ..
-        } = prepared;
-        case.with_model(self.context.aircraft, window, &all_free(model))
-    }
+    Ok(())
 }
 
 /// Model with the held derivatives free as well.

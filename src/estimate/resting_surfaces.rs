@@ -20,36 +20,34 @@ const AT_REST: f64 = 1.5;
 /// noise does, but are larger.
 const LARGEST_NOISE: f64 = 0.2;
 
-impl Task<'_> {
-    /// The class without the derivatives of surfaces that rest, and the names of these. With `hold: evidence`
-    /// the maneuver's evidence decides instead.
-    pub(super) fn class_of_moving_surfaces(&self) -> (Class, BTreeSet<String>) {
-        let resting = match self.context.settings.hold {
-            Hold::Table => self.derivatives_at_rest(),
-            Hold::Evidence => BTreeSet::new(),
-        };
-        (self.class.with_inactive(&resting), resting)
-    }
-
-    /// Derivatives to be estimated whose surfaces rest.
-    fn derivatives_at_rest(&self) -> BTreeSet<String> {
-        let derivatives = self.context.buildup.derivatives_of(self.class.axis);
-        let at_rest = derivatives.filter(|derivative| {
-            let mut signals = derivative.regressor.signals();
-            self.status(&derivative.name) == Some(Status::Estimated)
-                && signals.any(|name| !signal::OF_THE_FLOW.contains(&name) && self.rests(name))
-        });
-        at_rest.map(|derivative| derivative.name.clone()).collect()
-    }
-
-    /// True for a signal that shows no more than noise in the maneuver.
-    fn rests(&self, name: &str) -> bool {
-        let samples = self.record.values(name).and_then(|v| v.get(self.range()));
-        samples.is_some_and(is_noise)
-    }
+/// The class without the derivatives of surfaces that rest, and the names of these. With `hold: evidence`
+/// the maneuver's evidence decides instead.
+pub(super) fn class_of_moving_surfaces(task: &Task) -> (Class, BTreeSet<String>) {
+    let resting = match task.context.settings.hold {
+        Hold::Table => derivatives_at_rest(task),
+        Hold::Evidence => BTreeSet::new(),
+    };
+    (task.class.with_inactive(&resting), resting)
 }
 
-/// `true` if samples show no motion: their scatter about the mean is small, and no larger than white
+/// Derivatives to be estimated whose surfaces rest.
+fn derivatives_at_rest(task: &Task) -> BTreeSet<String> {
+    let derivatives = task.context.buildup.derivatives_of(task.class.axis);
+    let at_rest = derivatives.filter(|derivative| {
+        let mut signals = derivative.regressor.signals();
+        task.status(&derivative.name) == Some(Status::Estimated)
+            && signals.any(|name| !signal::OF_THE_FLOW.contains(&name) && is_at_rest(task, name))
+    });
+    at_rest.map(|derivative| derivative.name.clone()).collect()
+}
+
+/// True for a signal that shows no more than noise in the maneuver.
+fn is_at_rest(task: &Task, name: &str) -> bool {
+    let samples = task.record.values(name).and_then(|v| v.get(task.range()));
+    samples.is_some_and(is_noise)
+}
+
+/// True if samples show no motion: their scatter about the mean is small, and no larger than white
 /// noise with their differences from sample to sample would have.
 fn is_noise(samples: &[f64]) -> bool {
     let steps = samples.windows(2).map(|pair| (pair[1] - pair[0]).powi(2));

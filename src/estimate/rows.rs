@@ -19,10 +19,19 @@ struct Term<'a> {
     status: Status,
 }
 
-impl<'a> Task<'a> {
+/// Makes the rows of a maneuver.
+pub(super) struct RowMaker<'t, 'a> {
+    task: &'t Task<'a>,
+}
+
+impl<'t, 'a> RowMaker<'t, 'a> {
+    pub fn new(task: &'t Task<'a>) -> Self {
+        RowMaker { task }
+    }
+
     /// Derivatives and biases of the axis.
     fn terms(&self) -> Vec<Term<'a>> {
-        let (buildup, axis) = (self.context.buildup, self.class.axis);
+        let (buildup, axis) = (self.task.context.buildup, self.task.class.axis);
         let derivatives = buildup
             .derivatives_of(axis)
             .map(|d| (d.name.as_str(), d.unit().name()));
@@ -34,19 +43,19 @@ impl<'a> Task<'a> {
             .map(|(name, unit)| Term {
                 name,
                 unit,
-                status: self.status(name).unwrap_or(Status::Inactive),
+                status: self.task.status(name).unwrap_or(Status::Inactive),
             })
             .collect()
     }
 
     /// One row per derivative and bias of the axis.
-    pub(super) fn estimate_rows(&self, fit: Option<(&Vec<String>, &Fit)>) -> Vec<EstimateRow> {
-        let at = |name: &str| fit.and_then(|(names, _)| names.iter().position(|n| n == name));
+    pub fn estimate_rows(&self, fit: Option<(&Vec<String>, &Fit)>) -> Vec<EstimateRow> {
+        let place_of = |name: &str| fit.and_then(|(names, _)| names.iter().position(|n| n == name));
         let deviation = |matrix: Option<&DMatrix<f64>>, j: usize| matrix.map(|m| m[(j, j)].sqrt());
         let mut rows = Vec::new();
         for term in self.terms() {
             let mut row = self.estimate_row(term.name, term.unit, term.status);
-            match (term.status, at(term.name), fit) {
+            match (term.status, place_of(term.name), fit) {
                 (Status::Estimated, Some(j), Some((_, fit))) => {
                     row.value = Some(fit.values[j]);
                     row.bound = deviation(fit.covariance.as_ref(), j);
@@ -63,10 +72,10 @@ impl<'a> Task<'a> {
     }
 
     /// Rows of the sums whose parts were both estimated.
-    pub(super) fn combined_rows(&self, names: &[String], fit: &Fit) -> Vec<EstimateRow> {
-        let at = |name: &str| names.iter().position(|n| n == name);
-        let sums = self.context.buildup.combined.iter();
-        sums.filter_map(|c| self.combined_row(c, at(&c.constant)?, at(&c.slope)?, fit))
+    pub fn combined_rows(&self, names: &[String], fit: &Fit) -> Vec<EstimateRow> {
+        let place_of = |name: &str| names.iter().position(|n| n == name);
+        let sums = self.task.context.buildup.combined.iter();
+        sums.filter_map(|c| self.combined_row(c, place_of(&c.constant)?, place_of(&c.slope)?, fit))
             .collect()
     }
 
@@ -78,11 +87,11 @@ impl<'a> Task<'a> {
         j: usize,
         fit: &Fit,
     ) -> Option<EstimateRow> {
-        let alpha = self.maneuver.alpha_deg;
+        let alpha = self.task.maneuver.alpha_deg;
         let variance =
             |m: &DMatrix<f64>| m[(i, i)] + 2.0 * alpha * m[(i, j)] + alpha * alpha * m[(j, j)];
         let deviation = |m: &DMatrix<f64>| variance(m).max(0.0).sqrt();
-        let unit = self.context.buildup.unit_of(&combined.name)?.name();
+        let unit = self.task.context.buildup.unit_of(&combined.name)?.name();
         Some(EstimateRow {
             value: Some(fit.values[i] + alpha * fit.values[j]),
             bound: fit.covariance.as_ref().map(deviation),
@@ -96,13 +105,13 @@ impl<'a> Task<'a> {
     /// Row without results.
     fn estimate_row(&self, name: &str, unit: &str, status: Status) -> EstimateRow {
         EstimateRow {
-            wind_tunnel: self.tunnel_value(name),
-            ..EstimateRow::without_results(self.maneuver, name, unit, status)
+            wind_tunnel: self.task.tunnel_value(name),
+            ..EstimateRow::without_results(self.task.maneuver, name, unit, status)
         }
     }
 
     /// Row of `fits`.
-    pub(super) fn fit_row(&self, fit: &Fit, left_out: f64, start: StartingValues) -> FitRow {
+    pub fn fit_row(&self, fit: &Fit, left_out: f64, start: StartingValues) -> FitRow {
         FitRow {
             reason: fit.reason.clone(),
             start: Some(start),
@@ -111,21 +120,21 @@ impl<'a> Task<'a> {
             final_cost: fit.final_cost,
             condition_number: fit.condition_number,
             left_out: Some(left_out),
-            ..FitRow::without_numbers(&self.maneuver.maneuver_id, &self.class.name, fit.outcome)
+            ..FitRow::without_numbers(
+                &self.task.maneuver.maneuver_id,
+                &self.task.class.name,
+                fit.outcome,
+            )
         }
     }
 
     /// Row of an output's agreement with a computed one.
-    pub(super) fn agreement_row(
-        &self,
-        output: Output,
-        agreement: &OutputAgreement,
-    ) -> AgreementRow {
+    pub fn agreement_row(&self, output: Output, agreement: &OutputAgreement) -> AgreementRow {
         let theil = agreement.theil();
         AgreementRow {
-            maneuver_id: self.maneuver.maneuver_id.clone(),
-            class: self.class.name.clone(),
-            alpha_deg: self.maneuver.alpha_deg,
+            maneuver_id: self.task.maneuver.maneuver_id.clone(),
+            class: self.task.class.name.clone(),
+            alpha_deg: self.task.maneuver.alpha_deg,
             output,
             unit: Unit::of_signal(output.signal()).name.to_owned(),
             samples: agreement.samples,
@@ -139,34 +148,29 @@ impl<'a> Task<'a> {
     }
 
     /// Result of a maneuver that is rejected, with the reason.
-    pub(super) fn rejected(&self, reason: String) -> Estimated {
+    pub fn rejected(&self, reason: String) -> Estimated {
         Estimated::without_fit(
-            rejected_fit(self.maneuver, reason),
+            rejected_fit(self.task.maneuver, reason),
             self.estimate_rows(None),
         )
     }
 
     /// Measured and computed outputs, and the motion of the surfaces.
-    pub(super) fn history(
+    pub fn history(
         &self,
         measured: &Measurements,
         fit: &Fit,
         window: &Window,
         surfaces: &[&str],
     ) -> History {
-        let outputs = self
-            .class
-            .axis
-            .outputs()
-            .into_iter()
-            .enumerate()
-            .map(|(o, output)| HistoryOutput {
-                label: output.signal().to_owned(),
-                unit: Unit::of_signal(output.signal()).name.to_owned(),
-                measured: measured.values.iter().map(|z| z[o]).collect(),
-                computed: fit.response.outputs.iter().map(|y| y[o]).collect(),
-                marked: measured.used.iter().map(|used| !used[o]).collect(),
-            });
+        let outputs = self.task.class.axis.outputs().into_iter();
+        let outputs = outputs.enumerate().map(|(o, output)| HistoryOutput {
+            label: output.signal().to_owned(),
+            unit: Unit::of_signal(output.signal()).name.to_owned(),
+            measured: measured.values.iter().map(|z| z[o]).collect(),
+            computed: fit.response.outputs.iter().map(|y| y[o]).collect(),
+            marked: measured.used.iter().map(|used| !used[o]).collect(),
+        });
         let mut names: Vec<&str> = surfaces.to_vec();
         names.sort_unstable();
         names.dedup();
@@ -177,9 +181,9 @@ impl<'a> Task<'a> {
             )
         };
         History {
-            maneuver_id: self.maneuver.maneuver_id.clone(),
-            class: self.class.name.clone(),
-            alpha_deg: self.maneuver.alpha_deg,
+            maneuver_id: self.task.maneuver.maneuver_id.clone(),
+            class: self.task.class.name.clone(),
+            alpha_deg: self.task.maneuver.alpha_deg,
             time_s: (0..measured.values.len())
                 .map(|k| k as f64 * window.step_s)
                 .collect(),

@@ -34,7 +34,7 @@ impl Distance {
     /// Both estimates use the same data and the same held values, so the covariance of their
     /// difference is less than the sum of their covariances. The sum is used here, so the distance
     /// is underestimated.
-    pub fn of(fit: &Fit, second: &Regression) -> Option<Distance> {
+    pub fn between(fit: &Fit, second: &Regression) -> Option<Distance> {
         let corrected = fit.covariance_corrected.as_ref()?;
         let both: Vec<usize> = (0..second.values.len())
             .filter(|&j| second.values[j].is_some())

@@ -1,17 +1,25 @@
 //! Estimation of one maneuver by itself.
 
+use std::collections::BTreeMap;
+
 use nalgebra::DMatrix;
 
+use super::air_motion::{Air, Filtered, needs_filter};
+use super::calibration_effect::add_calibration_errors;
 use super::context::Context;
-use super::doubt::Explanation;
+use super::credibility::{Credibility, Explanation};
+use super::diagnostics::Diagnostics;
 use super::estimated::{Covariance, Estimated};
 use super::filter_minimum::NoMinimum;
-use super::in_gusts::{Air, Filtered};
+use super::fitting::{StartingPoints, fit_output_error};
+use super::held_by_evidence::{choose_held, undetermined_without_tunnel};
 use super::prepared_case::PreparedCase;
+use super::resting_surfaces::class_of_moving_surfaces;
+use super::rows::RowMaker;
 use super::second_opinion::add_second_opinion;
 use super::settings::Hold;
 use super::task::{Task, values_by_name};
-use super::whiteness::is_white;
+use super::whiteness::{is_white, lag_one, largest_correlation};
 use crate::aero::Axis;
 use crate::dynamics::{
     Equations, InGusts, Lateral, LateralInGusts, Longitudinal, LongitudinalInGusts,
@@ -19,8 +27,8 @@ use crate::dynamics::{
 use crate::flight::Record;
 use crate::maneuver::{Class, Maneuver};
 use crate::output_error::equation_error::{self, Regression};
-use crate::output_error::{Fit, Measurements, Outcome, consider, cost, estimation};
-use crate::tables::StartingValues;
+use crate::output_error::{Case, Fit, Measurements, Outcome, consider, cost, estimation};
+use crate::tables::{EstimationMethod, StartingValues};
 
 /// Remark on a fit by output error that is kept because its residuals are coloured noise of the
 /// sensors, and not gusts.
@@ -44,155 +52,208 @@ pub fn maneuver(
         context,
     };
     if maneuver.is_rejected() {
-        return task.rejected(maneuver.quality.reason.clone());
+        return RowMaker::new(&task).rejected(maneuver.quality.reason.clone());
     }
     match context.settings.hold {
-        Hold::Table => task.estimate_by_moving_surfaces(),
-        Hold::Evidence => task.estimate_by_evidence(),
+        Hold::Table => estimate_by_moving_surfaces(&task),
+        Hold::Evidence => estimate_by_evidence(&task),
     }
 }
 
-impl Task<'_> {
-    /// Estimates with the derivatives held that the class holds.
-    fn estimate_by_class(&self) -> Estimated {
-        let estimated = match self.class.axis {
-            Axis::Longitudinal => self.estimate::<3, Longitudinal, 4, LongitudinalInGusts>(),
-            Axis::Lateral => self.estimate::<4, Lateral, 6, LateralInGusts>(),
-        };
-        estimated.unwrap_or_else(|reason| self.rejected(reason))
-    }
+/// Estimates with the derivatives held that the class holds.
+fn estimate_by_class(task: &Task) -> Estimated {
+    let estimated = match task.class.axis {
+        Axis::Longitudinal => estimate::<3, Longitudinal, 4, LongitudinalInGusts>(task),
+        Axis::Lateral => estimate::<4, Lateral, 6, LateralInGusts>(task),
+    };
+    estimated.unwrap_or_else(|reason| RowMaker::new(task).rejected(reason))
+}
 
-    /// Estimates as the class does, without the derivatives of surfaces that rest.
-    fn estimate_by_moving_surfaces(&self) -> Estimated {
-        let (class, resting) = self.class_of_moving_surfaces();
-        let task = Task {
-            class: &class,
-            ..*self
-        };
-        let mut estimated = task.estimate_by_class();
-        let rows = estimated.estimates.iter_mut();
-        for row in rows.filter(|row| resting.contains(&row.derivative)) {
-            row.held_because = Some(RESTS.to_owned());
+/// Estimates as the class does, without the derivatives of surfaces that rest.
+fn estimate_by_moving_surfaces(task: &Task) -> Estimated {
+    let (class, resting) = class_of_moving_surfaces(task);
+    let task = Task {
+        class: &class,
+        ..*task
+    };
+    let mut estimated = estimate_by_class(&task);
+    let rows = estimated.estimates.iter_mut();
+    for row in rows.filter(|row| resting.contains(&row.derivative)) {
+        row.held_because = Some(RESTS.to_owned());
+    }
+    estimated
+}
+
+/// Estimates with the derivatives held that the maneuver's own evidence holds.
+fn estimate_by_evidence(task: &Task) -> Estimated {
+    let choice = match task.class.axis {
+        Axis::Longitudinal => choose_held::<3, Longitudinal>(task),
+        Axis::Lateral => choose_held::<4, Lateral>(task),
+    };
+    let choice = match choice {
+        Ok(choice) => choice,
+        Err(reason) => return RowMaker::new(task).rejected(reason),
+    };
+    let class = choice.applied_to(task.class);
+    let task = Task {
+        class: &class,
+        ..*task
+    };
+    let mut estimated = estimate_by_class(&task);
+    for row in &mut estimated.estimates {
+        row.held_because = choice.reasons.get(&row.derivative).cloned();
+    }
+    estimated
+}
+
+/// Estimates by output error, and by filter error if the method or the residuals require it.
+fn estimate<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
+    task: &Task,
+) -> Result<Estimated, String> {
+    let prepared = PreparedCase::<NX, E>::new(task, task.class_model()?)?;
+    let starts = StartingPoints::new(task, &prepared.case)?;
+    let (mut fit, start) = fit_output_error(task, &prepared.case, &starts)?;
+    let single = SingleEstimation::new(task, prepared);
+    let SingleEstimation { prepared, wide, .. } = &single;
+    let measurements = &prepared.case.measurements;
+    if needs_filter(task.context.settings.method, measurements, &fit) {
+        match Air::estimate::<NX, E, NG, G>(task, prepared, wide, starts.implied, &fit) {
+            Air::Moves(filtered) => return Ok(single.estimated_in_gusts(&filtered)),
+            Air::IsStill => fit.reason.push_str(OF_SENSORS),
+            Air::Unknown(why) => discard_in_gusts(measurements, &why, &mut fit),
         }
-        estimated
     }
+    single.add_bounds(&mut fit);
+    Ok(single.estimated_in_still_air(&fit, start.into()))
+}
 
-    /// Estimates with the derivatives held that the maneuver's own evidence holds.
-    fn estimate_by_evidence(&self) -> Estimated {
-        let choice = match self.class.axis {
-            Axis::Longitudinal => self.choose_held::<3, Longitudinal>(),
-            Axis::Lateral => self.choose_held::<4, Lateral>(),
-        };
-        let choice = match choice {
-            Ok(choice) => choice,
-            Err(reason) => return self.rejected(reason),
-        };
-        let class = choice.applied_to(self.class);
-        let task = Task {
-            class: &class,
-            ..*self
-        };
-        let mut estimated = task.estimate_by_class();
-        for row in &mut estimated.estimates {
-            row.held_because = choice.reasons.get(&row.derivative).cloned();
+/// A prepared maneuver, with everything that bounds and rows of its fit need.
+struct SingleEstimation<'t, 'a, const NX: usize, E: Equations<NX>> {
+    task: &'t Task<'a>,
+    prepared: PreparedCase<'a, NX, E>,
+    /// The case with the held derivatives free as well.
+    wide: Case<NX, E>,
+    /// Standard uncertainties of the held values by derivative.
+    held_uncertainties: BTreeMap<&'a str, f64>,
+    /// Estimates by equation error.
+    second_opinion: Regression,
+}
+
+impl<'t, 'a, const NX: usize, E: Equations<NX>> SingleEstimation<'t, 'a, NX, E> {
+    fn new(task: &'t Task<'a>, prepared: PreparedCase<'a, NX, E>) -> Self {
+        let wide = prepared.with_held_free(task.context.aircraft);
+        let held_uncertainties = task.held_uncertainties(&prepared.model);
+        SingleEstimation {
+            second_opinion: equation_error::regression(&prepared.case, &wide, &held_uncertainties),
+            task,
+            prepared,
+            wide,
+            held_uncertainties,
         }
-        estimated
     }
 
-    fn estimate<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
-        &self,
-    ) -> Result<Estimated, String> {
-        let prepared = self.prepare::<NX, E>(self.class_model()?)?;
+    /// Adds the covariances to a fit by output error: of the noise, of the held values and of
+    /// calibration.
+    fn add_bounds(&self, fit: &mut Fit) {
+        let (context, prepared) = (self.task.context, &self.prepared);
         let case = &prepared.case;
-        let starts = self.starting_points(case)?;
-        let (mut fit, start) = self.fit(case, &starts)?;
-        let with_held_free = self.with_held_free(&prepared);
-        let uncertainties = self.held_uncertainties(&prepared.model);
-        let second = equation_error::regression(case, &with_held_free, &uncertainties);
-        if self.needs_filter(&case.measurements, &fit) {
-            let implied = starts.implied;
-            match self.filtered::<NX, E, NG, G>(&prepared, &with_held_free, implied, &fit) {
-                Air::Moves(filtered) => {
-                    return Ok(self.estimated_in_gusts(&prepared, &filtered, &second));
-                }
-                Air::IsStill => fit.reason.push_str(OF_SENSORS),
-                Air::Unknown(why) => discard_in_gusts(&case.measurements, &why, &mut fit),
-            }
-        }
-        estimation::add_bounds(case, &mut fit, &self.context.settings.iteration);
-        if self.context.settings.hold == Hold::Evidence {
+        estimation::add_bounds(case, fit, &context.settings.iteration);
+        if context.settings.hold == Hold::Evidence {
             fit.reason
-                .push_str(&self.undetermined_without_tunnel(case, &fit));
+                .push_str(&undetermined_without_tunnel(self.task, case, fit));
         }
         let values = values_by_name(&prepared.model, &case.names, &fit.values);
-        consider::consider(case, &with_held_free, &values, &uncertainties, &mut fit);
-        self.add_calibration_errors(&prepared, &mut fit);
+        consider::consider(case, &self.wide, &values, &self.held_uncertainties, fit);
+        add_calibration_errors(context, prepared, fit);
+    }
+
+    /// Rows of a fit by output error.
+    fn estimated_in_still_air(&self, fit: &Fit, start: StartingValues) -> Estimated {
         let information = fit
             .final_cost
             .map(|_| cost::sums(&fit.response, &fit.weights).information);
         let explanation = Explanation {
             outputs: fit.final_cost.map(|_| &*fit.response.outputs),
             attitude_drifts: false,
-            second_opinion: &second,
+            second_opinion: &self.second_opinion,
         };
-        let mut estimated =
-            self.estimated(&prepared, &fit, start.into(), information.as_ref(), &second);
-        self.add_agreement(case, &fit, &explanation, &mut estimated);
-        Self::add_still_air(&case.measurements, &fit, &mut estimated.fit);
-        Ok(estimated)
+        let mut estimated = self.estimated(fit, start, information.as_ref(), explanation);
+        estimated.fit.method = Some(EstimationMethod::OutputError);
+        let measurements = &self.prepared.case.measurements;
+        estimated.fit.autocorrelation =
+            largest_correlation(lag_one(measurements, &fit.response.outputs));
+        estimated
     }
 
-    fn estimated_in_gusts<const NX: usize, E: Equations<NX>>(
-        &self,
-        prepared: &PreparedCase<NX, E>,
-        filtered: &Filtered,
-        second: &Regression,
-    ) -> Estimated {
-        let start = StartingValues::EquationError;
-        let information = Some(&filtered.information);
-        let second = filtered.second_opinion.as_ref().unwrap_or(second);
-        let mut estimated = self.estimated(prepared, &filtered.fit, start, information, second);
-        self.add_gusts(filtered, prepared.case.step_s, &mut estimated.fit);
-        estimated.noise = Some(filtered.noise);
+    /// Rows of a fit by filter error.
+    fn estimated_in_gusts(&self, filtered: &Filtered) -> Estimated {
+        let second = filtered.second_opinion.as_ref();
         let explanation = Explanation {
             outputs: filtered.outputs_along_air.as_deref(),
             attitude_drifts: filtered.attitude_drifts,
-            second_opinion: second,
+            second_opinion: second.unwrap_or(&self.second_opinion),
         };
-        self.add_agreement(&prepared.case, &filtered.fit, &explanation, &mut estimated);
+        let start = StartingValues::EquationError;
+        let information = Some(&filtered.information);
+        let mut estimated = self.estimated(&filtered.fit, start, information, explanation);
+        filtered.add_gusts(self.task, self.prepared.case.step_s, &mut estimated.fit);
+        estimated.noise = Some(filtered.noise);
         estimated
     }
 
-    /// Rows of a fit with its diagnostics.
-    fn estimated<const NX: usize, E: Equations<NX>>(
+    /// Rows of a fit with its diagnostics and its credibility.
+    fn estimated(
         &self,
-        prepared: &PreparedCase<NX, E>,
         fit: &Fit,
         start: StartingValues,
         information: Option<&DMatrix<f64>>,
-        second: &Regression,
+        explanation: Explanation,
     ) -> Estimated {
+        let (task, case) = (self.task, &self.prepared.case);
+        let mut estimated = self.make_rows(fit, start);
+        add_second_opinion(
+            &case.names,
+            explanation.second_opinion,
+            &mut estimated.estimates,
+        );
+        let diagnostics = Diagnostics {
+            task,
+            case,
+            window: &self.prepared.window,
+            model: &self.prepared.model,
+        };
+        diagnostics.add_to(information, &mut estimated);
+        let credibility = Credibility {
+            task,
+            case,
+            fit,
+            explanation,
+        };
+        credibility.add_to(&mut estimated);
+        estimated
+    }
+
+    /// Rows of a fit by itself.
+    fn make_rows(&self, fit: &Fit, start: StartingValues) -> Estimated {
         let PreparedCase {
             case,
             window,
-            model,
             surfaces,
             left_out,
-        } = prepared;
-        let mut estimated = Estimated {
-            estimates: self.estimate_rows(Some((&case.names, fit))),
-            combined: self.combined_rows(&case.names, fit),
+            ..
+        } = &self.prepared;
+        let row_maker = RowMaker::new(self.task);
+        Estimated {
+            estimates: row_maker.estimate_rows(Some((&case.names, fit))),
+            combined: row_maker.combined_rows(&case.names, fit),
             covariance: Covariance::of_fit(&case.names, fit),
             correlations: vec![],
-            history: Some(self.history(&case.measurements, fit, window, surfaces)),
-            fit: self.fit_row(fit, *left_out, start),
+            history: Some(row_maker.history(&case.measurements, fit, window, surfaces)),
+            fit: row_maker.fit_row(fit, *left_out, start),
             fit_outputs: vec![],
             noise: None,
             means: None,
-        };
-        add_second_opinion(&case.names, second, &mut estimated.estimates);
-        self.add_diagnostics(case, window, model, information, &mut estimated);
-        estimated
+        }
     }
 }
 

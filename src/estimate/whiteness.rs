@@ -48,7 +48,8 @@ pub(super) fn lag_one(measurements: &Measurements, computed: &[[f64; OUTPUTS]]) 
     })
 }
 
-pub(super) fn largest(values: [f64; OUTPUTS]) -> Option<f64> {
+/// Largest of the outputs' correlations.
+pub(super) fn largest_correlation(values: [f64; OUTPUTS]) -> Option<f64> {
     values.into_iter().reduce(f64::max)
 }
 

@@ -229,7 +229,7 @@ impl<'a> Step for PredictStep<'a> {
                 let context = context(self.config, self.member.delays);
                 prediction::maneuver(&record, maneuver, class, &context, self.own, &from)
             }
-            None => Predicted::none("the configuration has no such class", from.len()),
+            None => Predicted::not_predicted("the configuration has no such class", from.len()),
         };
         Ok(ComputedArtefact::Settled(predicted))
     }
@@ -249,10 +249,11 @@ pub fn predict(
         return Ok(());
     };
     let fits: Vec<FitRow> = estimates.iter().map(|e| e.fit.clone()).collect();
-    let sources = prediction::others(&campaign.maneuvers, &fits, settings);
+    let sources = prediction::predicting_maneuvers(&campaign.maneuvers, &fits, settings);
     let bring = |(i, sources): (usize, &Option<Vec<usize>>)| {
         let Some(sources) = sources else {
-            let predicted = Predicted::none("its own fit did not converge or is doubtful", 0);
+            let predicted =
+                Predicted::not_predicted("its own fit did not converge or is doubtful", 0);
             return Ok(Some(predicted));
         };
         let from = sources.iter().filter_map(|&j| {
@@ -273,7 +274,7 @@ pub fn predict(
                 };
                 Ok(runner.bring(&step)?.map(|brought| brought.artefact))
             }
-            None => Ok(Some(Predicted::none(
+            None => Ok(Some(Predicted::not_predicted(
                 "no other maneuver of its class and angle of attack",
                 0,
             ))),

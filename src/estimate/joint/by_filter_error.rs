@@ -1,13 +1,15 @@
 //! Joint estimation by filter error.
 
-use super::member::{Fitted, Member, is_own, starting_values};
+use super::member::{Fitted, Member, is_unshared, mean_of_own_estimates};
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
+use crate::estimate::air_motion::Air;
 use crate::estimate::filter_group::{FilterStart, Group, SlopeFit};
 use crate::estimate::filter_minimum::NoMinimum;
 use crate::estimate::group_member::GroupMember;
-use crate::estimate::in_gusts::Air;
+use crate::estimate::gust_size::{gust_ft_s, rotary_gust_deg_s};
+use crate::estimate::maneuver_filter::least_deviations;
 use crate::estimate::task::Task;
-use crate::estimate::whiteness::{lag_one, largest};
+use crate::estimate::whiteness::{lag_one, largest_correlation};
 use crate::filter_error::noise::Noise;
 use crate::output_error::sharing::SharedParameters;
 use crate::output_error::{Case, Fit, Outcome, Response};
@@ -33,11 +35,11 @@ impl<'m, 'a, const NX: usize, E: Equations<NX>> OwnEstimate<'m, 'a, NX, E> {
         member: &'m Member<'a, NX, E>,
     ) -> Result<Self, String> {
         let (task, prepared) = (&member.task, &member.prepared);
-        let wide = task.with_held_free(prepared);
+        let wide = prepared.with_held_free(task.context.aircraft);
         let implied = member.starts.implied.clone();
-        let air = task.filtered::<NX, E, NG, G>(prepared, &wide, implied, &member.alone);
+        let air = Air::estimate::<NX, E, NG, G>(task, prepared, &wide, implied, &member.alone);
         let air_is_still = matches!(air, Air::IsStill);
-        let deviations = || task.least_deviations(&prepared.case.measurements);
+        let deviations = || least_deviations(task, &prepared.case.measurements);
         let alone = |noise| (member.alone.clone(), noise, None);
         let (fit, noise, cost) = match air {
             Air::Moves(filtered) => (filtered.fit, filtered.noise, Some(filtered.cost)),
@@ -59,7 +61,7 @@ impl<'m, 'a, const NX: usize, E: Equations<NX>> OwnEstimate<'m, 'a, NX, E> {
 }
 
 /// Filter error on the sum of the costs, from the mean of the maneuvers' own estimates.
-pub fn fit<'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
+pub fn fit_jointly<'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
     task: &Task<'a>,
     own: &[OwnEstimate<'_, 'a, NX, E>],
 ) -> Result<Fitted, String> {
@@ -68,7 +70,7 @@ pub fn fit<'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG
         let label = o.member.task.maneuver.maneuver_id.as_str();
         (label, case.names.as_slice(), case.derivatives())
     });
-    let parameters = SharedParameters::new(named, |name| is_own(task, name))?;
+    let parameters = SharedParameters::new(named, |name| is_unshared(task, name))?;
     let members = own
         .iter()
         .map(|o| GroupMember::new(&o.member.task, &o.member.prepared, &o.wide));
@@ -87,7 +89,7 @@ pub fn fit<'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG
         noise: group.noise(&slope_fit),
         responses,
     };
-    air.add(own, &mut fitted.estimated.fit);
+    air.add_to(own, &mut fitted.estimated.fit);
     Ok(fitted)
 }
 
@@ -98,7 +100,7 @@ fn minimum<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
     own: &[OwnEstimate<NX, E>],
 ) -> Result<SlopeFit<NG, G>, NoMinimum> {
     let alone: Vec<&Fit> = own.iter().map(|o| &o.fit).collect();
-    let shared = starting_values(&alone, group.parameters.shared());
+    let shared = mean_of_own_estimates(&alone, group.parameters.shared());
     let values: Vec<Vec<f64>> = alone.iter().map(|fit| fit.values.clone()).collect();
     let start = |noise: Vec<Noise>| FilterStart {
         own: group.parameters.assemble(&shared, &values),
@@ -125,12 +127,16 @@ impl JointAir {
     /// Adds the gusts that the filters found to the row of `fits`: the root mean square of the
     /// maneuvers' gusts, and the largest correlation of innovations. The row has no cost of output
     /// error.
-    fn add<const NX: usize, E: Equations<NX>>(&self, own: &[OwnEstimate<NX, E>], row: &mut FitRow) {
+    fn add_to<const NX: usize, E: Equations<NX>>(
+        &self,
+        own: &[OwnEstimate<NX, E>],
+        row: &mut FitRow,
+    ) {
         let air = own.iter().zip(&self.noise).map(|(o, noise)| {
             let (task, case) = (&o.member.task, &o.member.prepared.case);
             (
-                task.gust_ft_s(noise, case.step_s),
-                task.rotary_gust_deg_s(noise),
+                gust_ft_s(task, noise, case.step_s),
+                rotary_gust_deg_s(task.class.axis, noise),
             )
         });
         let air: Vec<(f64, f64)> = air.collect();
@@ -141,7 +147,7 @@ impl JointAir {
         let correlations = own.iter().zip(&self.responses).map(|(o, response)| {
             let measured = &o.member.prepared.case.measurements;
             let correlations: [f64; OUTPUTS] = lag_one(measured, &response.outputs);
-            largest(correlations)
+            largest_correlation(correlations)
         });
         [row.initial_cost, row.final_cost] = [None; 2];
         row.method = Some(EstimationMethod::FilterError);

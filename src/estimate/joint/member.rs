@@ -3,9 +3,11 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::dynamics::Equations;
+use crate::estimate::air_motion::needs_filter;
 use crate::estimate::estimated::{Covariance, Estimated};
-use crate::estimate::fitting::StartingPoints;
+use crate::estimate::fitting::{StartingPoints, fit_output_error};
 use crate::estimate::prepared_case::PreparedCase;
+use crate::estimate::rows::RowMaker;
 use crate::estimate::task::Task;
 use crate::estimate::whiteness::is_white;
 use crate::maneuver::Status;
@@ -23,9 +25,9 @@ pub struct Member<'a, const NX: usize, E: Equations<NX>> {
 impl<'a, const NX: usize, E: Equations<NX>> Member<'a, NX, E> {
     /// Prepares a maneuver and estimates it alone by output error.
     pub fn new(task: Task<'a>) -> Result<Self, String> {
-        let prepared = task.prepare::<NX, E>(task.class_model()?)?;
-        let starts = task.starting_points(&prepared.case)?;
-        let (mut alone, _) = task.fit(&prepared.case, &starts)?;
+        let prepared = PreparedCase::new(&task, task.class_model()?)?;
+        let starts = StartingPoints::new(&task, &prepared.case)?;
+        let (mut alone, _) = fit_output_error(&task, &prepared.case, &starts)?;
         estimation::add_bounds(&prepared.case, &mut alone, &task.context.settings.iteration);
         Ok(Member {
             task,
@@ -37,8 +39,8 @@ impl<'a, const NX: usize, E: Equations<NX>> Member<'a, NX, E> {
 
     /// Returns true if filter error is to estimate the maneuver.
     pub fn needs_filter(&self) -> bool {
-        self.task
-            .needs_filter(&self.prepared.case.measurements, &self.alone)
+        let method = self.task.context.settings.method;
+        needs_filter(method, &self.prepared.case.measurements, &self.alone)
     }
 
     /// Returns true if the residuals of output error show no motion of the air.
@@ -65,26 +67,27 @@ impl Fitted {
         let names = names.to_vec();
         let is_shared =
             |row: &EstimateRow| row.status != Status::Estimated || names.contains(&row.derivative);
-        let rows = task.estimate_rows(Some((&names, fit))).into_iter();
+        let row_maker = RowMaker::new(task);
+        let rows = row_maker.estimate_rows(Some((&names, fit))).into_iter();
         let count = members.len().max(1) as f64;
         let left_out = members.map(|m| m.prepared.left_out).sum::<f64>() / count;
         let estimated = Estimated {
             estimates: rows.filter(is_shared).collect(),
-            combined: task.combined_rows(&names, fit),
+            combined: row_maker.combined_rows(&names, fit),
             correlations: vec![],
             covariance: Covariance::of_fit(&names, fit),
             history: None,
             fit_outputs: vec![],
             noise: None,
             means: None,
-            fit: task.fit_row(fit, left_out, StartingValues::SingleEstimates),
+            fit: row_maker.fit_row(fit, left_out, StartingValues::SingleEstimates),
         };
         Fitted { estimated, costs }
     }
 }
 
 /// Returns true for a derivative that each maneuver keeps to itself.
-pub fn is_own(task: &Task, name: &str) -> bool {
+pub fn is_unshared(task: &Task, name: &str) -> bool {
     let joint = task.context.settings.joint.as_ref();
     let share_constants = joint.is_some_and(|settings| settings.share_constants);
     !share_constants && task.is_constant(name)
@@ -92,7 +95,7 @@ pub fn is_own(task: &Task, name: &str) -> bool {
 
 /// Mean of the maneuvers' own derivatives, weighted by their covariances; the plain mean where these
 /// do not exist. `shared` has the places of the derivatives in each fit.
-pub fn starting_values(alone: &[&Fit], shared: &[usize]) -> Vec<f64> {
+pub fn mean_of_own_estimates(alone: &[&Fit], shared: &[usize]) -> Vec<f64> {
     let n = shared.len();
     let values = |fit: &&Fit| DVector::from_iterator(n, shared.iter().map(|&j| fit.values[j]));
     let estimate = |fit: &&Fit| {

@@ -20,6 +20,7 @@ use self::by_filter_error::OwnEstimate;
 use self::member::{Fitted, Member};
 use super::context::Context;
 use super::estimated::{Estimated, rejected_fit};
+use super::rows::RowMaker;
 use super::task::Task;
 use crate::aero::Axis;
 use crate::dynamics::{
@@ -108,6 +109,7 @@ impl<'r> Request<'r> {
         self.by_output_error(members, left_out)
     }
 
+    /// A maneuver, or the group as a whole, to be estimated with the class of the group.
     fn task<'t>(&self, record: &'t Record, maneuver: &'t Maneuver) -> Task<'t>
     where
         'r: 't,
@@ -138,11 +140,12 @@ impl<'r> Request<'r> {
         }
         let taking = own.iter().map(|o| (o.member.task.maneuver, o.cost));
         let taking: Vec<TakingPart> = taking.collect();
-        Some(self.joined(&taking, left_out, |task| {
-            by_filter_error::fit::<NX, E, NG, G>(task, &own)
+        Some(self.join(&taking, left_out, |task| {
+            by_filter_error::fit_jointly::<NX, E, NG, G>(task, &own)
         }))
     }
 
+    /// Estimates by output error, without the maneuvers whose own fit does not converge.
     fn by_output_error<const NX: usize, E: Equations<NX>>(
         &self,
         members: Vec<Member<'r, NX, E>>,
@@ -158,13 +161,13 @@ impl<'r> Request<'r> {
             .iter()
             .map(|member| (member.task.maneuver, member.alone.final_cost));
         let taking: Vec<TakingPart> = taking.collect();
-        self.joined(&taking, left_out, |task| {
-            by_output_error::fit(task, &members)
+        self.join(&taking, left_out, |task| {
+            by_output_error::fit_jointly(task, &members)
         })
     }
 
     /// Results of a group from its fit.
-    fn joined(
+    fn join(
         &self,
         taking: &[TakingPart<'r>],
         left_out: LeftOut<'r>,
@@ -189,7 +192,7 @@ impl<'r> Request<'r> {
             mut estimated,
             costs,
         } = fitted.unwrap_or_else(|reason| Fitted {
-            estimated: task.rejected(reason),
+            estimated: RowMaker::new(&task).rejected(reason),
             costs: vec![],
         });
         for (maneuver, reason) in &left_out {
@@ -198,24 +201,35 @@ impl<'r> Request<'r> {
                 estimated.fit.reason, maneuver.maneuver_id
             );
         }
-        let count = taking.len();
-        let row = |maneuver: &Maneuver, part| joint_row(&whole, count, maneuver, part);
-        let joined = taking.iter().enumerate();
-        let joined = joined.map(|(i, (maneuver, cost_alone))| JointRow {
-            cost_alone: *cost_alone,
-            cost_joint: costs.get(i).copied(),
-            ..row(maneuver, Participation::Joined)
-        });
-        let left_out = left_out.into_iter();
-        let left_out =
-            left_out.map(|(maneuver, reason)| row(maneuver, Participation::LeftOut(reason)));
         Joined {
-            members: joined.chain(left_out).collect(),
+            members: joint_rows(&whole, taking, left_out, &costs),
             estimated,
         }
     }
 }
 
+/// Rows of `joint`: of the maneuvers that take part, with their costs in the joint fit, and of those
+/// that are left out.
+fn joint_rows(
+    whole: &Maneuver,
+    taking: &[TakingPart],
+    left_out: LeftOut,
+    costs: &[f64],
+) -> Vec<JointRow> {
+    let count = taking.len();
+    let row = |maneuver: &Maneuver, part| joint_row(whole, count, maneuver, part);
+    let joined = taking.iter().enumerate();
+    let joined = joined.map(|(i, (maneuver, cost_alone))| JointRow {
+        cost_alone: *cost_alone,
+        cost_joint: costs.get(i).copied(),
+        ..row(maneuver, Participation::Joined)
+    });
+    let left_out = left_out.into_iter();
+    let left_out = left_out.map(|(maneuver, reason)| row(maneuver, Participation::LeftOut(reason)));
+    joined.chain(left_out).collect()
+}
+
+/// Mean of a quantity over maneuvers; zero without any.
 fn mean_of(maneuvers: &[&Maneuver], value: impl Fn(&Maneuver) -> f64) -> f64 {
     maneuvers.iter().map(|m| value(m)).sum::<f64>() / maneuvers.len().max(1) as f64
 }
@@ -246,6 +260,7 @@ fn mean_maneuver(joint_id: &str, maneuvers: &[&Maneuver]) -> Maneuver {
     }
 }
 
+/// Result of a group without maneuvers.
 fn without_members(whole: &Maneuver) -> Joined {
     let fit = rejected_fit(whole, "no maneuver to join".to_owned());
     Joined {
@@ -254,6 +269,7 @@ fn without_members(whole: &Maneuver) -> Joined {
     }
 }
 
+/// Row of a maneuver without its costs.
 fn joint_row(
     whole: &Maneuver,
     maneuvers: usize,

@@ -170,7 +170,7 @@ fn a_doubtful_maneuver_enters_no_prediction_and_no_joint_estimate() {
         fit(&maneuvers[1], Outcome::Converged),
         fit(&maneuvers[2], Outcome::Doubtful),
     ];
-    let sources = others(&maneuvers, &fits, &PredictionSettings::default());
+    let sources = predicting_maneuvers(&maneuvers, &fits, &PredictionSettings::default());
     assert_eq!(sources, [Some(vec![1]), Some(vec![0]), None]);
     let joined = joint::estimate(
         "joint/steps/20.20",

@@ -12,7 +12,7 @@ use approx::assert_relative_eq;
 
 use super::estimated::rejected_fit;
 use super::joint::{self, bins};
-use super::prediction::{self, others};
+use super::prediction::{self, predicting_maneuvers};
 use super::*;
 use crate::aero::{Axis, Bias, Buildup, Derivative, Output, WindTunnel};
 use crate::aircraft::Aircraft;
@@ -393,7 +393,7 @@ fn others_are_those_of_the_class_that_are_near_and_converged() {
     }
     let settings = bench.settings.prediction.unwrap();
     assert_eq!(
-        others(&maneuvers, &fits, &settings),
+        predicting_maneuvers(&maneuvers, &fits, &settings),
         [Some(vec![1]), Some(vec![0]), None, None]
     );
 }

@@ -5,24 +5,18 @@ use nalgebra::{DMatrix, DVector, SVector};
 use super::filter_group::{FilterStart, Group, SlopeFit};
 use super::filter_minimum::{Minimum, NoMinimum};
 use super::group_member::GroupMember;
+use super::gust_size::{gust_ft_s, rotary_gust_deg_s};
 use super::prepared_case::PreparedCase;
 use super::sensor_noise;
 use super::settings::Method;
 use super::task::Task;
-use super::whiteness::{is_white, lag_one, largest, white_cost};
-use crate::aero::Axis;
+use super::whiteness::{is_white, lag_one, largest_correlation, white_cost};
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
 use crate::filter_error::filter::Filter;
 use crate::filter_error::noise::Noise;
-use crate::flight::signal;
 use crate::output_error::equation_error::Regression;
 use crate::output_error::{Case, Fit, Measurements, Response};
 use crate::tables::{EstimationMethod, FitRow};
-use crate::units::DEG;
-
-/// Scale of turbulence at altitude, ft (MIL-F-8785C, Dryden): with it the random walk of the angle
-/// is the high-frequency part of a gust of some speed.
-const GUST_SCALE_FT: f64 = 1750.0;
 
 /// Ratio of a rotary gust to the standard deviation of its rate, above which the gust may have
 /// taken the place of the rate.
@@ -61,31 +55,31 @@ pub(super) enum Air {
     Unknown(NoMinimum),
 }
 
-impl<'a> Task<'a> {
-    /// Returns true if filter error is to estimate a maneuver with this fit by output error.
-    pub(super) fn needs_filter(&self, measurements: &Measurements, fit: &Fit) -> bool {
-        match self.context.settings.method {
-            Method::OutputError => false,
-            Method::FilterError => true,
-            Method::Auto => !is_white(measurements, fit),
-        }
+/// Returns true if filter error is to estimate a maneuver with this fit by output error.
+pub(super) fn needs_filter(method: Method, measurements: &Measurements, fit: &Fit) -> bool {
+    match method {
+        Method::OutputError => false,
+        Method::FilterError => true,
+        Method::Auto => !is_white(measurements, fit),
     }
+}
 
+impl Air {
     /// Estimates a maneuver by filter error. `wide` has the held derivatives free as well, and `implied`
     /// are the starting values by equation error.
-    pub(super) fn filtered<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
-        &self,
+    pub fn estimate<'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
+        task: &Task<'a>,
         prepared: &PreparedCase<'a, NX, E>,
         wide: &Case<NX, E>,
         implied: Vec<f64>,
         output_error: &Fit,
     ) -> Air {
-        let member = GroupMember::new(self, prepared, wide);
-        let group: Group<NX, E, NG, G> = Group::of_one(self, member);
+        let member = GroupMember::new(task, prepared, wide);
+        let group: Group<NX, E, NG, G> = Group::single(task, member);
         let constant = group.constant();
         let filters = group.filters(&constant, None);
-        let reached = reached(&group, &filters, implied, output_error);
-        let slope_fit = reached.and_then(|found| {
+        let found = minimise_from_two_starts(&group, &filters, implied, output_error);
+        let slope_fit = found.and_then(|found| {
             let slope_fit = group.slope_fit(constant, filters, found);
             Ok(group.with_slopes(slope_fit.ok_or(NoMinimum::Diverges)?))
         });
@@ -99,66 +93,29 @@ impl<'a> Task<'a> {
             return Air::IsStill;
         }
         let filtered = slope_fit.and_then(|slope_fit| {
-            Filtered::of_one(&group, &slope_fit, output_error).ok_or(NoMinimum::Diverges)
+            Filtered::new(&group, &slope_fit, output_error).ok_or(NoMinimum::Diverges)
         });
         match filtered {
             Ok(filtered) => Air::Moves(Box::new(filtered)),
             Err(why) => Air::Unknown(why),
         }
     }
-
-    /// Adds the gusts that the filter found to the row of `fits`.
-    pub(super) fn add_gusts(&self, filtered: &Filtered, step_s: f64, row: &mut FitRow) {
-        [row.initial_cost, row.final_cost] = filtered.output_error_costs;
-        row.method = Some(EstimationMethod::FilterError);
-        row.gust_ft_s = Some(self.gust_ft_s(&filtered.noise, step_s));
-        row.rotary_gust_deg_s = Some(self.rotary_gust_deg_s(&filtered.noise));
-        row.gust_corner_rad_s = Some(filtered.noise.corner);
-        row.autocorrelation = largest(filtered.autocorrelation);
-        row.likelihood_gain = filtered.likelihood_gain;
-    }
-
-    /// Speed of the gusts across the flight path, rms.
-    pub(super) fn gust_ft_s(&self, noise: &Noise, step_s: f64) -> f64 {
-        let maneuver = self.record.values(signal::VELOCITY).unwrap_or_default();
-        let velocities = maneuver.get(self.range()).unwrap_or_default();
-        let velocity = velocities.iter().sum::<f64>() / velocities.len().max(1) as f64;
-        let steps = GUST_SCALE_FT / (2.0 * velocity * step_s);
-        velocity * noise.angle * steps.sqrt()
-    }
-
-    /// Rotary gust, rms: of the axis's gusts the larger one.
-    pub(super) fn rotary_gust_deg_s(&self, noise: &Noise) -> f64 {
-        DEG * match self.class.axis {
-            Axis::Longitudinal => noise.gusts[0],
-            Axis::Lateral => noise.gusts[0].max(noise.gusts[1]),
-        }
-    }
-
-    /// Adds the residuals' correlation to the row of a fit by output error.
-    pub(super) fn add_still_air(measurements: &Measurements, fit: &Fit, row: &mut FitRow) {
-        row.method = Some(EstimationMethod::OutputError);
-        row.autocorrelation = largest(lag_one(measurements, &fit.response.outputs));
-    }
-
-    /// Starting values with the tunnel's derivatives.
-    pub(super) fn tunnel_start<const NX: usize, E: Equations<NX>>(
-        &self,
-        case: &Case<NX, E>,
-    ) -> Vec<f64> {
-        let maneuver = self.maneuver;
-        case.starting_values(|name| {
-            self.context
-                .start
-                .value(name, maneuver.alpha_deg, maneuver.mach)
-                .map_or(0.0, |v| v.value)
-        })
-    }
 }
 
 impl Filtered {
+    /// Adds the gusts that the filter found to the row of `fits`.
+    pub fn add_gusts(&self, task: &Task, step_s: f64, row: &mut FitRow) {
+        [row.initial_cost, row.final_cost] = self.output_error_costs;
+        row.method = Some(EstimationMethod::FilterError);
+        row.gust_ft_s = Some(gust_ft_s(task, &self.noise, step_s));
+        row.rotary_gust_deg_s = Some(rotary_gust_deg_s(task.class.axis, &self.noise));
+        row.gust_corner_rad_s = Some(self.noise.corner);
+        row.autocorrelation = largest_correlation(self.autocorrelation);
+        row.likelihood_gain = self.likelihood_gain;
+    }
+
     /// Result of the fit of one maneuver.
-    fn of_one<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
+    fn new<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
         group: &Group<NX, E, NG, G>,
         slope_fit: &SlopeFit<NG, G>,
         output_error: &Fit,
@@ -190,7 +147,7 @@ impl Filtered {
 ///
 /// # Errors
 /// Why no start leads to a minimum: the reason of the iteration that ended at the least cost.
-fn reached<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
+fn minimise_from_two_starts<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
     group: &Group<NX, E, NG, G>,
     filters: &[Filter<NG, G>],
     implied: Vec<f64>,

@@ -2,6 +2,7 @@
 //! error, or needs an error that no instrument has.
 
 use super::estimated::Estimated;
+use super::rows::RowMaker;
 use super::second_opinion::Distance;
 use super::settings::Doubtful;
 use super::task::Task;
@@ -23,60 +24,68 @@ pub(super) struct Explanation<'a> {
     pub second_opinion: &'a Regression,
 }
 
-impl Task<'_> {
-    /// Adds the agreement of a fit with the measured outputs and with equation error, and the outcome
-    /// `doubtful` with its reasons.
-    pub(super) fn add_agreement<const NX: usize, E: Equations<NX>>(
-        &self,
-        case: &Case<NX, E>,
-        fit: &Fit,
-        explanation: &Explanation,
-        estimated: &mut Estimated,
-    ) {
-        let outputs = explanation.outputs;
-        let agreements = outputs.map(|y| OutputAgreement::of_outputs(&case.measurements, y));
+/// A fit that is to be judged.
+pub(super) struct Credibility<'c, 'a, const NX: usize, E: Equations<NX>> {
+    pub task: &'c Task<'a>,
+    pub case: &'c Case<NX, E>,
+    pub fit: &'c Fit,
+    pub explanation: Explanation<'c>,
+}
+
+impl<const NX: usize, E: Equations<NX>> Credibility<'_, '_, NX, E> {
+    /// Adds the agreement of the fit with the measured outputs and with equation error, and the
+    /// outcome `doubtful` with its reasons.
+    pub fn add_to(&self, estimated: &mut Estimated) {
+        let outputs = self.explanation.outputs;
+        let agreements = outputs.map(|y| OutputAgreement::of_outputs(&self.case.measurements, y));
         let named = E::AXIS
             .outputs()
             .into_iter()
             .zip(agreements.iter().flatten());
-        estimated.fit_outputs = named.map(|(o, a)| self.agreement_row(o, a)).collect();
-        let distance = Distance::of(fit, explanation.second_opinion);
+        let rows = RowMaker::new(self.task);
+        estimated.fit_outputs = named.map(|(o, a)| rows.agreement_row(o, a)).collect();
+        let distance = Distance::between(self.fit, self.explanation.second_opinion);
         let row = &mut estimated.fit;
         row.equation_error_distance = distance.map(|d| d.per_derivative());
-        if fit.outcome != Outcome::Converged {
+        if self.fit.outcome != Outcome::Converged {
             return;
         }
-        let mut doubts = self.unexplained_outputs::<NX, E>(fit, explanation, agreements.as_ref());
-        doubts.extend(self.contradiction(distance));
-        doubts.extend(self.impossible_biases(case, fit));
-        doubts.extend(self.impossible_initial_states(case, fit));
+        let doubts = self.doubts(agreements.as_ref(), distance);
         if doubts.is_empty() {
             return;
         }
         let doubts = doubts.join("; ");
-        match self.context.settings.doubtful {
+        match self.task.context.settings.doubtful {
             Doubtful::LeaveOut => (row.outcome, row.reason) = (Outcome::Doubtful, doubts),
             Doubtful::Use => row.reason = format!("{}; used though {doubts}", row.reason),
         }
     }
 
-    /// Outputs that move and that a constant would fit better than the equations.
-    fn unexplained_outputs<const NX: usize, E: Equations<NX>>(
+    /// Reasons to doubt the fit; empty for a credible one.
+    fn doubts(
         &self,
-        fit: &Fit,
-        explanation: &Explanation,
         agreements: Option<&[OutputAgreement; OUTPUTS]>,
+        distance: Option<Distance>,
     ) -> Vec<String> {
+        let mut doubts = self.unexplained_outputs(agreements);
+        doubts.extend(self.contradiction(distance));
+        doubts.extend(self.impossible_biases());
+        doubts.extend(self.impossible_initial_states());
+        doubts
+    }
+
+    /// Outputs that move and that a constant would fit better than the equations.
+    fn unexplained_outputs(&self, agreements: Option<&[OutputAgreement; OUTPUTS]>) -> Vec<String> {
         let Some(agreements) = agreements else {
             return vec!["its equations diverge along the maneuver".to_owned()];
         };
-        let least = self.context.settings.doubt.r_squared;
+        let least = self.task.context.settings.doubt.r_squared;
         let mut doubts = Vec::new();
         for (o, output) in E::AXIS.outputs().into_iter().enumerate() {
             let ordinary = self.ordinary_bias(output).unwrap_or(0.0);
             let moves = agreements[o].measured_deviation() > ordinary;
-            let drifts = explanation.attitude_drifts && output.is_attitude();
-            let counts = moves && !drifts && fit.weights[o] > 0.0;
+            let drifts = self.explanation.attitude_drifts && output.is_attitude();
+            let counts = moves && !drifts && self.fit.weights[o] > 0.0;
             let share = agreements[o].r_squared().filter(|share| *share < least);
             if let Some(share) = share.filter(|_| counts) {
                 doubts.push(format!(
@@ -88,10 +97,11 @@ impl Task<'_> {
         doubts
     }
 
+    /// Reason for a fit that lies too far from equation error; `None` for one that agrees with it.
     fn contradiction(&self, distance: Option<Distance>) -> Option<String> {
         let distance = distance?;
         let probability = distance.probability();
-        (probability < self.context.settings.doubt.contradiction).then(|| {
+        (probability < self.task.context.settings.doubt.contradiction).then(|| {
             format!(
                 "its {} derivatives are {:.1} joint standard errors from equation error \
                  (probability {probability:.0e})",
@@ -102,15 +112,12 @@ impl Task<'_> {
     }
 
     /// Biases larger than an instrument can have, by more than their uncertainty.
-    fn impossible_biases<const NX: usize, E: Equations<NX>>(
-        &self,
-        case: &Case<NX, E>,
-        fit: &Fit,
-    ) -> Vec<String> {
+    fn impossible_biases(&self) -> Vec<String> {
+        let (case, fit) = (self.case, self.fit);
         let mut doubts = Vec::new();
         for (i, &o) in case.biased_outputs.iter().enumerate() {
             let j = case.derivatives() + i;
-            let error = self.impossible_error(E::AXIS.outputs()[o], fit, j, fit.values[j], 1.0);
+            let error = self.impossible_error(E::AXIS.outputs()[o], j, fit.values[j], 1.0);
             doubts.extend(error.map(|error| format!("{} is {error}", case.names[j])));
         }
         doubts
@@ -120,11 +127,8 @@ impl Task<'_> {
     /// uncertainty. The smaller of two distances counts: from the first sample, which may be an
     /// outlier, and from the mean of several, during which the aircraft may move. The first outputs
     /// are the measured states.
-    fn impossible_initial_states<const NX: usize, E: Equations<NX>>(
-        &self,
-        case: &Case<NX, E>,
-        fit: &Fit,
-    ) -> Vec<String> {
+    fn impossible_initial_states(&self) -> Vec<String> {
+        let (case, fit) = (self.case, self.fit);
         let first = case.parameters() - NX;
         let Some(measured) = case.motion.states.first() else {
             return vec![];
@@ -140,7 +144,7 @@ impl Task<'_> {
             } else {
                 changes[1]
             };
-            let error = self.impossible_error(output, fit, first + i, change, DEG);
+            let error = self.impossible_error(output, first + i, change, DEG);
             let name = &case.names[first + i];
             doubts
                 .extend(error.map(|error| format!("{name} differs from the measured by {error}")));
@@ -150,17 +154,10 @@ impl Task<'_> {
 
     /// Words for an error of an output that its instrument cannot have; `None` for one that it can.
     /// `unit` is the output's unit in that of the parameter `j`.
-    fn impossible_error(
-        &self,
-        output: Output,
-        fit: &Fit,
-        j: usize,
-        error: f64,
-        unit: f64,
-    ) -> Option<String> {
+    fn impossible_error(&self, output: Output, j: usize, error: f64, unit: f64) -> Option<String> {
         let ordinary = self.ordinary_bias(output)?;
-        let most = self.context.settings.doubt.ordinary_biases * ordinary;
-        let uncertainty = unit * fit.covariance_corrected.as_ref()?[(j, j)].sqrt();
+        let most = self.task.context.settings.doubt.ordinary_biases * ordinary;
+        let uncertainty = unit * self.fit.covariance_corrected.as_ref()?[(j, j)].sqrt();
         (error.abs() > most + NORMAL_95 * uncertainty).then(|| {
             format!(
                 "{error:.3} {}, {:.0} times the ordinary bias of its instrument",
@@ -170,8 +167,15 @@ impl Task<'_> {
         })
     }
 
+    /// Ordinary bias of an output's instrument; `None` where the configuration has none.
     fn ordinary_bias(&self, output: Output) -> Option<f64> {
-        let bias = self.context.settings.ordinary_bias.get(&output).copied();
+        let bias = self
+            .task
+            .context
+            .settings
+            .ordinary_bias
+            .get(&output)
+            .copied();
         bias.filter(|bias| *bias > 0.0)
     }
 }

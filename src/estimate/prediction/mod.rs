@@ -11,14 +11,19 @@
 //! noise of the maneuver's own fit. A prediction from one sample to the next follows any motion, so the
 //! computed outputs are those along the air's angle, as for the own fit: both compare.
 
+mod mean_of_others;
+
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
+use self::mean_of_others::mean_derivatives;
 use super::context::Context;
 use super::estimated::Estimated;
+use super::maneuver_filter::new_filter;
 use super::prepared_case::PreparedCase;
+use super::resting_surfaces::class_of_moving_surfaces;
+use super::rows::RowMaker;
 use super::settings::Hold;
 use super::settings::PredictionSettings;
 use super::task::Task;
@@ -30,11 +35,11 @@ use crate::filter_error::joint_filter::JointFilter;
 use crate::filter_error::noise::Noise;
 use crate::filter_error::scoring::minimise;
 use crate::flight::Record;
-use crate::maneuver::{Class, Maneuver, Status};
+use crate::maneuver::{Class, Maneuver};
 use crate::output_error::sharing::SharedParameters;
 use crate::output_error::theil::{self, OutputAgreement};
-use crate::output_error::{Case, Fit, Model, Outcome, cost, estimation, mean};
-use crate::tables::{AgreementRow, EstimateRow, FitRow, PredictedRow, PredictionStatus};
+use crate::output_error::{Case, Fit, Model, Outcome, cost, estimation};
+use crate::tables::{AgreementRow, FitRow, PredictedRow, PredictionStatus};
 
 /// Prediction of a maneuver: its columns of `fits`, and a row for each output.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -46,7 +51,7 @@ pub struct Predicted {
 impl Predicted {
     /// A maneuver that is not predicted, with the reason.
     #[must_use]
-    pub fn none(reason: impl Into<String>, others: usize) -> Predicted {
+    pub fn not_predicted(reason: impl Into<String>, others: usize) -> Predicted {
         let predicted_from = (others > 0).then_some(others);
         let summary = PredictedRow {
             prediction: Some(PredictionStatus::NotPredicted(reason.into())),
@@ -63,7 +68,7 @@ impl Predicted {
 /// Finds for each maneuver the others of its class and angle of attack whose fits converged; `None`
 /// for a maneuver whose own fit did not.
 #[must_use]
-pub fn others(
+pub fn predicting_maneuvers(
     maneuvers: &[Maneuver],
     fits: &[FitRow],
     settings: &PredictionSettings,
@@ -109,7 +114,7 @@ pub fn maneuver(
         class,
         context,
     };
-    let (class, _) = task.class_of_moving_surfaces();
+    let (class, _) = class_of_moving_surfaces(&task);
     let task = Task {
         class: &class,
         ..task
@@ -120,9 +125,10 @@ pub fn maneuver(
         }
         Axis::Lateral => predict::<4, Lateral, 6, LateralInGusts>(&task, own, others),
     };
-    predicted.unwrap_or_else(|reason| Predicted::none(reason, others.len()))
+    predicted.unwrap_or_else(|reason| Predicted::not_predicted(reason, others.len()))
 }
 
+/// Predicts a maneuver with the means of the others' derivatives.
 fn predict<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
     task: &Task,
     own: &Estimated,
@@ -134,41 +140,41 @@ fn predict<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
         Hold::Table => task.class_model()?,
         Hold::Evidence => task.model_without_held()?,
     };
-    let share_constants = settings
-        .prediction
-        .as_ref()
-        .is_some_and(|s| s.share_constants);
     let values: BTreeMap<&str, f64> = model
         .free
         .iter()
         .map(|d| d.name.as_str())
         .zip(mean_derivatives(task, &model.free, others)?)
         .collect();
-    let (kept, fixed): (Vec<&Derivative>, Vec<&Derivative>) = model
-        .free
-        .iter()
-        .partition(|d| !share_constants && task.is_constant(&d.name));
     let value = |name: &str| values.get(name).copied().unwrap_or(0.0);
-    let held = model
-        .held
-        .iter()
-        .copied()
-        .chain(fixed.into_iter().map(|d| (d, value(&d.name))));
-    let fixed = Model {
-        free: kept,
-        held: held.collect(),
-        ..model.clone()
-    };
-    let prepared = task.prepare::<NX, E>(fixed)?;
+    let prepared = PreparedCase::<NX, E>::new(task, with_others_held(task, &model, value))?;
     let start = prepared.case.starting_values(value);
     let by_output_error = predict_by_output_error(task, &prepared.case, &start)?;
     let prediction = match own.noise {
         Some(noise) => {
             predict_in_gusts::<NX, E, NG, G>(task, &prepared, &noise, by_output_error, start)?
         }
-        None => by_output_error.sound()?,
+        None => by_output_error.converged()?,
     };
-    Ok(rows(task, &prepared.case, &prediction, others.len()))
+    Ok(prediction_rows(
+        task,
+        &prepared.case,
+        &prediction,
+        others.len(),
+    ))
+}
+
+/// Model with the derivatives held at the values from the others. The constants stay free unless
+/// they are shared.
+fn with_others_held<'a>(task: &Task, model: &Model<'a>, value: impl Fn(&str) -> f64) -> Model<'a> {
+    let prediction = task.context.settings.prediction.as_ref();
+    let share_constants = prediction.is_some_and(|settings| settings.share_constants);
+    let is_kept = |d: &Derivative| !share_constants && task.is_constant(&d.name);
+    let mut fixed = model.clone();
+    fixed.free.retain(|d| is_kept(d));
+    let others = model.free.iter().filter(|d| !is_kept(d));
+    fixed.held.extend(others.map(|d| (*d, value(&d.name))));
+    fixed
 }
 
 /// Computed outputs of a prediction.
@@ -184,7 +190,7 @@ struct Prediction {
 
 impl Prediction {
     /// Prediction of output error that converged.
-    fn sound(self) -> Result<Prediction, String> {
+    fn converged(self) -> Result<Prediction, String> {
         match &self.cost {
             Ok(_) => Ok(self),
             Err(reason) => Err(reason.clone()),
@@ -192,6 +198,7 @@ impl Prediction {
     }
 }
 
+/// Fits what the prediction leaves free by output error, and computes the outputs.
 fn predict_by_output_error<const NX: usize, E: Equations<NX>>(
     task: &Task,
     case: &Case<NX, E>,
@@ -242,7 +249,7 @@ fn predict_in_gusts<const NX: usize, E: Equations<NX>, const NG: usize, G: InGus
     by_output_error: Prediction,
     start: Vec<f64>,
 ) -> Result<Prediction, String> {
-    let filter = task.filter::<NX, E, NG, G>(prepared, &prepared.window, &prepared.model);
+    let filter = new_filter::<NX, E, NG, G>(task, prepared, &prepared.window, &prepared.model);
     let own = SharedParameters::of_one(filter.names());
     let joint = JointFilter::new(std::slice::from_ref(&filter), &own).with_known_noise();
     let start = if by_output_error.cost.is_ok() {
@@ -264,75 +271,8 @@ fn predict_in_gusts<const NX: usize, E: Equations<NX>, const NG: usize, G: InGus
     })
 }
 
-/// Mean over the others of the derivatives that are free in the predicted maneuver; the tunnel's
-/// value of a derivative that none of them estimates.
-fn mean_derivatives(
-    task: &Task,
-    free: &[&Derivative],
-    others: &[&Estimated],
-) -> Result<Vec<f64>, String> {
-    let covered = |d: &&&Derivative| others.iter().any(|o| value(o, &d.name).is_some());
-    let wanted: Vec<&str> = free
-        .iter()
-        .filter(covered)
-        .map(|d| d.name.as_str())
-        .collect();
-    let estimates: Vec<mean::Estimate> =
-        others.iter().filter_map(|o| estimate(o, &wanted)).collect();
-    if estimates.is_empty() {
-        return Err("no other maneuver of its class and angle of attack".into());
-    }
-    let mean = mean::weighted(&estimates, wanted.len())
-        .ok_or("the others' covariances have no inverse")?;
-    let mean: BTreeMap<&str, f64> = wanted.into_iter().zip(mean.iter().copied()).collect();
-    let value = |d: &&Derivative| {
-        mean.get(d.name.as_str())
-            .copied()
-            .or_else(|| task.tunnel_value(&d.name))
-    };
-    free.iter()
-        .map(|d| value(d).ok_or_else(|| format!("none of the others estimates {}", d.name)))
-        .collect()
-}
-
-fn value(estimated: &Estimated, name: &str) -> Option<f64> {
-    let of_it = |row: &&EstimateRow| row.derivative == name && row.status == Status::Estimated;
-    estimated.estimates.iter().find(of_it)?.value
-}
-
-/// Estimates of the wanted derivatives by one maneuver, with their part of its covariance.
-fn estimate(estimated: &Estimated, wanted: &[&str]) -> Option<mean::Estimate> {
-    let covariance = estimated.covariance.as_ref()?;
-    let (mut places, mut at, mut values) = (Vec::new(), Vec::new(), Vec::new());
-    for (place, name) in wanted.iter().enumerate() {
-        let found = covariance
-            .names
-            .iter()
-            .position(|n| n == name)
-            .zip(value(estimated, name));
-        if let Some((i, value)) = found {
-            places.push(place);
-            at.push(i);
-            values.push(value);
-        }
-    }
-    let n = covariance.names.len();
-    let element = |i: usize, j: usize| {
-        covariance
-            .corrected
-            .get(at[i] * n + at[j])
-            .copied()
-            .unwrap_or(0.0)
-    };
-    let covariance = DMatrix::from_fn(at.len(), at.len(), element);
-    (!places.is_empty()).then(|| mean::Estimate {
-        places,
-        values: DVector::from_vec(values),
-        covariance,
-    })
-}
-
-fn rows<const NX: usize, E: Equations<NX>>(
+/// Columns of `fits`, and the rows of the outputs.
+fn prediction_rows<const NX: usize, E: Equations<NX>>(
     task: &Task,
     case: &Case<NX, E>,
     prediction: &Prediction,
@@ -342,6 +282,7 @@ fn rows<const NX: usize, E: Equations<NX>>(
     let weighted: Vec<(OutputAgreement, f64)> =
         agreements.iter().copied().zip(prediction.weights).collect();
     let named = || task.class.axis.outputs().into_iter().zip(&agreements);
+    let row_maker = RowMaker::new(task);
     let whole = theil::theil(&weighted);
     let summary = PredictedRow {
         prediction: Some(PredictionStatus::Predicted),
@@ -360,6 +301,8 @@ fn rows<const NX: usize, E: Equations<NX>>(
     };
     Predicted {
         summary,
-        outputs: named().map(|(o, a)| task.agreement_row(o, a)).collect(),
+        outputs: named()
+            .map(|(o, a)| row_maker.agreement_row(o, a))
+            .collect(),
     }
 }
