@@ -126,6 +126,93 @@ fn a_module_uses_only_modules_listed_above_it() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
+/// Largest number of files that hold methods of one type.
+const MOST_FILES: usize = 6;
+
+/// Largest number of methods of a type that has them in more than one file.
+const MOST_METHODS_OVER_FILES: usize = 35;
+
+/// Name of the type of an `impl` block, from its text after `impl` up to the brace; `None` for a
+/// block of a trait.
+fn inherent_type(header: &str) -> Option<&str> {
+    let header = header.split("where").next()?.trim();
+    if words(header).any(|word| word == "for") {
+        return None;
+    }
+    let mut depth = 0;
+    let mut before = ' ';
+    let is_end = |(at, c): (usize, char)| {
+        match c {
+            '<' => depth += 1,
+            '>' if before != '-' => depth -= 1,
+            _ => {}
+        }
+        before = c;
+        (depth == 0).then_some(at)
+    };
+    let generics = header.starts_with('<');
+    let end = header.char_indices().find_map(is_end)?;
+    let path = if generics { &header[end + 1..] } else { header };
+    words(path.split('<').next()?).last()
+}
+
+/// Numbers of methods by file of each type, which its module and name identify.
+fn methods(sources: &[Source]) -> BTreeMap<(&str, &str), BTreeMap<&str, usize>> {
+    let mut methods: BTreeMap<(&str, &str), BTreeMap<&str, usize>> = BTreeMap::new();
+    for source in sources {
+        let mut rest = source.bare.as_str();
+        while let Some(begin) = rest.find("\nimpl") {
+            let block = &rest[begin + "\nimpl".len()..];
+            let header = &block[..block.find('{').unwrap_or(block.len())];
+            let body = &block[header.len()..];
+            let length = if body.starts_with("{}") {
+                2
+            } else {
+                body.find("\n}").unwrap_or(body.len())
+            };
+            if let Some(name) = inherent_type(header) {
+                let count = body[..length].matches(" fn ").count();
+                let key = (source.module[0].as_str(), name);
+                let of_type = methods.entry(key).or_default();
+                *of_type.entry(source.path.as_str()).or_default() += count;
+            }
+            rest = &body[length..];
+        }
+    }
+    methods
+}
+
+#[test]
+fn methods_are_counted_by_type_and_file() {
+    let files = [
+        (
+            "a/mod.rs",
+            "struct T;\nimpl<F: Fn() -> u8> T<F> {\n    fn a() {}\n    fn b() {}\n}\nimpl Copy for T {}\nimpl Clone for T {\n    fn c() {}\n}\n",
+        ),
+        (
+            "a/b.rs",
+            "use super::T;\nimpl super::T<u8>\nwhere\n    u8: Copy,\n{\n    fn d() {}\n}\n",
+        ),
+    ];
+    let sources = files.map(|(path, text)| source(path.to_owned(), text));
+    let of_type = BTreeMap::from([("a/b.rs", 1), ("a/mod.rs", 2)]);
+    assert_eq!(methods(&sources), BTreeMap::from([(("a", "T"), of_type)]));
+}
+
+#[test]
+fn no_type_is_spread_over_a_module() {
+    let methods = methods(sources());
+    assert!(methods.len() > 300, "{}", methods.len());
+    let mut wrong = Vec::new();
+    for ((module, name), files) in &methods {
+        let total: usize = files.values().sum();
+        if files.len() > MOST_FILES || (files.len() > 1 && total > MOST_METHODS_OVER_FILES) {
+            wrong.push(format!("{module}: {name}: {total} methods: {files:?}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
 /// Values of a key in a YAML file.
 fn values(file: &Path, key: &str) -> Vec<String> {
     let text = fs::read_to_string(file).unwrap();
