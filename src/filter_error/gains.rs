@@ -142,8 +142,11 @@ impl<const NX: usize> PatternGain<NX> {
         })
     }
 
-    /// Slopes through the prediction's covariance and the outputs' slopes: dK = (dP Cᵀ + P dCᵀ −
-    /// K dS) S⁻¹.
+    /// Slope of the gain K along a parameter.
+    ///
+    /// P is the covariance of the prediction, C the slopes of the outputs along the states, S the
+    /// covariance of the innovations, and d a slope along the parameter: dK = (dP Cᵀ + P dCᵀ − K
+    /// dS) S⁻¹.
     #[inline(always)]
     fn slopes_along(
         &self,

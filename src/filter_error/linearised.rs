@@ -168,7 +168,9 @@ impl<const NX: usize> UnitSlopes<NX> {
 /// Order of the exponential: that of a Runge-Kutta step.
 const ORDER: usize = 4;
 
-/// exp A by Horner's rule: sums S₀ = 1 and S_n = 1 + A S_(n−1) / (5 − n), the last of which it is.
+/// Matrix exponential exp A to fourth order, by Horner's rule.
+///
+/// The sums are S₀ = 1 and S_n = 1 + A S_(n−1) / (5 − n); S₄ is the result.
 struct Exponential<const N: usize> {
     a: SMatrix<f64, N, N>,
     sums: [SMatrix<f64, N, N>; ORDER + 1],

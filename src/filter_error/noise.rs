@@ -218,9 +218,12 @@ impl Noise {
         !self.is_still() && (0..gusts).all(belongs)
     }
 
-    /// Steady gain of a filter for the angle alone, a random walk that the output `vane` measures:
-    /// with q and r the variances of walk and output, p = q/2 + √(q²/4 + q r) and K = p / (p + r).
-    /// Zero in still air.
+    /// Steady gain of a filter for the angle of the air alone, measured by the output `vane`; zero
+    /// in still air.
+    ///
+    /// Let q be the variance of the angle's random walk in a step and r the variance of the vane's
+    /// noise, both rad². The variance of the predicted angle is p = q/2 + √(q²/4 + q r), and the
+    /// gain p / (p + r).
     #[must_use]
     pub fn angle_gain(&self, vane: usize) -> f64 {
         if self.is_still() {
@@ -231,9 +234,11 @@ impl Noise {
         p / (p + r)
     }
 
-    /// Logarithm of a rotary gust over the size that the random walk of the angle implies. The gust
-    /// is the angle's rate, low-passed at the corner ω: white of intensity σ²/Δt becomes σ²ω/(2Δt)
-    /// (MIL-F-8785C).
+    /// Logarithm of a rotary gust's size over the size that the random walk of the angle implies.
+    ///
+    /// Let σ be the walk's standard deviation per sample, rad, Δt the sampling interval, s, and ω
+    /// the corner, rad/s. The rotary gust is the angle's rate, which is white with intensity σ²/Δt,
+    /// low-passed at ω. Its variance is therefore σ² ω/(2 Δt) (MIL-F-8785C).
     fn rotary_excess(&self, gust: usize, step_s: f64) -> f64 {
         let expected = self.angle * (self.corner / (2.0 * step_s)).sqrt();
         (self.gusts[gust] / expected).ln()

@@ -1,8 +1,20 @@
-//! Covariance of the steady filter's prediction: P = A (P − P Cᵀ S⁻¹ C P) Aᵀ + Q with
-//! S = C P Cᵀ + R.
+//! Covariance of the steady filter's prediction error, by the Riccati equation.
 //!
-//! It is solved by doubling: a round goes on by as many steps as all rounds before it. Slopes of P
-//! obey the closed loop's Lyapunov equation, which is doubled likewise.
+//! | symbol | quantity |
+//! |---|---|
+//! | A | change of the predicted state with the corrected state one step before |
+//! | C | change of the outputs with the state |
+//! | Q, R | covariances of the states' noise in a step and of the outputs' noise |
+//! | P, P⁺ | covariances of the predicted state's and of the corrected state's error |
+//! | S = C P Cᵀ + R | covariance of the innovations |
+//! | K = P Cᵀ S⁻¹ | gain |
+//! | Ā = A (1 − K C) | closed loop |
+//!
+//! P is constant from step to step: P = A (P − P Cᵀ S⁻¹ C P) Aᵀ + Q.
+//!
+//! The equation is solved by doubling: each round advances by as many steps as all rounds before
+//! it. The slope dP along a parameter obeys the Lyapunov equation of the closed loop, which is
+//! solved by doubling too.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use nalgebra::SMatrix;
@@ -94,10 +106,13 @@ impl<const NX: usize> SteadyFilter<NX> {
         }
     }
 
-    /// Slope of the prediction's covariance along a parameter.
+    /// Slope dP of the prediction's covariance along a parameter, from the slopes of the system.
     ///
-    /// The corrected covariance is stationary in the gain, so only changes of the system count:
+    /// With prefix d for a slope, and the symbols of this file,
+    ///
     /// dP = Ā dP Āᵀ + A [K dR Kᵀ − K dC P⁺ − (K dC P⁺)ᵀ] Aᵀ + dA P⁺ Aᵀ + A P⁺ dAᵀ + dQ.
+    ///
+    /// The slope of the gain does not enter, because the gain minimises P⁺.
     #[inline(always)]
     pub fn slope(&self, change: &SystemSlope<NX>) -> States<NX> {
         if self.powers.is_empty() {

@@ -1,19 +1,29 @@
 //! Slopes of the derivatives over α inside a maneuver, and their effect on the estimates.
 //!
 //! A slope is a derivative's change over α, as a share of the tunnel's change. The slopes have a
-//! normal prior about a common share λ. With information H and gradient g of −J at the fit, f the
-//! filter's own parameters and s the slopes,
+//! normal prior about a common share λ.
+//!
+//! | symbol | quantity |
+//! |---|---|
+//! | f, s | the filter's own parameters, and the slopes |
+//! | s₀ | slopes at which the fit held them |
+//! | H_ff, H_fs, H_ss | blocks of the information at the fit |
+//! | g_s | gradient of −J along s at the fit, plus V s₀ |
+//! | λ, w | common share, and standard deviation of a slope about it over λ |
+//! | m = λ 1, D = λ w 1 | prior mean of the slopes, and diagonal of their prior standard deviations |
+//! | V = H_ss − H_sf H_ff⁻¹ H_fs | information on the slopes with f eliminated |
+//! | G = H_ff⁻¹ H_fs | change of the estimates with the slopes, with reversed sign |
+//!
+//! For one share λ the slopes have the mean ŝ and the covariance P, the estimates of f change by −G
+//! (ŝ − s₀) with the covariance G P G', and the data have the likelihood p:
 //!
 //! ```text
-//! V = H_ss − H_sf H_ff⁻¹ H_fs        m = λ 1        D = λ w 1
-//! slopes   ŝ = m + P (g_s − V m)     P = D (1 + D V D)⁻¹ D
-//! estimates move by −G (ŝ − s₀)      with covariance G P G',  G = H_ff⁻¹ H_fs
+//! P = D (1 + D V D)⁻¹ D        ŝ = m + P (g_s − V m)
 //! p(data | λ) ∝ |1 + D V D|^(−½) exp(g_s' m − ½ m' V m + ½ (g_s − V m)' P (g_s − V m))
 //! ```
 //!
-//! where the fit held the slopes at s₀, and g_s is the gradient there plus V s₀. The result is the
-//! mean over λ. If the data show constant derivatives, the slopes come out near zero and move
-//! nothing.
+//! The result is the mean over the shares λ, weighted by p. If the data show constant derivatives,
+//! the slopes come out near zero and change nothing.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 

@@ -11,7 +11,11 @@ use super::term::{Term, between_points};
 use super::unknowns::{SparseRow, Unknowns, is_of_campaign};
 use crate::output_error::error_effect::SharedError;
 
-/// Evidence of a flight: y = A z + K u + e.
+/// Evidence of a flight, y = A z + K u + e.
+///
+/// z are the unknowns of the coefficient and A the rows of the estimates over z. u are the
+/// calibration errors of the flight, each with unit variance, and K their effects. e are the
+/// remaining errors.
 #[derive(Clone, Debug)]
 pub struct FlightData {
     /// Index of each maneuver in the evidence, and its rows.

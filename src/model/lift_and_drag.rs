@@ -4,17 +4,19 @@
 //! C_L = C_N cos α − C_A sin α        C_D = C_N sin α + C_A cos α
 //! ```
 //!
-//! at the maneuver's mean flight condition, and their slopes along each regressor. Along α the axes
-//! turn as well: ∂C_L/∂α has −C_D, ∂C_D/∂α has C_L, per rad. All are weighted sums of the
-//! derivatives. Let p be the estimated derivatives, with covariance Σ, and h the held ones. The
-//! held values have the error f of covariance C. The errors of p and h are G f + e and −f, so a sum
-//! has the variance
+//! Coefficients and their slopes along each regressor are given at the maneuver's mean flight
+//! condition. The axes turn with α, so ∂C_L/∂α also contains −C_D, and ∂C_D/∂α contains C_L, per
+//! rad. All are weighted sums of the derivatives, with weights w_p of the estimated derivatives and
+//! w_h of the held ones.
+//!
+//! Let Σ be the covariance of the estimates. Let C be the covariance of the held values: the
+//! tunnel's uncertainty, or the covariance of the other flights' posterior. If the held values have
+//! the error −f, the estimates have the error G f beside their own. A sum therefore has the
+//! variance
 //!
 //! ```text
 //! w_p' Σ w_p − 2 w_p' G C w_h + w_h' C w_h
 //! ```
-//!
-//! Held values have the tunnel's uncertainty, or that of the posterior of the other flights.
 
 use nalgebra::{DMatrix, DVector, Matrix2, RowDVector};
 

@@ -1,7 +1,10 @@
 //! Posterior of all flights but one.
 //!
-//! With K = Σ − A P Aᵀ of the flight's own rows, the posterior (m, P) of all flights becomes that of the
-//! others: m − P Aᵀ K⁻¹ (y − A m), P + P Aᵀ K⁻¹ A P.
+//! Let (m, P) be mean and covariance of the posterior from all flights, and y, A and Σ the
+//! differences, rows and error covariance of the flight to be left out ([`FlightData`]). With K = Σ
+//! − A P Aᵀ, the posterior of the other flights has
+//!
+//! mean m − P Aᵀ K⁻¹ (y − A m), covariance P + P Aᵀ K⁻¹ A P.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 

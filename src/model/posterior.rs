@@ -33,7 +33,10 @@ pub fn information(flights: &[FlightData], weights: &[f64], unknowns: usize) -> 
     sums
 }
 
-/// Posterior of the unknowns with a prior covariance R Rᵀ: P = R (I + Rᵀ Λ R)⁻¹ Rᵀ, mean P η.
+/// Posterior of the unknowns for a prior covariance given by its root R.
+///
+/// With the information matrix Λ and vector η of the data ([`Information`]), the prior covariance R
+/// Rᵀ gives the posterior covariance P = R (I + Rᵀ Λ R)⁻¹ Rᵀ and the mean P η.
 pub struct Solved<'a> {
     root: &'a BlockRoot,
     /// L with L Lᵀ = I + Rᵀ Λ R.
@@ -118,11 +121,20 @@ pub struct LeftOut {
     pub covariance: DMatrix<f64>,
 }
 
-/// Predictions of a flight's rows without these rows, in closed form.
+/// Predictions of a flight's rows from all other data, in closed form.
 ///
-/// With F = A P Aᵀ of the whole posterior and r = y − A m, the rows left out have the precision V⁻¹
-/// = Σ⁻¹ − Σ⁻¹ F Σ⁻¹ and the difference V Σ⁻¹ r. For some of the flight's rows the same holds with
-/// their part of V⁻¹.
+/// | symbol | quantity |
+/// |---|---|
+/// | y, A | differences of the flight's estimates from the tunnel, and their rows over the unknowns |
+/// | m, P | mean and covariance of the posterior from all data |
+/// | r = y − A m | residual of the rows |
+/// | Σ | covariance of the errors of y |
+/// | F = A P Aᵀ | covariance of the fitted values A m |
+/// | V | covariance of y less its prediction from the other data |
+///
+/// If the flight is left out, y less its prediction has the precision V⁻¹ = Σ⁻¹ − Σ⁻¹ F Σ⁻¹ and the
+/// value V Σ⁻¹ r. If only some of its rows are left out, their blocks of V⁻¹ and Σ⁻¹ r replace the
+/// whole ones.
 #[derive(Clone, Debug)]
 pub struct LeavingOut {
     /// V⁻¹.

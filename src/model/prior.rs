@@ -1,13 +1,21 @@
 //! Prior of one derivative's difference from the tunnel: a Gaussian process over the flight
 //! condition (Kennedy and O'Hagan 2001).
 //!
-//! With f the difference, t the tunnel's table over its root mean square ρ, s the relative size and ℓ
-//! the length of the difference,
+//! | symbol | quantity |
+//! |---|---|
+//! | f(α) | difference at the angle of attack α, in the derivative's unit |
+//! | ρ | root mean square of the tunnel's table, in the derivative's unit |
+//! | t | tunnel's value over ρ, at α; t′ at α′ |
+//! | s | relative size of the difference |
+//! | ℓ | length of the difference, deg |
+//! | M(d) | Matérn correlation of order 3/2 at the distance d in lengths |
 //!
-//! cov f(α), f(α′) = s² ρ² (½ + ½ t t′) · ⅘ (M(|α − α′|/ℓ) + ¼),  M(d) = (1 + √3 d) exp(−√3 d).
+//! With M(d) = (1 + √3 d) exp(−√3 d), the covariance is
 //!
-//! Half of the difference scales with the table, half does not. The quarter is an offset common to all
-//! angles of attack. Where the table states its uncertainty u, u u′ stands for ρ² (½ + ½ t t′).
+//! cov f(α), f(α′) = s² ρ² (½ + ½ t t′) · ⅘ (M(|α − α′|/ℓ) + ¼).
+//!
+//! Half of the difference scales with the table, half does not. The quarter is an offset common to
+//! all angles of attack. Where the table states its uncertainty u, u u′ stands for ρ² (½ + ½ t t′).
 //! Across Mach number and third variable M falls over the range of the table.
 
 use nalgebra::DMatrix;

@@ -1,14 +1,24 @@
 //! Weighted least squares in which one outlier distorts neither the coefficients nor τ.
 //!
-//! A residual beyond [`HUBER`] standard deviations counts as if it were at that limit: Huber's
-//! weights in the solution, his proposal 2 for τ. The covariance of the coefficients is that of an
-//! M-estimate (Huber 1981, section 7.6),
+//! | symbol | quantity | unit |
+//! |---|---|---|
+//! | n, p | number of points, number of coefficients | – |
+//! | b, τ | bound of a point, scatter between maneuvers | derivative |
+//! | V | diagonal matrix of the variances b² + τ² of the points | derivative² |
+//! | X | design: value of each basis function (column) at each point (row) | – |
+//! | u | residual of a point over its standard deviation √(b² + τ²) | – |
+//! | ψ(u) | u limited to ±[`HUBER`] | – |
+//! | m | share of the points with \|u\| up to [`HUBER`] | – |
+//! | K | correction for few points, 1 + (p/n)(1 − m)/m | – |
 //!
-//! K² · [Σψ²(uᵢ)/(n − p)] / m² · (Xᵀ V⁻¹ X)⁻¹, K = 1 + (p/n)(1 − m)/m,
+//! The solution weights a residual beyond [`HUBER`] standard deviations as if it were at that limit
+//! (Huber's weights); τ² is Huber's proposal 2. The coefficients are an M-estimate, whose
+//! covariance is (Huber 1981, section 7.6)
 //!
-//! with u the residuals over their standard deviations, ψ limiting them at [`HUBER`], m the share
-//! that is not limited and V = b² + τ². The bracket scales the covariance by the actual residuals
-//! instead of those that bounds and τ predict, which matters with few data.
+//! K² · [Σψ²(u)/(n − p)] / m² · (Xᵀ V⁻¹ X)⁻¹.
+//!
+//! The bracket scales the covariance by the actual residuals instead of the residuals that bounds
+//! and τ predict, which matters with few data.
 
 use nalgebra::{DMatrix, DVector};
 

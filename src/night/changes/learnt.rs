@@ -1,7 +1,9 @@
-//! Information of the flights since the last night about each derivative, in nats.
+//! Information that the flights since the earlier night gave about each derivative, in nats.
 //!
-//! With the posterior of a derivative at the tunnel's breakpoints N(m₀, P₀) in the earlier night and
-//! N(m, P) now, it is their Kullback-Leibler divergence
+//! Let m₀ and P₀ be mean and covariance of a derivative's posterior at n points, the tunnel's
+//! breakpoints, in the earlier night. Let m and P be mean and covariance now. The information is
+//! the Kullback-Leibler divergence of the two posteriors,
+//!
 //! ½ (tr P₀⁻¹P − n + (m − m₀)' P₀⁻¹ (m − m₀) + ln |P₀| − ln |P|).
 
 use std::collections::BTreeMap;

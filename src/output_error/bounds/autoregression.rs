@@ -1,8 +1,10 @@
-//! Noise of one output as an autoregressive process: v_k + Σ a_j v_{k−j} = e_k with white e.
+//! Noise of one output as an autoregressive process.
 //!
-//! The process follows from autocovariances by the recursion of Levinson and Durbin, in the order
-//! of the least information criterion (Akaike's, corrected for few samples). White noise has order
-//! 0.
+//! The noise v at sample k follows from the samples before it and white noise e, with the
+//! coefficients a_j: v_k + Σ a_j v_{k−j} = e_k.
+//!
+//! The process is fitted to autocovariances by the recursion of Levinson and Durbin. Its order has
+//! the least information criterion (Akaike's, corrected for few samples). White noise has order 0.
 
 /// Autoregressive process.
 #[derive(Clone, Debug, PartialEq)]

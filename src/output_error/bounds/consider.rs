@@ -1,5 +1,8 @@
-//! "Consider" covariance: the effect of the held values' uncertainty on the estimates, G P Gᵀ with
-//! G = −H⁻¹ Σ S_fᵀ W S_h.
+//! "Consider" covariance: effect of the uncertainty of held values on the estimates.
+//!
+//! Let S_f and S_h be the sensitivities to free parameters and to held values, W the weights, H the
+//! information on the free parameters, and P the covariance of the held values. The covariance is G
+//! P Gᵀ with G = −H⁻¹ Σ S_fᵀ W S_h.
 
 use std::collections::BTreeMap;
 

@@ -1,12 +1,20 @@
 //! Agreement of a computed response with the measured one: Theil's inequality coefficient with its
 //! parts, and R².
 //!
-//! U = √(Σ (y−z)²/n) / (√(Σ z²/n) + √(Σ y²/n)), from 0 (perfect) to 1 (no relation). The mean
-//! square in the numerator splits exactly into three parts: the squared difference of the means
-//! (bias), the squared difference of the standard deviations (variance), and 2 (1 − ρ) σ_y σ_z
-//! (covariance). Each part is given as its share (Theil 1966; Klein and Morelli 2006, section 11.3;
-//! Jategaonkar 2015, section 11.4). A good model leaves almost nothing to bias and variance. R² = 1
-//! − Σ (z−y)² / Σ (z−z̄)² is one for a perfect prediction and can be negative.
+//! Let z be the n measured and y the computed values of one output. Theil's coefficient is
+//!
+//! U = √(Σ (y−z)²/n) / (√(Σ z²/n) + √(Σ y²/n)),
+//!
+//! from 0 (perfect) to 1 (no relation). The mean square in the numerator is the sum of three parts,
+//! each published as its share (Theil 1966; Klein and Morelli 2006, section 11.3; Jategaonkar 2015,
+//! section 11.4):
+//!
+//! - bias: squared difference of the means;
+//! - variance: squared difference of the standard deviations σ_y and σ_z;
+//! - covariance: 2 (1 − ρ) σ_y σ_z, with ρ the correlation of y and z.
+//!
+//! A good model leaves almost nothing to bias and variance. R² = 1 − Σ (z−y)² / Σ (z−z̄)² is one
+//! for a perfect prediction and can be negative.
 
 use crate::dynamics::OUTPUTS;
 use crate::output_error::case::Measurements;
