@@ -1,6 +1,6 @@
-//! Comparison of a campaign with an earlier one: the trend of each derivative's group with the
-//! earlier trend of that group, z = (now − before) / √(standard error now² + standard error
-//! before²).
+//! Comparison of a campaign with an earlier one: the trend of each derivative's group is compared
+//! with the earlier trend of that group. z is the difference over its standard error, the root of
+//! the sum of both squared standard errors.
 //!
 //! If both campaigns share flights, their errors are not independent, and z is too small: the
 //! comparison may miss small changes, but reports no false ones.
@@ -15,7 +15,7 @@ use crate::trend;
 /// An earlier campaign's published trends.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Earlier {
-    /// The folder, as the analyst names it.
+    /// Folder as the analyst names it.
     pub name: String,
     pub trends: Vec<PublishedTrend>,
 }

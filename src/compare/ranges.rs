@@ -220,7 +220,8 @@ fn range_in_words(
 }
 
 /// Size of a disagreement in words: the median in percent of the other value's magnitude, with the
-/// extremes if they are far from the median; in the derivative's unit if the other value is zero.
+/// extremes if they are far from the median. If the other value is zero, the size is in the
+/// derivative's unit.
 fn extent_in_words(run: &[ComparedAlpha]) -> String {
     let mut shares: Vec<f64> = run
         .iter()

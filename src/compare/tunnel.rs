@@ -78,7 +78,8 @@ fn compare_derivative(
     alphas.into_iter().filter_map(row).collect()
 }
 
-/// Distance of a row from a condition: by Mach number first, then by the third variable.
+/// Distances of a row from a condition in Mach number and third variable, for comparison in this
+/// order.
 fn distance(row: &PosteriorRow, condition: Option<&Condition>) -> (f64, f64) {
     let apart = |a: Option<f64>, b: Option<f64>| a.zip(b).map_or(0.0, |(a, b)| (a - b).abs());
     (

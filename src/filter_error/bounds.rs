@@ -1,8 +1,9 @@
 //! Covariance of the estimates of filter error, with the effects of held values and of calibration
 //! errors through the filter's own weights.
 //!
-//! The white covariance is H⁻¹. The corrected one takes the innovations' autocovariance as that of
-//! output error takes the residuals', and is never below the white one.
+//! If the innovations are white, the covariance is the inverse H⁻¹ of the information matrix. The
+//! corrected covariance uses the autocovariance of the innovations, as output error uses that of
+//! the residuals. It is never below H⁻¹.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -27,15 +28,16 @@ use crate::output_error::sharing::{SharedParameters, add_matrix, add_vector};
 pub struct Bounds {
     pub covariance: DMatrix<f64>,
     pub condition_number: f64,
-    /// H⁻¹ of the filter's own parameters at known noise.
+    /// Inverse H⁻¹ of the information on the filter's own parameters, with the noise held at its
+    /// estimate.
     inverse: DMatrix<f64>,
 }
 
 /// Computes the bounds of a fit.
 ///
 /// # Errors
-/// Condition number and parameters of the least determined direction, where the data determine no
-/// covariance.
+/// If the data determine no covariance: condition number, and the parameters of the least
+/// determined direction.
 pub fn bounds<const NX: usize, E: InGusts<NX>>(
     filter: &JointFilter<NX, E>,
     scored: &Scored,
@@ -154,7 +156,8 @@ impl Bounds {
     }
 }
 
-/// Pass with the held derivatives, and slopes over α, free as well, at a fit.
+/// Information at a fit from a wide filter, in which held derivatives and slopes over α are free as
+/// well.
 #[derive(Debug)]
 pub struct WidePass {
     /// Names of the filter's own parameters.
@@ -166,8 +169,8 @@ pub struct WidePass {
 }
 
 impl WidePass {
-    /// Computes the pass of `wide` at the fit of `filter`. `values` has every parameter by name;
-    /// those without a value are zero. `None` if the wide filter diverges.
+    /// Computes the pass of the wide filter `wide` at the fit of `filter`. `values` has the
+    /// parameters by name; a parameter without a value is zero. `None` if the wide filter diverges.
     #[must_use]
     pub fn of<const NX: usize, E: InGusts<NX>>(
         filter: &Filter<NX, E>,
@@ -187,8 +190,8 @@ impl WidePass {
         })
     }
 
-    /// Joins the passes of maneuvers whose own parameters have these places. Held derivatives and
-    /// slopes of one name are common to the maneuvers.
+    /// Joins the passes of maneuvers; `own` places their own parameters in the joint fit. Held
+    /// derivatives and slopes of one name are common to the maneuvers.
     #[must_use]
     pub fn joined(members: &[WidePass], own: &SharedParameters) -> Self {
         let mut names: Vec<String> = vec![];
@@ -218,7 +221,7 @@ impl WidePass {
         }
     }
 
-    /// Names of the parameters among those of all maneuvers.
+    /// Names of the parameters of one maneuver in the joint fit.
     fn joint_names<'n>(&'n self, own: &'n SharedParameters, member: usize) -> Vec<&'n String> {
         let places = own.places(member);
         let joint = |name: &'n String| {
@@ -249,8 +252,8 @@ impl WidePass {
         uncertainties.iter().map(shift).collect()
     }
 
-    /// Effect of slopes of these sizes on the estimates; `values` has those at which the fit held
-    /// them.
+    /// Effect on the estimates of slopes over α with these prior sizes. `values` has the slopes at
+    /// which the fit held them.
     #[must_use]
     pub fn slope_effect(
         &self,

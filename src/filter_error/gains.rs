@@ -24,9 +24,10 @@ pub(super) struct Pattern {
 #[derive(Clone, Debug)]
 pub(super) struct PatternGain<const NX: usize> {
     pub gain: Gain<NX>,
-    /// S⁻¹; zero along outputs that do not count.
+    /// Inverse S⁻¹ of the innovations' covariance; zero for outputs that do not count.
     pub inverse: Outputs,
-    /// L⁻¹ with S = L Lᵀ, which makes the innovations white; zero likewise.
+    /// Matrix L⁻¹ with S = L Lᵀ, by which the innovations become white; zero for outputs that do
+    /// not count.
     pub whitening: Outputs,
     pub log_determinant: f64,
     /// Slopes of gain and S along each parameter that has any.
@@ -47,8 +48,8 @@ pub(super) struct ParameterSlope<const NX: usize> {
     pub system: SystemSlope<NX>,
 }
 
-/// Variances of the outputs for the steady filter: that of an output that counts in only a share of
-/// the samples is divided by this share.
+/// Variances of the outputs' noise for the steady filter. If an output counts in only a share of
+/// the samples, its variance is divided by this share.
 pub(super) fn steady_variances(noise: &Noise, patterns: &[Pattern]) -> [f64; OUTPUTS] {
     let all: usize = patterns.iter().map(|p| p.samples).sum();
     std::array::from_fn(|o| noise.outputs[o].powi(2) / share(o, patterns, all))
@@ -99,7 +100,7 @@ pub(super) fn gains<const NX: usize>(
 }
 
 impl<const NX: usize> PatternGain<NX> {
-    /// Gain that corrects nothing.
+    /// Gain of zero.
     pub fn none() -> Self {
         PatternGain {
             gain: Gain::zeros(),

@@ -1,8 +1,9 @@
-//! Filters of several maneuvers that share derivatives: one cost, the sum over the maneuvers. Each
-//! keeps its biases, initial states, derivatives that act as biases, and its noise with the gains.
-//! The filter of one maneuver is that of a group of one.
+//! Filters of several maneuvers that share derivatives. The cost is the sum over the maneuvers.
+//! Each maneuver keeps its own biases, initial states, derivatives that act as biases, noise and
+//! gains. A single maneuver is treated as a group of one.
 //!
-//! Parameters in order: the shared derivatives, each maneuver's own ones, then each maneuver's noise.
+//! Parameters in order: the shared derivatives, each maneuver's own parameters, then each
+//! maneuver's noise.
 
 use std::ops::Range;
 
@@ -18,7 +19,7 @@ use crate::output_error::sharing::{SharedParameters, add_matrix, add_vector, val
 #[derive(Debug)]
 pub struct JointFilter<'f, const NX: usize, E: InGusts<NX>> {
     filters: &'f [Filter<NX, E>],
-    /// Derivatives, biases and initial states.
+    /// Derivatives, biases and initial states of all maneuvers, with their places.
     own: &'f SharedParameters,
     noise_is_known: bool,
 }
@@ -28,7 +29,7 @@ pub struct JointFilter<'f, const NX: usize, E: InGusts<NX>> {
 pub struct JointResponse {
     /// Response of each maneuver.
     pub members: Vec<Response>,
-    /// J with the priors' part.
+    /// Cost J of all maneuvers, priors included.
     pub cost: f64,
 }
 
@@ -199,7 +200,8 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
         own.into_iter().chain(noise).collect()
     }
 
-    /// Fixes known noise, and the corner and the correlations of rotary gusts that are fixed themselves.
+    /// Marks parameters as fixed: all noise if it is known; else corner and correlations of those
+    /// rotary gusts whose size is fixed.
     pub(super) fn fix_noise(&self, free: &mut [bool]) {
         if self.noise_is_known {
             free[self.first_noise()..].fill(false);

@@ -1,5 +1,6 @@
-//! Mean linear system of a maneuver. Rates and outputs are linear in the coefficients, and these in
-//! the derivatives, so its slopes are affine in the derivatives: A = A₀ + Σ ξ_j A_j.
+//! Mean linear system of a maneuver. Rates and outputs are linear in the coefficients, and the
+//! coefficients in the derivatives ξ_j. The slopes along the states are therefore affine in the
+//! derivatives: A = A₀ + Σ ξ_j A_j.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use nalgebra::{SMatrix, SVector};
@@ -27,7 +28,7 @@ struct Slopes<const NX: usize> {
     outputs: SMatrix<f64, OUTPUTS, NX>,
 }
 
-/// System of one step: x(k+1) = Φ x(k), y(k) = C x(k).
+/// System of one step with the states x and outputs y: x(k+1) = Φ x(k), y(k) = C x(k).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Discrete<const NX: usize> {
     pub step: SMatrix<f64, NX, NX>,
@@ -111,7 +112,7 @@ impl<const NX: usize> Linearised<NX> {
 
 /// Slopes of rates and outputs at one sample, by coefficient.
 struct UnitSlopes<const NX: usize> {
-    /// At zero coefficients.
+    /// Slopes at zero coefficients.
     still: Slopes<NX>,
     /// Changes of the slopes at constant coefficients, per unit of each coefficient.
     changes: [Slopes<NX>; COEFFICIENTS],
@@ -187,7 +188,7 @@ impl<const N: usize> Exponential<N> {
         Exponential { a, sums }
     }
 
-    /// Slope along dA.
+    /// Slope of exp A along the change dA of A.
     #[inline(always)]
     fn slope(&self, change: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
         let mut slope = SMatrix::zeros();
@@ -198,5 +199,5 @@ impl<const N: usize> Exponential<N> {
     }
 }
 
-/// 1/(5 − n) at the n-th sum.
+/// Factor 1/(5 − n) of the n-th sum.
 const SHARES: [f64; ORDER] = [1.0 / 4.0, 1.0 / 3.0, 1.0 / 2.0, 1.0];

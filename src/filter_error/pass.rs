@@ -35,15 +35,15 @@ use crate::output_error::kernel::trajectory::{STATE_BOUND, StageHistory, Traject
 /// Gain of a pattern with its slopes in the lanes of the parameters.
 pub(super) struct LaneGain<const NX: usize> {
     gain: Gain<NX>,
-    /// −K, by which a state's sensitivities follow those of the outputs.
+    /// Matrix −K: change of the state's sensitivities with the outputs' sensitivities.
     reaction: Gain<NX>,
     whitening: Outputs,
     /// Slopes of the gain: state by state, output by output.
     slopes: LaneBlocks,
 }
 
-/// Rows of numbers in the lanes of the parameters, so that the rows of a widest vector stand together:
-/// vector by vector, row by row.
+/// Rows of numbers in the lanes of the parameters. They are stored vector by vector, and for each
+/// of the widest vectors row by row.
 pub(super) struct LaneBlocks {
     values: AlignedBuffer,
     rows: usize,
@@ -62,7 +62,7 @@ impl LaneBlocks {
         self.values.slice_mut()[(block + row) * VECTOR + lane % VECTOR] = value;
     }
 
-    /// Rows of the vector at a lane; `rows` is their number, which the compiler knows.
+    /// Rows of the vector at a lane; `rows` is their number, a constant when compiled.
     #[inline(always)]
     fn at<S: Simd>(&self, rows: usize, lane: usize) -> LaneRows<'_, S> {
         let first = lane / VECTOR * rows * VECTOR;
@@ -117,7 +117,7 @@ pub(super) struct Corrections<'a, const NX: usize> {
     pub biases: [f64; OUTPUTS],
     /// Lanes of the biases: output by output, one where a bias shifts the output.
     pub bias_rows: LaneBlocks,
-    /// Share of a rotary gust that is left after a step, and its slope in each lane.
+    /// Share of a rotary gust that remains after a step, and its slope in each lane.
     pub decay: f64,
     pub decay_row: AlignedBuffer,
 }
@@ -127,7 +127,7 @@ pub(super) struct PassOutputs<'a> {
     /// Predicted outputs.
     pub predicted: &'a mut [[f64; OUTPUTS]],
     pub innovations: &'a mut [[f64; OUTPUTS]],
-    /// Innovations made white.
+    /// Innovations made white with unit variance.
     pub whitened: &'a mut [[f64; OUTPUTS]],
 }
 
@@ -175,7 +175,8 @@ impl RecordedRows {
         }
     }
 
-    /// Σ s u over all samples and outputs, lane by lane.
+    /// Sum Σ s u of the sensitivities s times the values u, over all samples and outputs, lane by
+    /// lane.
     pub fn weighted_sum(&self, values: &[[f64; OUTPUTS]]) -> Vec<f64> {
         Arch::new().dispatch(WeightedSum {
             rows: self,
@@ -249,7 +250,7 @@ pub(super) struct FilterPass<'a, const NX: usize, E: InGusts<NX>, K: RowSink> {
     pub sink: Option<&'a mut K>,
 }
 
-/// Samples of a chunk as the filter meets them.
+/// Corrections at the samples of one chunk.
 struct ChunkCorrections<'a, const NX: usize, E> {
     corrections: &'a Corrections<'a, NX>,
     /// Slots of products of a state: (slot, state).

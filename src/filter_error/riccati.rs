@@ -29,32 +29,32 @@ const SETTLED: f64 = 1e-13;
 
 /// Square matrix of the states.
 pub(super) type States<const NX: usize> = SMatrix<f64, NX, NX>;
-/// Outputs along the states.
+/// Slopes of the outputs along the states (C).
 pub(super) type Observation<const NX: usize> = SMatrix<f64, OUTPUTS, NX>;
 
-/// Linear system with noise.
+/// Linear system with noise: the matrices A, C and Q, and the diagonal of R.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NoisySystem<const NX: usize> {
     pub a: States<NX>,
     pub c: Observation<NX>,
     pub q: States<NX>,
-    /// Variances of the outputs.
+    /// Variances of the outputs' noise, the diagonal of R.
     pub r: [f64; OUTPUTS],
 }
 
 /// Change of a system along a parameter.
 pub(super) type SystemSlope<const NX: usize> = NoisySystem<NX>;
 
-/// Covariances of the steady filter.
+/// Steady filter of a system: gain and error covariances.
 #[derive(Clone, Debug)]
 pub(super) struct SteadyFilter<const NX: usize> {
-    /// Covariance of the prediction.
+    /// Covariance P of the predicted state.
     pub prediction: States<NX>,
-    /// Covariance of the corrected state.
+    /// Covariance P⁺ of the corrected state.
     corrected: States<NX>,
     gain: SMatrix<f64, NX, OUTPUTS>,
     pub system: NoisySystem<NX>,
-    /// Closed loop A (1 − K C), and its powers 2, 4, 8, ….
+    /// Closed loop Ā, and its powers 2, 4, 8, ….
     powers: Vec<States<NX>>,
 }
 
@@ -84,7 +84,7 @@ impl<const NX: usize> SteadyFilter<NX> {
         Some(filter)
     }
 
-    /// Filter without process noise: it corrects nothing, whether or not the airframe is stable.
+    /// Filter without process noise: its gain is zero, whether or not the airframe is stable.
     pub fn still(system: NoisySystem<NX>) -> Self {
         SteadyFilter {
             prediction: States::zeros(),
@@ -136,7 +136,8 @@ impl<const NX: usize> SteadyFilter<NX> {
     }
 }
 
-/// Doubles the Riccati recursion until it settles.
+/// Solves for P by doubling the Riccati recursion until it settles; `None` if it does not stay
+/// finite.
 #[inline(always)]
 fn solve<const NX: usize>(system: &NoisySystem<NX>) -> Option<States<NX>> {
     let mut information = Observation::<NX>::zeros();

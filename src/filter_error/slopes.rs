@@ -27,17 +27,17 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-/// Shares λ: from derivatives that are constant to changes half as large again as the tunnel's.
+/// Shares λ: from 0, constant derivatives, to 1.5, changes half as large again as the tunnel's.
 const SHARES: [f64; 7] = [0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5];
 
-/// Standard deviation w of a slope about the common share. A table with errors of 20 % is not only
-/// scaled; it also has another shape over α.
+/// Standard deviation w of a slope about the common share, over that share. A table with errors of
+/// 20 % is not only scaled; it also has another shape over α.
 const SCATTER: f64 = 0.5;
 
 /// Effect of the slopes on the estimates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SlopeEffect {
-    /// Slopes.
+    /// Mean ŝ of the slopes.
     pub slopes: DVector<f64>,
     /// Change of the filter's own parameters.
     pub change: DVector<f64>,
@@ -46,7 +46,7 @@ pub struct SlopeEffect {
 }
 
 impl SlopeEffect {
-    /// Turns the change of the estimates into an uncertainty.
+    /// Adds the square of the change to the covariance, and leaves the estimates unchanged.
     pub fn become_uncertainty(&mut self) {
         self.covariance += &self.change * self.change.transpose();
         self.change.fill(0.0);
@@ -56,11 +56,11 @@ impl SlopeEffect {
 /// Blocks of the information on own parameters and slopes, with the slopes' gradient.
 #[derive(Clone, Debug)]
 pub struct SlopeInformation {
-    /// H_ff⁻¹.
+    /// Inverse H_ff⁻¹.
     pub inverse: DMatrix<f64>,
-    /// H_fs.
+    /// Block H_fs.
     pub cross: DMatrix<f64>,
-    /// H_ss.
+    /// Block H_ss.
     pub slopes: DMatrix<f64>,
     /// Gradient of −J along the slopes.
     pub gradient: DVector<f64>,
@@ -68,7 +68,7 @@ pub struct SlopeInformation {
     pub held_at: DVector<f64>,
 }
 
-/// Slopes for one share of the tunnel's.
+/// Slopes and their effect for one share λ.
 struct ShareEstimate {
     log_likelihood: f64,
     slopes: DVector<f64>,
@@ -118,7 +118,8 @@ impl SlopeInformation {
     }
 }
 
-/// Mean over the shares, by their likelihoods; the covariance has the scatter between them.
+/// Mean over the shares, weighted by their likelihoods. The covariance includes the scatter between
+/// the shares.
 fn mean(estimates: &[ShareEstimate], own: usize) -> SlopeEffect {
     let largest = estimates
         .iter()

@@ -5,7 +5,8 @@ use crate::lab::campaign::{Cards, FlightCard, TestPoint};
 use crate::lab::simulator::{Card, FlightCondition};
 use crate::numerics::random::derived_seed;
 
-/// Flight of all candidates, by which their seeds differ from those of simulated campaigns.
+/// Name of the flight of all candidates, so that their random numbers differ from those of
+/// simulated campaigns.
 const FLIGHT: &str = "next";
 
 /// A card that the next flight may fly.

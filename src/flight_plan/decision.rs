@@ -21,20 +21,20 @@
 //! # Decision
 //!
 //! x is *decided* if it lies between two neighbouring limits with the probability p or more. After
-//! the flight x is normal with the mean m′ and the variance s² = σ′² + ν², so the interval from l to
-//! u is decided if
+//! the flight x is normal with the mean m′ and the variance s² = σ′² + ν², so the interval from l
+//! to u is decided if
 //!
 //! Φ((u − m′)/s) − Φ((l − m′)/s) ≥ p.
 //!
 //! The left side falls as m′ moves away from the middle of the interval. The condition therefore
-//! holds for every m′ from some a to some b, the *deciding means* of this interval. They do not
-//! overlap with those of another interval, since p is over a half.
+//! holds for every m′ from some a to some b, the *deciding means* of this interval. The deciding
+//! means of two intervals do not overlap, since p is over a half.
 //!
 //! # Probability before the flight
 //!
-//! m′ is not known before the flight. It is normal with the mean m and the variance τ² = σ² − σ′²,
-//! what the flight takes from the variance of g. The probability that the flight decides is the sum
-//! over all intervals of
+//! Before the flight m′ is a random variable. It is normal with the mean m and the variance τ² = σ²
+//! − σ′², by which the flight lowers the variance of g. The probability that the flight decides is
+//! the sum over all intervals of
 //!
 //! Φ((b − m)/τ) − Φ((a − m)/τ).
 //!
@@ -50,7 +50,8 @@ const HALVINGS: usize = 60;
 pub struct Decision {
     /// Mean m in tonight's posterior.
     pub mean: f64,
-    /// Limits in ascending order; below the first and above the last are intervals too.
+    /// Limits in ascending order; the outermost intervals reach below the first and above the last
+    /// limit.
     pub limits: Vec<f64>,
     /// Standard deviation ν of the part n, which no flight lowers.
     pub rest: f64,

@@ -17,7 +17,7 @@ pub struct GoalPoint {
     pub kind: GoalKind,
     /// Derivative, quantity, or class.
     pub name: String,
-    /// Airframe of a level, simulator of a match.
+    /// Airframe of a level, or simulator of a match; empty for a derivative.
     pub of: &'static str,
     /// Maneuver and quantity that decide a match.
     pub decided_by: String,

@@ -54,7 +54,7 @@ struct CardLine {
     teaches: Vec<Taught>,
 }
 
-/// Goal that a card helps to reach.
+/// Goal on which a card gives much information.
 #[derive(Debug, Serialize)]
 struct Taught {
     symbol: String,

@@ -191,8 +191,9 @@ fn aims(outlooks: &[Outlook], points: &[GoalPoint]) -> Vec<Aim> {
         .collect()
 }
 
-/// Covariance of each coefficient with the observations of the cards. By experience only a share of
-/// a class's maneuvers is usable, so the noise of its rows is divided by this share.
+/// Covariance of each coefficient with the observations of the cards. Only a share of a class's
+/// maneuvers is usable, by experience, so the noise covariance of its rows is divided by this
+/// share.
 fn knowledge(
     state: &CampaignState,
     kept: &[KeptCard],
@@ -311,7 +312,7 @@ impl Rows<'_> {
         }
     }
 
-    /// Goals to which a card alone adds most, each derivative once.
+    /// Goals on which a card by itself gives most information, each derivative once.
     fn teaches(&self, card: usize, nothing: &CardSet) -> String {
         let mut after = nothing.clone();
         after.fly(card);

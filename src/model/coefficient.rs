@@ -24,14 +24,14 @@ const REWEIGHTINGS: usize = 2;
 /// Share of the largest variance below which the comparison of classes ignores a direction.
 const CHECKED_VARIANCE: f64 = 1e-6;
 
-/// Posterior of one coefficient.
+/// Posterior of one coefficient, with its evidence and its self-check.
 #[derive(Clone, Debug)]
 pub struct CoefficientPosterior {
     pub terms: Vec<Term>,
     pub unknowns: Unknowns,
     pub scales: Vec<Scale>,
-    /// Scales before the last step. The noise between the points of the grids was computed with
-    /// them.
+    /// Scales before the last step, with which the noise between the points of the grids was
+    /// computed.
     pub noise_scales: Vec<Scale>,
     /// Posterior, including the spread over the scales that the data leave open.
     pub gaussian: Gaussian,
@@ -102,9 +102,9 @@ impl Data {
         Data::with_planned(terms, evidence, &[], basis).0
     }
 
-    /// Evidence as in [`Data::new`], with the observation that each planned maneuver will make. The
-    /// classes of the planned maneuvers, and the delays that they share with the campaign, are
-    /// among the unknowns; the planned maneuvers are no evidence.
+    /// Collects the evidence as [`Data::new`] does, and the observation that each planned maneuver
+    /// will make. The errors of the planned maneuvers' classes, and the delays that they share with
+    /// the campaign, are among the unknowns. The planned maneuvers themselves are not evidence.
     #[must_use]
     pub fn with_planned(
         terms: &[Term],
@@ -150,15 +150,16 @@ impl Data {
         (data, planned)
     }
 
-    /// Sets the noise of each maneuver to its own plus the noise between the points of the grids.
+    /// Adds the noise between the points of the grids to each maneuver's own noise, for these
+    /// scales.
     pub fn set_between(&mut self, terms: &[Term], scales: &[Scale]) {
         for (flight, own) in self.flights.iter_mut().zip(&self.places) {
             flight.set_between(&observed(own, &self.observations), terms, scales);
         }
     }
 
-    /// Most probable scales, from a start, and the Gaussian for them. Before them, the data with
-    /// the noise for the scales of the start.
+    /// Finds the most probable scales from a start. Returns the observed differences, these scales
+    /// and the Gaussian; the noise between the points of the grids has the scales of the start.
     fn fit(
         &mut self,
         terms: &[Term],

@@ -28,7 +28,7 @@ pub struct Sampler<'a> {
     coefficients: Vec<CoefficientSampler>,
 }
 
-/// Differences of one coefficient: mean + root · normal deviates.
+/// Sampler of one coefficient: a draw is mean + root · (independent standard normal deviates).
 #[derive(Clone, Debug)]
 struct CoefficientSampler {
     quantities: Vec<PublishedDerivative>,

@@ -20,18 +20,19 @@ use crate::output_error::error_effect::SharedError;
 pub struct FlightData {
     /// Index of each maneuver in the evidence, and its rows.
     pub maneuvers: Vec<(usize, Range<usize>)>,
-    /// y.
+    /// Differences y of the estimates from the tunnel.
     pub differences: DVector<f64>,
-    /// A.
+    /// Rows A, one per estimate.
     pub rows: Vec<SparseRow>,
     /// Covariance of e, maneuver by maneuver. Once set, it includes the noise between the points of
     /// the grids.
     noise: Vec<DMatrix<f64>>,
-    /// K Kᵀ.
+    /// Covariance K Kᵀ from the calibration errors.
     calibration: DMatrix<f64>,
 }
 
-/// Sums of the normal equations: Λ = Σ Aᵀ Σ⁻¹ A and η = Σ Aᵀ Σ⁻¹ y.
+/// Normal equations of the unknowns, summed over the flights: Λ = Σ_flights Aᵀ Σ⁻¹ A and η =
+/// Σ_flights Aᵀ Σ⁻¹ y, with Σ the covariance of K u + e ([`FlightData::covariance`]).
 #[derive(Clone, Debug)]
 pub struct Information {
     pub matrix: DMatrix<f64>,
@@ -86,7 +87,7 @@ impl FlightData {
         data
     }
 
-    /// Sets each maneuver's noise to its own plus the noise between the points of the grids.
+    /// Sets each maneuver's noise to its own noise plus the noise between the points of the grids.
     pub fn set_between(&mut self, observed: &[Observed], terms: &[Term], scales: &[Scale]) {
         for (noise, (_, _, observation)) in self.noise.iter_mut().zip(observed) {
             let Observation {
@@ -125,14 +126,14 @@ impl FlightData {
         }
     }
 
-    /// Covariance of the errors that no other maneuver shares, of the maneuver at an index in this
-    /// flight.
+    /// Covariance of the errors that a maneuver shares with no other; `maneuver` is its index in
+    /// this flight.
     #[must_use]
     pub fn noise(&self, maneuver: usize) -> &DMatrix<f64> {
         &self.noise[maneuver]
     }
 
-    /// Covariance Σ of K u + e; the noise of a maneuver of weight w is 1/w times its own.
+    /// Covariance Σ of the errors K u + e. A maneuver of weight w has 1/w times its own noise.
     #[must_use]
     pub fn covariance(&self, weights: &[f64]) -> DMatrix<f64> {
         let mut covariance = self.calibration.clone();
@@ -188,7 +189,7 @@ impl FlightData {
         dense
     }
 
-    /// Aᵀ over all unknowns.
+    /// Transposed rows Aᵀ, over all unknowns.
     #[must_use]
     pub fn columns(&self, unknowns: usize) -> DMatrix<f64> {
         let mut columns = DMatrix::zeros(unknowns, self.rows.len());
@@ -200,7 +201,7 @@ impl FlightData {
         columns
     }
 
-    /// A m and A P Aᵀ of a mean m and a covariance P of the unknowns.
+    /// Mean A m and covariance A P Aᵀ of the rows, from mean m and covariance P of the unknowns.
     #[must_use]
     pub fn image(
         &self,

@@ -12,7 +12,8 @@ use super::unknowns::Unknowns;
 use crate::aero::WindTunnel;
 use crate::output_error::error_effect::{ErrorEffect, SharedError};
 
-/// Differences from the tunnel of derivatives of one coefficient that a maneuver holds.
+/// Differences from the tunnel of the derivatives of one coefficient that a maneuver holds, with
+/// their covariance.
 #[derive(Clone, Debug)]
 pub struct HeldDifferences {
     pub derivatives: Vec<String>,
@@ -20,7 +21,7 @@ pub struct HeldDifferences {
     pub covariance: DMatrix<f64>,
 }
 
-/// Posterior of a coefficient's terms.
+/// Terms of a coefficient with their scales and their posterior.
 #[derive(Clone, Copy, Debug)]
 pub struct Posterior<'a> {
     pub terms: &'a [Term],
@@ -68,7 +69,7 @@ impl Evidence<'_> {
         })
     }
 
-    /// Weights of the terms in the differences of derivatives: one row each.
+    /// Weights of the terms in the differences of derivatives, one row per derivative.
     fn design_of(&self, terms: &[Term], names: &[&str]) -> DMatrix<f64> {
         let mut design = DMatrix::zeros(names.len(), terms.len());
         for (i, name) in names.iter().enumerate() {

@@ -29,7 +29,7 @@ use crate::maneuver::{Maneuver, Means, Status};
 use crate::tables::{EstimateRow, LiftAndDragRow};
 use crate::units::RAD;
 
-/// Regressor of the row with the coefficients themselves.
+/// Name of the regressor in the row that has the coefficients themselves instead of a slope.
 const TOTAL: &str = "total";
 
 /// Maneuver as it was flown, with its build-up.
@@ -53,11 +53,11 @@ struct Weights {
 /// Errors of the derivatives that a maneuver holds.
 struct HeldErrors {
     names: Vec<String>,
-    /// G.
+    /// Change G of the estimates with the errors of the held values.
     gains: DMatrix<f64>,
     /// Covariance of held values that the maneuver's corrected covariance contains.
     assumed: DMatrix<f64>,
-    /// C.
+    /// Covariance C of the held values.
     covariance: DMatrix<f64>,
 }
 
@@ -118,14 +118,15 @@ impl PublishedManeuver<'_> {
         row.is_some_and(|row| row.status == Status::Estimated && row.value.is_some())
     }
 
-    /// Value of a derivative; an inactive one has the tunnel's value.
+    /// Value of a derivative: as estimated or held; the tunnel's for an inactive derivative.
     fn value(&self, derivative: &Derivative) -> f64 {
         let row = self.estimate(derivative);
         row.and_then(|row| row.value.or(row.wind_tunnel))
             .unwrap_or(0.0)
     }
 
-    /// Part of a regressor in the mean flight condition. The mean rates of a maneuver are small.
+    /// Mean of a regressor without products over the maneuver. Rates and sideslip count as zero,
+    /// since their means are small.
     fn mean(&self, part: &Regressor) -> f64 {
         let maneuver = self.evidence.maneuver;
         match part {
@@ -234,7 +235,7 @@ impl PublishedManeuver<'_> {
 }
 
 impl HeldErrors {
-    /// Errors with the tunnel's uncertainty.
+    /// Errors of the held values with the tunnel's uncertainty.
     fn of(evidence: &Evidence) -> HeldErrors {
         let effects: Vec<_> = evidence.held_effects().collect();
         let deviations = effects.iter().map(|(_, effect)| effect.deviation.powi(2));
@@ -269,7 +270,8 @@ impl HeldErrors {
     }
 }
 
-/// Regressors, each once, that are neither constant nor composed of others.
+/// Distinct regressors of the derivatives that are neither constant nor composed of other
+/// regressors.
 fn leaves<'a>(derivatives: &[&'a Derivative]) -> Vec<&'a Regressor> {
     let mut leaves: Vec<&Regressor> = Vec::new();
     for leaf in derivatives.iter().flat_map(|d| d.regressor.leaves()) {

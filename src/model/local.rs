@@ -17,7 +17,7 @@ const MACH_STEP: f64 = 0.005;
 pub enum LocalKind {
     /// A derivative.
     Derivative,
-    /// A sum of a constant and its slope times α, in place of the constant.
+    /// A sum of a constant and its slope times α, published in place of the constant.
     Sum,
 }
 

@@ -1,14 +1,16 @@
-//! Evidence of a maneuver about a coefficient: differences of its estimates from the tunnel, as
-//! linear functions of the coefficient's unknown differences and of errors that maneuvers share.
+//! Evidence of a maneuver about a coefficient: differences of the maneuver's estimates from the
+//! tunnel. They are linear functions of the coefficient's unknown differences and of errors that
+//! maneuvers share.
 //!
-//! With f the differences at the maneuver's condition, an estimate differs from the tunnel by
+//! Let f be the differences of the derivatives at the maneuver's condition, and u the calibration
+//! errors, each with unit variance. The estimates differ from the tunnel by
 //!
-//! y = (S + G) f + K u + e,
+//! y = (S + G) f + K u + e.
 //!
-//! where S selects the estimated derivatives, G is the change of the estimates with the held
-//! values, K u the effect of calibration errors, and e has the rest of the corrected covariance.
-//! Nuisance parameters of the maneuver are marginalised: only the rows and columns of its estimates
-//! of this coefficient are used.
+//! S selects the estimated derivatives. G is the change of the estimates with the held values, and
+//! K with the calibration errors. e has the rest of the corrected covariance. Nuisance parameters
+//! of the maneuver are marginalised: only the rows and columns of its estimates of this coefficient
+//! are used.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -19,7 +21,7 @@ use crate::maneuver::Status;
 use crate::numerics::symmetric::{scale, scaled};
 use crate::output_error::error_effect::{ErrorEffect, SharedError};
 
-/// Least eigenvalue of a noise covariance at unit diagonal.
+/// Least eigenvalue of a noise covariance scaled to unit diagonal, so that it stays invertible.
 const LEAST_EIGENVALUE: f64 = 1e-6;
 
 /// Evidence of a maneuver about one coefficient.
@@ -107,7 +109,8 @@ impl Evidence<'_> {
         })
     }
 
-    /// Index among the parameters, and value, of an estimated derivative.
+    /// Index among the parameters and value of an estimated derivative; `None` if it is not
+    /// estimated.
     fn estimated(&self, name: &str) -> Option<(usize, f64)> {
         let place = self.covariance.names.iter().position(|n| n == name)?;
         let row = self.estimates.iter().find(|e| e.derivative == name)?;
@@ -197,8 +200,8 @@ fn is_held(effect: &ErrorEffect) -> bool {
     matches!(effect.error, SharedError::Held(_))
 }
 
-/// Covariance with the eigenvalues raised that are negative or tiny beside the variances of `whole`;
-/// `None` unless both are finite and these variances positive.
+/// Raises eigenvalues of a covariance that are negative, or tiny beside the variances of `whole`.
+/// `None` unless both matrices are finite and the variances of `whole` positive.
 fn floored(covariance: &DMatrix<f64>, whole: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let is_sound = covariance.iter().chain(whole.iter()).all(|v| v.is_finite())
         && whole.diagonal().iter().all(|v| *v > 0.0);

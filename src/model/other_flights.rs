@@ -12,13 +12,13 @@ use super::flight_data::FlightData;
 use super::posterior::Gaussian;
 use super::unknowns::{SparseRow, between, sum};
 
-/// Posterior of the other flights, from the point of view of one flight.
+/// Posterior of all flights other than one.
 pub struct OtherFlights<'a> {
     whole: &'a Gaussian,
     own: Option<OwnRows<'a>>,
 }
 
-/// Rows of the flight itself: K and K⁻¹ (y − A m).
+/// Rows of the flight that is left out: factor of K, and K⁻¹ (y − A m).
 struct OwnRows<'a> {
     flight: &'a FlightData,
     root: Cholesky<f64, Dyn>,
@@ -26,7 +26,8 @@ struct OwnRows<'a> {
 }
 
 impl<'a> OtherFlights<'a> {
-    /// Posterior of all flights but one. `None` if a covariance is not positive definite.
+    /// Leaves out `flight`; without a flight the posterior stays whole. `None` if a covariance is
+    /// not positive definite.
     #[must_use]
     pub fn new(
         whole: &'a Gaussian,
@@ -47,7 +48,7 @@ impl<'a> OtherFlights<'a> {
         Some(OtherFlights { whole, own })
     }
 
-    /// Means and covariance of weighted sums of the unknowns.
+    /// Means and covariance of weighted sums of the unknowns, one sum per row.
     #[must_use]
     pub fn of(&self, rows: &[SparseRow]) -> (DVector<f64>, DMatrix<f64>) {
         let Gaussian { mean, covariance } = self.whole;

@@ -1,10 +1,11 @@
 //! Outlook: covariance of the posterior after planned maneuvers.
 //!
 //! The covariance of a Gaussian posterior follows from the design and the noise of its data, not
-//! from their values. With A the rows of the planned estimates over the unknowns, K the effects of
-//! the calibration errors of their common flight, B the rows of the quantities of interest, and P
-//! the posterior's covariance, an [`Outlook`] holds the covariance of (A z + K u, B z). A maneuver
-//! then observes its rows of A z + K u with its own noise.
+//! from their values. Let z be the unknowns, with the posterior's covariance P, and u the
+//! calibration errors of the common flight of the planned maneuvers. A are the rows of the planned
+//! estimates over z, K the effects of u on them, and B the rows of the quantities of interest. An
+//! [`Outlook`] holds the covariance of (A z + K u, B z). A maneuver then observes its rows of A z +
+//! K u with its own noise.
 //!
 //! Scales and weights remain those of the posterior; its spread over uncertain scales is in P. The
 //! values of the evidence have no effect, so it may have been computed with other held values.
@@ -66,8 +67,8 @@ pub struct Outlook {
 
 impl Model {
     /// Outlook of each coefficient on planned maneuvers of one flight and on points. `evidence`,
-    /// `buildup`, `tunnel` and `settings` are those of the posterior. A coefficient whose covariance
-    /// is not finite is left out.
+    /// `buildup`, `tunnel` and `settings` must be the ones from which the posterior was made. A
+    /// coefficient whose covariance is not finite is left out.
     #[must_use]
     pub fn outlook(
         &self,
@@ -90,8 +91,7 @@ impl Model {
 }
 
 impl Model {
-    /// Unit of a derivative or sum of the posterior, and the angles of attack at which the tunnel
-    /// tabulates it.
+    /// Unit and breakpoints in α of a derivative or sum; `None` if the posterior does not have it.
     #[must_use]
     pub fn breakpoints_deg(&self, derivative: &str) -> Option<(&'static str, &[f64])> {
         let all = self.coefficients.iter();
@@ -152,8 +152,8 @@ impl CoefficientPosterior {
         })
     }
 
-    /// Covariance of the unknowns of the data, planned maneuvers included. For the differences the
-    /// spread of the posterior over uncertain scales is added.
+    /// Covariance of all unknowns, including the errors that planned maneuvers share. The
+    /// covariance of the differences includes the uncertainty of the scales.
     fn covariance(&self, data: &Data, maneuvers: usize) -> Option<DMatrix<f64>> {
         let mut weights = vec![1.0; maneuvers];
         for (place, weight) in &self.weights {
@@ -235,14 +235,15 @@ impl CoefficientPosterior {
     }
 }
 
-/// Positive part of a symmetric matrix: rounding leaves tiny negative eigenvalues.
+/// Positive semidefinite part of a symmetric matrix, since rounding leaves tiny negative
+/// eigenvalues.
 fn positive(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let mut eigen = matrix.clone().symmetric_eigen();
     eigen.eigenvalues.apply(|value| *value = value.max(0.0));
     eigen.recompose()
 }
 
-/// K Kᵀ of the calibration errors that the planned maneuvers share with their flight.
+/// Covariance K Kᵀ from the calibration errors that the planned maneuvers share with their flight.
 fn calibration(
     observed: &[Option<(usize, Observation)>],
     placed: &[Option<PlannedRows>],

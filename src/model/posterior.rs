@@ -39,7 +39,7 @@ pub fn information(flights: &[FlightData], weights: &[f64], unknowns: usize) -> 
 /// Rᵀ gives the posterior covariance P = R (I + Rᵀ Λ R)⁻¹ Rᵀ and the mean P η.
 pub struct Solved<'a> {
     root: &'a BlockRoot,
-    /// L with L Lᵀ = I + Rᵀ Λ R.
+    /// Cholesky factor L of I + Rᵀ Λ R = L Lᵀ.
     lower: DMatrix<f64>,
 }
 
@@ -51,18 +51,19 @@ impl<'a> Solved<'a> {
         Some(Solved { root, lower })
     }
 
-    /// L⁻¹ Rᵀ A of some columns A over the unknowns.
+    /// Product L⁻¹ Rᵀ A for some columns A over the unknowns, from which Aᵀ P A follows as its
+    /// square.
     fn halves(&self, mut columns: DMatrix<f64>) -> DMatrix<f64> {
         solve_lower(self.lower.as_view(), columns.as_view_mut());
         columns
     }
 
-    /// P.
+    /// Covariance P of the unknowns.
     fn covariance(&self) -> DMatrix<f64> {
         square(&self.halves(self.root.transposed()))
     }
 
-    /// Means and covariance of a flight's rows.
+    /// Means and covariance that the posterior gives for a flight's rows.
     #[must_use]
     pub fn image(
         &self,
@@ -77,7 +78,7 @@ impl<'a> Solved<'a> {
     }
 }
 
-/// L with L Lᵀ = I + Rᵀ Λ R, from Rᵀ Λ R.
+/// Cholesky factor L of I + Rᵀ Λ R = L Lᵀ, from `inner` = Rᵀ Λ R.
 #[must_use]
 pub fn inner_root(mut inner: DMatrix<f64>) -> Option<DMatrix<f64>> {
     for j in 0..inner.nrows() {
@@ -113,8 +114,8 @@ pub fn of_differences(information: &Information, unknowns: &Unknowns) -> Option<
     })
 }
 
-/// Prediction of rows that were left out: the observed value less the prediction from the others,
-/// with the covariance of that difference.
+/// Differences of rows that were left out from their prediction by the other rows, with the
+/// covariance of these differences.
 #[derive(Clone, Debug)]
 pub struct LeftOut {
     pub differences: DVector<f64>,
@@ -137,14 +138,14 @@ pub struct LeftOut {
 /// whole ones.
 #[derive(Clone, Debug)]
 pub struct LeavingOut {
-    /// V⁻¹.
+    /// Precision V⁻¹.
     precision: DMatrix<f64>,
-    /// Σ⁻¹ r.
+    /// Weighted residual Σ⁻¹ r.
     weighted: DVector<f64>,
 }
 
 impl LeavingOut {
-    /// Predictions of a flight's rows; `None` unless their covariance is positive definite.
+    /// Prepares the predictions for a flight; `None` unless its covariances are positive definite.
     #[must_use]
     pub fn new(flight: &FlightData, weights: &[f64], whole: &Gaussian) -> Option<LeavingOut> {
         let (predicted, spread) = flight.image(&whole.mean, &whole.covariance);
@@ -155,13 +156,13 @@ impl LeavingOut {
         })
     }
 
-    /// The flight, predicted from the other flights.
+    /// Difference of all rows of the flight from their prediction by the other flights.
     #[must_use]
     pub fn flight(&self) -> Option<LeftOut> {
         self.rows(&(0..self.weighted.len()))
     }
 
-    /// Some rows, predicted from all others.
+    /// Difference of some rows from their prediction by all other rows.
     #[must_use]
     pub fn rows(&self, rows: &Range<usize>) -> Option<LeftOut> {
         let own = (rows.start, rows.start);
@@ -177,8 +178,9 @@ impl LeavingOut {
 /// Weights of the maneuvers by Student's t: a maneuver far from its prediction by all others has a
 /// lower weight.
 ///
-/// Each is compared at its full weight: with V of the prediction less the noise that its weight
-/// added.
+/// A weight w below one has added 1/w − 1 times the maneuver's noise to the covariance of its
+/// difference. This part is subtracted before the comparison, so each maneuver is compared at full
+/// weight.
 #[must_use]
 pub fn reweighted(
     flights: &[FlightData],

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 
 use super::scale_prior::Scale;
 
-/// Share of the offset, relative to the part that fades over α.
+/// Variance of the offset over the variance of the part that fades over α.
 const OFFSET: f64 = 0.25;
 
 /// Covariance between two lists of points.
@@ -19,8 +19,8 @@ pub struct PriorCovariance {
     pub across: DMatrix<f64>,
 }
 
-/// Covariance of a scale with its derivatives by the logarithm of the length. The derivatives by
-/// the logarithm of the size are twice the same matrices.
+/// Covariance for a scale, with its first and second derivative by the logarithm of the length. The
+/// derivative of each by the logarithm of the size is twice the matrix itself.
 #[derive(Clone, Debug)]
 pub struct Slopes {
     pub value: DMatrix<f64>,
@@ -76,7 +76,8 @@ impl PriorCovariance {
     }
 }
 
-/// Variance over that of unit size, so that the variance at a point is s² times its shape.
+/// Factor of `shape` for a size s: s² over the correlation 1 + `OFFSET` at distance zero, so that
+/// the variance at a point is s² times its shape.
 #[must_use]
 pub fn variance_factor(scale: &Scale) -> f64 {
     scale.size * scale.size / (1.0 + OFFSET)

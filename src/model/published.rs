@@ -14,12 +14,12 @@ pub struct PublishedDerivative {
     pub name: String,
     pub unit: &'static str,
     pub nodes: Vec<Node>,
-    /// Index of the term whose grid it has.
+    /// Index of the term that has the same grid.
     pub term: usize,
     /// Tunnel's values; zero at points without one.
     pub tunnel: Vec<f64>,
     pub has_tunnel: bool,
-    /// Weights of the differences, point by point.
+    /// Weights of the differences in the value, point by point.
     pub rows: Vec<SparseRow>,
 }
 
@@ -106,7 +106,7 @@ impl CoefficientPosterior {
 }
 
 impl PublishedDerivative {
-    /// Value at each point, of given differences from the tunnel.
+    /// Value at each point for given differences from the tunnel.
     #[must_use]
     pub fn values(&self, differences: &DVector<f64>) -> Vec<f64> {
         let points = self.rows.iter().zip(&self.tunnel);

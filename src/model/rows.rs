@@ -14,7 +14,7 @@ use crate::tables::{
     ContributionRow, CovarianceRow, LeftOutKind, PosteriorRow, ScaleRow, SelfCheckRow,
 };
 
-/// Tables of one coefficient.
+/// Rows of one coefficient in each of the posterior's tables.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rows {
     pub posterior: Vec<PosteriorRow>,

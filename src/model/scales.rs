@@ -1,9 +1,9 @@
 //! Most probable scales of the differences between flight and tunnel.
 //!
-//! The difference of a derivative from the tunnel is a random function of the flight condition, with
-//! two *scales*: its size, as a multiple of the table's size or of its stated uncertainty, and the
-//! length in deg of α over which it changes. The most probable scales have the largest product of
-//! prior and marginal likelihood of all estimates.
+//! The difference of a derivative from the tunnel is a random function of the flight condition with
+//! two *scales*. The size is a multiple of the table's size, or of the table's stated uncertainty.
+//! The length is the change of α, in deg, over which the difference changes. The most probable
+//! scales have the largest product of prior and marginal likelihood of all estimates.
 //!
 //! | symbol | quantity |
 //! |---|---|
@@ -27,8 +27,8 @@
 //!
 //! f_ij = −½ tr(M C_i M C_j) + aᵀ C_i M C_j a + ½ tr(M C_ij) − ½ aᵀ C_ij a.
 //!
-//! The expectation of f_ij over data that the scales predict is ½ tr(M C_i M C_j), since that of
-//! a aᵀ is M. This expectation is never negative; it replaces f_ij where f_ij is not positive
+//! The expectation of f_ij over data that the scales predict is ½ tr(M C_i M C_j), since that of a
+//! aᵀ is M. This expectation is never negative; it replaces f_ij where f_ij is not positive
 //! definite.
 
 use nalgebra::{DMatrix, DVector};
@@ -38,8 +38,8 @@ use super::scale_prior::Scale;
 use super::term::Term;
 use crate::numerics::minimise::{LocalExpansion, minimum};
 
-/// Share of a term's largest prior variance below which a direction of its differences is ignored:
-/// it changes a difference by at most a thousandth of its standard deviation.
+/// Share of a term's largest prior variance below which a direction of its differences is ignored.
+/// Such a direction changes a difference by at most a thousandth of its standard deviation.
 pub const LEAST_VARIANCE: f64 = 1e-6;
 
 /// Largest number of Newton steps of the search for the scales.
@@ -117,12 +117,11 @@ pub fn negative_log_posterior(
 /// proportional to the square of the size, so its derivative along log size is 2 C.
 struct Changes<'a> {
     term: &'a ObservedTerm,
-    /// Columns of M C_i at the term's differences, along log size and log length.
+    /// M C_i for log size and log length, at the columns of the term's differences.
     images: [DMatrix<f64>; 2],
-    /// C_i a, along log size and log length.
+    /// C_i a for log size and log length.
     moved: [DVector<f64>; 2],
-    /// ½ tr(M X) − ½ aᵀ X a, with X the covariance C, its first and its second derivative along log
-    /// length.
+    /// ½ tr(M X) − ½ aᵀ X a, where X is C, its first and its second derivative along log length.
     halves: [f64; 3],
 }
 
@@ -143,8 +142,8 @@ impl<'a> Changes<'a> {
         }
     }
 
-    /// Adds to the second derivatives of f the terms with M C_i M C_j, for i of this term and j of an
-    /// earlier term or the same one.
+    /// Adds the parts with M C_i M C_j to the second derivatives of f. i is a scale of this term, j
+    /// a scale of an earlier term or of the same one.
     fn add_pair(
         &self,
         other: &Changes,

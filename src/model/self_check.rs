@@ -1,5 +1,5 @@
 //! Self-check of the model, without a truth: each flight is predicted from the others, and each
-//! class from the other classes. Scales and weights are those of all data.
+//! class from the other classes. Scales and weights are taken from all data.
 
 use nalgebra::{Cholesky, DVector};
 
@@ -13,7 +13,7 @@ use crate::numerics::student::NORMAL_95;
 pub struct Agreement {
     /// Number of estimates.
     pub estimates: usize,
-    /// Number of them inside their 95 % interval.
+    /// Number of estimates inside the 95 % interval of their prediction.
     pub inside: usize,
     /// Log density of the estimates, each in its own unit.
     pub log_density: f64,

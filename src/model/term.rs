@@ -16,7 +16,7 @@ use crate::maneuver::Status;
 use crate::numerics::order_statistics::median;
 use crate::tables::Knowledge;
 
-/// One unknown of a coefficient.
+/// Derivative or sum of one coefficient, whose difference from the tunnel is unknown over its grid.
 #[derive(Clone, Debug)]
 pub struct Term {
     /// Derivative of the model that the term is or replaces.
@@ -65,7 +65,8 @@ impl TermSources<'_> {
             .collect()
     }
 
-    /// Number of points of a coefficient's grids: an upper limit, found without making them.
+    /// Upper limit of the number of points of a coefficient's grids, found without making the
+    /// grids.
     #[must_use]
     pub fn points(&self, coefficient: Coefficient, evidence: &[Evidence]) -> usize {
         let derivatives = self.buildup.derivatives.iter();

@@ -1,5 +1,5 @@
-//! Unknowns of a coefficient in one vector: differences from the tunnel at the points of the grids,
-//! then errors that all maneuvers of a class, or of the campaign, share.
+//! Unknowns of a coefficient in one vector. Differences from the tunnel at the points of the grids
+//! come first, then errors that all maneuvers of a class, or of the campaign, share.
 //!
 //! The systematic error of a class is, for each derivative that it estimates, a function of α in
 //! units of the bounds of a maneuver. Its variance is ω², and its correlation fades over 10°.
@@ -20,7 +20,7 @@ use crate::output_error::error_effect::SharedError;
 /// Distance over which a class's errors fade, deg; also the spacing of their grid.
 const CLASS_LENGTH_DEG: f64 = 10.0;
 
-/// Row of a sparse matrix over the unknowns.
+/// Row of a sparse matrix over the unknowns: index of an unknown and its factor.
 pub type SparseRow = Vec<(usize, f64)>;
 
 /// Order of the unknowns.
@@ -136,8 +136,8 @@ impl Unknowns {
         (0..design.nrows()).map(row).collect()
     }
 
-    /// Root of the prior covariance of all unknowns but the differences. Directions below `least`
-    /// of the largest variance of their kind are ignored.
+    /// Root of the prior covariance of all unknowns except the differences. Directions whose
+    /// variance is below the share `least` of the largest of their kind are ignored.
     #[must_use]
     pub fn root_of_others(&self, least: f64) -> BlockRoot {
         let mut whole = BlockRoot::default();
@@ -178,8 +178,7 @@ pub fn root_of_differences(terms: &[Term], scales: &[Scale], least: f64) -> Bloc
     whole
 }
 
-/// True for an error that is common to all flights, such as the delay with which a recorder records
-/// the surfaces.
+/// `true` for an error that is common to all flights, such as a recorder's delay of a surface.
 #[must_use]
 pub fn is_of_campaign(error: &SharedError) -> bool {
     matches!(error, SharedError::Delay(_))

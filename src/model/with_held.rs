@@ -1,9 +1,9 @@
 //! Estimates of a maneuver with the values that it holds taken from the posterior of the other
 //! flights.
 //!
-//! With G the change of the estimates with the held derivatives, and f and C the means and
-//! covariance of these by the other flights, the estimates move by −G f, and in their covariance G
-//! C Gᵀ replaces the tunnel's part.
+//! Let G be the change of the estimates with the held derivatives. Let f and C be mean and
+//! covariance of the held derivatives' differences from the tunnel, by the other flights. The
+//! estimates move by −G f, and in their covariance G C Gᵀ replaces the tunnel's part.
 
 use std::collections::BTreeMap;
 

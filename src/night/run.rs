@@ -20,7 +20,7 @@ use crate::store::nights::{Night, Nights, Summary};
 use crate::store::{Fingerprint, atomic};
 use crate::tables::{PublishedTrend, PublishedVerdict};
 
-/// Published file of the changes since the night before, for machines to read.
+/// Name of the published file with the changes since the night before, for machines to read.
 pub const ALERT: &str = "alert.json";
 
 /// End of a run.
@@ -80,7 +80,7 @@ pub fn run(
     }
     let outcome = run.publish();
     if outcome.is_err() {
-        // Its files may fill the disk that stopped the run.
+        // The unfinished night's files may fill the disk that stopped the run.
         run.nights.remove_tonight();
     }
     outcome

@@ -38,10 +38,10 @@ impl Verified {
     }
 }
 
-/// Digests all input anew, and compares input, configuration and code with the lineage that the
-/// files of a night state. If they agree, the tables are made again from the artefacts and
-/// compared. The night is the one named, by default the current one; with `tables` only files of
-/// these names are compared.
+/// Digests all input anew. Compares input, configuration and code with the lineage stored in the
+/// files of a night. If they agree, the tables are made again from the artefacts and compared. The
+/// night is the one named, by default the current one; with `tables` only files of these names are
+/// compared.
 ///
 /// # Errors
 /// No night, no archive, or a table that the night does not have.
@@ -164,8 +164,8 @@ impl Comparison<'_> {
         }
     }
 
-    /// Differences from the lineage of a file. A CSV has that of the Parquet table beside it, the
-    /// report that of the night.
+    /// Differences from the lineage of a file. A CSV has the lineage of the Parquet table beside
+    /// it, the report the lineage of the night.
     fn differences(&self, file: &str) -> Vec<String> {
         let path = self.nights.folder(&self.night.name).join(file);
         let table = path.with_extension("parquet");

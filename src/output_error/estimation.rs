@@ -16,7 +16,8 @@ const WEIGHTS_SETTLED: f64 = 1e-3;
 
 /// Estimates the free parameters of a maneuver, or of several joined, with their bounds.
 ///
-/// Costs are those with the weights of the `table`. `resolution` is the least standard deviation of each output from which weights are estimated.
+/// The published costs use the weights of the `table`. `resolution` is the least standard deviation
+/// of each output from which weights are estimated.
 #[must_use]
 pub fn estimate<D: Bounded>(
     data: &D,

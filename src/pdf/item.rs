@@ -99,13 +99,13 @@ pub enum Mark {
 pub struct Item {
     pub height: f32,
     pub marks: Vec<Mark>,
-    /// Stays on the page of the next item.
+    /// `true` if the item stays on the page of the next item.
     pub keep: bool,
     /// Repeated at the top of a page that this item begins.
     pub head: Option<Arc<Item>>,
     /// Empty space, which no page begins with.
     pub is_room: bool,
-    /// Begins a page.
+    /// `true` if the item begins a page.
     pub breaks: bool,
 }
 

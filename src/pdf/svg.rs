@@ -1,6 +1,6 @@
 //! An SVG drawing as PDF operators.
 //!
-//! y points down, as in the SVG; the page that places the drawing inverts it.
+//! y points down, as in the SVG; the page that places the drawing inverts y.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;

@@ -137,7 +137,7 @@ impl<'a> Step for EstimateStep<'a> {
     }
 }
 
-/// Corrections of the surfaces of an axis; those of other surfaces have no effect.
+/// Corrections of the surfaces that act in an axis; other surfaces have no effect on its estimates.
 fn delays_of_axis<'a>(
     config: &'a Config,
     delays: &'a [DelayCorrection],

@@ -23,8 +23,8 @@ use crate::store::{ArtefactName, Kind, object};
 
 /// Everything that decides the records of a flight.
 ///
-/// The flight id comes from the file's name and is part of the records and of every id in the
-/// tables, so a renamed file is ingested again.
+/// The flight id comes from the file's name, and is part of the records and of every id in the
+/// tables. A renamed file is therefore ingested again.
 #[derive(Serialize)]
 pub struct IngestKey<'a> {
     flight_id: &'a str,

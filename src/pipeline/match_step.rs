@@ -143,8 +143,8 @@ pub fn fly_again(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
     Ok(())
 }
 
-/// Finds the differences that decide the proof of match, predicted by a model, of the flown
-/// maneuvers of a class: one for each that can be flown again, in the order of the flights.
+/// Finds the differences that decide the proof of match of a class, predicted by a model. Each
+/// maneuver that can be flown again has one, in the order of the flights.
 ///
 /// # Errors
 /// A record that cannot be read.

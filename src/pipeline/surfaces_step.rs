@@ -131,8 +131,8 @@ fn combine(config: &Config, campaign: &mut Campaign, flights: &[FlightEvidence])
     campaign.problems.extend(found.problems);
 }
 
-/// Compares the errors of the instruments over the flights. Flights that hardly determine an error
-/// are corrected by the others.
+/// Compares the errors of the instruments over the flights. A flight that hardly determines an
+/// error is corrected by the errors of the other flights.
 fn compare_flights(config: &Config, campaign: &mut Campaign, of_surfaces: Vec<ErrorSeries>) {
     let evidence = |flight: &Flight| flight.ingested.assessment.error_evidence.clone();
     let flights: Vec<(String, Vec<ErrorEvidence>)> = campaign

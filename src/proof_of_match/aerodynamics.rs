@@ -1,9 +1,11 @@
 //! Aerodynamic coefficients of a simulation: the values at trim, and their change with the motion
 //! and the surfaces.
 //!
-//! C = C_trim + ∫ C_α dα + Σ C_x(α) (x − x_trim), with the derivatives at the present angle of
-//! attack. A derivative is the local slope, as it is estimated. The level of a coefficient is
-//! matched at the trim, so constants of the database do not enter.
+//! A coefficient is C = C_trim + ∫ C_α dα + Σ C_x(α) (x − x_trim). C_trim is its value at trim, and
+//! the integral of its derivative C_α is taken from the trim to the present angle of attack. The
+//! sum is over all other regressors x, with the derivatives C_x at the present angle of attack. A
+//! derivative is a local slope, as estimated. Constants of the database do not enter, because
+//! C_trim is matched to the flight.
 
 use nalgebra::Vector3;
 
@@ -66,7 +68,7 @@ impl Flow {
         }
     }
 
-    /// Indices of its quantities among the slopes.
+    /// Indices of the flow's quantities among the slopes.
     pub const ALPHA: usize = 0;
     pub const BETA: usize = 1;
     pub const VELOCITY: usize = 2;
@@ -90,18 +92,19 @@ enum Factor {
     Beta,
     Velocity,
     Mach,
-    /// Rate of an axis times half this length over the airspeed.
+    /// Angular rate about an axis, times half a reference length over the airspeed.
     Rate {
         axis: usize,
         half_length: f64,
     },
-    /// Rate of the angle of attack times half this length over the airspeed.
+    /// Rate of the angle of attack, times half a reference length over the airspeed.
     AlphaRate {
         half_length: f64,
     },
     /// Recorded signal with this index.
     Recorded(usize),
-    /// Recorded deflection over dynamic pressure times this area or volume.
+    /// Recorded deflection of a vane, over dynamic pressure times an area (force) or a volume
+    /// (moment).
     Vane {
         place: usize,
         size: f64,
@@ -120,7 +123,7 @@ pub struct Aerodynamics<'a> {
     pub table: DerivativeTable,
 }
 
-/// Balance from which a simulation starts.
+/// Trim from which a simulation starts: coefficients, and factors of the derivatives.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trim {
     pub coefficients: [f64; COEFFICIENTS],
@@ -332,7 +335,7 @@ impl<'a> AboutTrim<'a> {
 pub struct CoefficientSlopes {
     pub change: [f64; COEFFICIENTS],
     pub by_flow: [FlowSlopes; COEFFICIENTS],
-    /// Slope of each derivative's own coefficient along it.
+    /// Slope of each derivative's coefficient along the derivative.
     pub by_derivative: Vec<f64>,
 }
 

@@ -1,8 +1,8 @@
 //! Difference that decides whether a repeat flight passes, as a linear function of the derivatives.
 //!
 //! To first order the outputs of a repeat flight differ from a model's by four parts: the mean
-//! difference, the effects of the derivatives' deviations, those of the start's errors, and the
-//! sensors' noise. At one sample the difference is therefore normal, and its nearest limit is a
+//! difference, the effects of the derivatives' deviations, the effects of the start's errors, and
+//! the sensors' noise. At one sample the difference is therefore normal, and its nearest limit is a
 //! number of standard deviations away. The decisive difference is found in three steps:  1. of an
 //! alternative: at the sample with the smallest distance; 2. of a requirement: that of the
 //! alternative with the largest distance; 3. of the maneuver: that of the requirement with the
@@ -108,8 +108,8 @@ impl MeanRun {
         decisive.map(|(_, difference)| difference)
     }
 
-    /// Difference at the sample with the smallest distance inside a tolerance's limit, preceded by
-    /// that distance.
+    /// Smallest distance inside a tolerance's limit over the samples, and the difference at that
+    /// sample.
     fn worst(
         &self,
         flown: (&Recording, &FreeRun),

@@ -4,7 +4,7 @@
 use crate::aero::{Buildup, Condition, Regressor, WindTunnel};
 use crate::numerics::trapezoid::running_integral;
 
-/// Spacing of the table, deg. It is linear between, as most databases are.
+/// Spacing of the table, deg. Between its points the table is linear, as most databases are.
 const STEP_DEG: f64 = 1.0;
 
 /// Reach of the table on either side of the maneuver's mean, deg. Beyond it, derivatives are

@@ -1,5 +1,5 @@
-//! Dutch roll of a maneuver: that of the flight by its own estimates, that of a simulator by its
-//! model.
+//! Dutch roll of a maneuver: of the aircraft by the maneuver's own estimates, and of a simulator by
+//! its model.
 //!
 //! Period, time to half and damping ratio follow from the same linear equations at the maneuver's
 //! condition ([`crate::qualities`]), so that only the derivatives differ. A maneuver contains no
@@ -67,9 +67,9 @@ pub struct LateralModes {
     linear: LinearModel,
     /// Derivatives of the equations, by their index in the build-up.
     derivatives: Vec<usize>,
-    /// The maneuver's own values.
+    /// Values of the derivatives by the maneuver's own estimates.
     own: DVector<f64>,
-    /// Derivatives that the maneuver estimates; it holds the others.
+    /// Mask of the derivatives that the maneuver estimates; the others are held.
     estimated: Vec<bool>,
     /// Root of the covariance of the estimates' errors.
     errors: DMatrix<f64>,
@@ -177,8 +177,8 @@ impl LateralModes {
         })
     }
 
-    /// Dutch roll according to a repeat flight's estimates: those of an aircraft that deviates from
-    /// a model, with errors of their own.
+    /// Dutch roll by the estimates from a repeat flight. The estimates are the derivatives of an
+    /// aircraft that deviates from a model, plus errors of estimation.
     #[must_use]
     pub fn of_repeat(
         &self,

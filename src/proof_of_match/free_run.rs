@@ -1,5 +1,5 @@
-//! Free run: the rigid body flies from a start, with nothing of the record but the surfaces, thrust
-//! and mass.
+//! Free run: the rigid body flies from a start. Of the record only surfaces, thrust and mass are
+//! used.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use super::aerodynamics::{AboutTrim, Aerodynamics, COEFFICIENTS, Flow, Trim};
@@ -36,8 +36,7 @@ pub struct Start {
 }
 
 impl Start {
-    /// The start with one parameter changed: a state, or one of the trim coefficients, which follow
-    /// the states.
+    /// Start with one parameter changed. Parameters are the states, then the trim coefficients.
     #[must_use]
     pub fn moved(&self, parameter: usize, by: f64) -> Start {
         let mut start = self.clone();
@@ -52,7 +51,7 @@ impl Start {
         start
     }
 
-    /// Slopes of the body's changing states along one of the start's.
+    /// Slopes of the body's state along one state of the start.
     #[must_use]
     pub fn slopes(&self, parameter: usize) -> [f64; CHANGING] {
         let [alpha, beta, velocity, ..] = self.state;
@@ -69,7 +68,8 @@ impl Start {
                 -velocity * sa * sb,
             ]),
             2 => body[..3].copy_from_slice(&[ca * cb, sb, sa * cb]),
-            // Pitch turns about the axis across, as the heading is zero; bank about the body's own.
+            // Pitch attitude turns about the horizontal lateral axis, since the heading is zero;
+            // bank turns about the body's longitudinal axis.
             6 => turn[..4].copy_from_slice(
                 (Quaternion::new(0.0, 0.0, 0.5, 0.0) * attitude)
                     .coords

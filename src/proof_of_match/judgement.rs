@@ -15,7 +15,7 @@ pub struct Finding {
     /// Number of the requirement within its test, from one.
     pub requirement: usize,
     pub tolerance: Tolerance,
-    /// Values of the Dutch roll.
+    /// Value of the Dutch roll's quantity in flight and by the model; `None` for a time history.
     pub flight_value: Option<f64>,
     pub model_value: Option<f64>,
     pub samples: usize,
@@ -23,7 +23,7 @@ pub struct Finding {
     /// Largest distance beyond the tolerance, with its time; `None` if the simulated aircraft
     /// departs.
     pub largest_excess: Option<(f64, f64)>,
-    /// Minus infinity if the simulated aircraft departs.
+    /// Margin to the tolerance; minus infinity if the simulated aircraft departs.
     pub margin: f64,
 }
 
@@ -61,7 +61,8 @@ impl Judged<'_> {
     }
 }
 
-/// Tolerances of some tests that can be judged; those of the Dutch roll only if it is available.
+/// Tolerances of some tests that can be judged. Tolerances of the Dutch roll are left out if it is
+/// not available.
 #[must_use]
 pub fn judged<'a>(tests: &[&'a Test], has_dutch_roll: bool) -> Vec<Judged<'a>> {
     let of_test = |test: &&'a Test| {
@@ -132,7 +133,7 @@ impl Simulated {
     }
 }
 
-/// The requirement with the smallest margin, as its best alternative; `None` without findings.
+/// Best alternative of the requirement with the smallest margin; `None` without findings.
 #[must_use]
 pub fn decisive(findings: &[Finding]) -> Option<&Finding> {
     let requirements = findings.chunk_by(|a, b| a.test == b.test && a.requirement == b.requirement);
@@ -151,7 +152,7 @@ struct Difference {
 }
 
 impl Difference {
-    /// Size over width.
+    /// Size of the difference over the width of the tolerance.
     fn ratio(&self) -> f64 {
         self.size / self.width
     }
@@ -199,7 +200,7 @@ pub fn allowed_outside(samples: usize, required_pct: f64) -> usize {
     samples.saturating_sub(required)
 }
 
-/// One less the smallest ratio that is not exceeded by the required share of samples.
+/// One minus the smallest ratio that the required share of the samples does not exceed.
 fn margin(differences: &[Difference], required_pct: f64) -> f64 {
     let mut ratios: Vec<f64> = differences.iter().map(Difference::ratio).collect();
     ratios.sort_by(f64::total_cmp);

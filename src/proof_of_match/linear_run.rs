@@ -36,7 +36,7 @@ pub type Histories = [Vec<f64>; COUNT];
 #[derive(Clone, Debug)]
 pub struct LinearRun {
     pub run: FreeRun,
-    /// In the order of the parameters, up to a departure.
+    /// Histories of the slopes, in the order of the parameters, up to a departure.
     pub slopes: Vec<Histories>,
 }
 

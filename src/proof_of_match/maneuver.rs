@@ -40,14 +40,15 @@ pub struct ProofInputs<'a> {
     pub specification: &'a Specification,
 }
 
-/// A maneuver as found.
+/// A maneuver as recorded, with the posterior and the estimates that belong to it.
 #[derive(Clone, Copy, Debug)]
 pub struct RecordedManeuver<'a> {
     pub record: &'a Record,
     pub maneuver: &'a Maneuver,
     /// Posterior of the maneuver's axis at its condition; without one there are no probabilities.
     pub local: Option<&'a LocalPosterior>,
-    /// Means of its record and its own estimates, from which its Dutch roll follows.
+    /// Means of the record and the maneuver's own estimates, from which the Dutch roll of the
+    /// flight follows.
     pub own: Option<(&'a Means, &'a OwnEstimates)>,
 }
 
@@ -137,7 +138,7 @@ pub fn not_flown(basis: &ProofInputs, maneuver: &Maneuver, reason: &str) -> Matc
     }
 }
 
-/// Verdict of a maneuver before it is flown.
+/// Verdict row of a maneuver before it is flown again.
 fn verdict_row(maneuver: &Maneuver, model: ModelSource) -> MatchVerdictRow {
     MatchVerdictRow {
         maneuver_id: maneuver.maneuver_id.clone(),
@@ -361,7 +362,8 @@ impl<'a> Flight<'a> {
         }
     }
 
-    /// One if a surface moves after the last input; `None` if the maneuver ends before that.
+    /// Returns 1 if a surface moves after the last input, which indicates feedback, else 0. `None`
+    /// if the maneuver ends before that can be seen.
     fn closed_loop(&self) -> Option<usize> {
         let settled_s = self.maneuver.recognised.last_input_s? + SETTLED_S;
         let has_moved = self.recording.movement_after(settled_s) > MOVED_DEG;

@@ -2,10 +2,10 @@
 //! noise are propagated to the differences between aircraft and simulator.
 //!
 //! A repeat flight is flown by an aircraft of the posterior with the same surfaces. To first order
-//! its outputs differ from those at the mean by the effects of the derivatives' deviations. Those
-//! of the simulator differ by the effects of the errors of its matched start. Both follow from the
-//! slopes of one free run. The noise of the sensors is white and independent, so its part of the
-//! probability is exact for each draw.
+//! its outputs differ from those at the mean by the effects of the derivatives' deviations. The
+//! outputs of the simulator differ by the effects of the errors of its matched start. Both effects
+//! follow from the slopes of one free run. The noise of the sensors is white and independent, so
+//! its part of the probability is exact for each draw.
 
 use nalgebra::DMatrix;
 use pulp::Arch;
@@ -63,7 +63,7 @@ pub struct Probabilities {
 }
 
 impl Probabilities {
-    /// The probabilities within 0 and 1, without the rounding errors of the sums.
+    /// Limits the probabilities to 0 and 1, which rounding errors of the sums may exceed.
     fn clamped(mut self) -> Probabilities {
         for probability in self.tolerances.iter_mut().chain([&mut self.whole]) {
             *probability = probability.clamp(0.0, 1.0);
@@ -193,7 +193,7 @@ fn start_parameters(axis: Axis) -> [usize; 7] {
     }
 }
 
-/// Covariance of the quantities at some indices.
+/// Rows and columns of a covariance at some indices.
 fn of_places(covariance: &DMatrix<f64>, places: &[usize]) -> DMatrix<f64> {
     covariance.select_rows(places).select_columns(places)
 }
@@ -384,7 +384,7 @@ fn at_most_outside(inside: &[f64], allowed: usize) -> f64 {
     let mut outside = vec![0.0; allowed + 1];
     outside[0] = 1.0;
     for (before, inside) in inside.iter().enumerate() {
-        // No more samples are outside than there were.
+        // At most as many samples can be outside as were considered so far.
         for count in (1..=allowed.min(before + 1)).rev() {
             outside[count] = inside * outside[count] + (1.0 - inside) * outside[count - 1];
         }

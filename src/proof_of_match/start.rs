@@ -1,8 +1,8 @@
 //! Start of a free run: initial state and trim, matched over the first samples of a maneuver.
 //!
 //! As in a qualification test guide, the simulator is trimmed to the aircraft before it runs free.
-//! The initial state and the six coefficients at trim are those with which the simulation fits all
-//! outputs best, weighted by their noise, up to the first input. After that the model alone changes
+//! Initial state and the six coefficients at trim are chosen so that the simulation fits all
+//! outputs best up to the first input, weighted by their noise. After that the model alone changes
 //! the coefficients.
 
 use nalgebra::{DMatrix, DVector};
@@ -60,9 +60,9 @@ pub fn matched(simulation: &Simulation) -> MatchedStart {
     }
 }
 
-/// Slopes of the outputs along the parameters of a start, each over its noise.
+/// Slopes of the outputs along the parameters of a start, over the noise of each output.
 struct Slopes {
-    /// Row by row: samples, and outputs that ingest has not repaired.
+    /// Sample, output and slopes of each row; outputs that ingest has repaired have no row.
     rows: Vec<(usize, usize, DVector<f64>)>,
     covariance: DMatrix<f64>,
 }

@@ -22,8 +22,8 @@ use crate::tables::{
     Airframe, DeviationBasis, FlyingQuality, Level, LevelRow, QualityRow, RootRow,
 };
 
-/// Seed of the draws. All angles of attack use the same random numbers, so probabilities are as
-/// smooth over α as the posterior.
+/// Seed of the draws. All angles of attack use the same random numbers, so that probabilities vary
+/// as smoothly over α as the posterior.
 const SEED: u64 = 21;
 
 /// Share of draws with another pattern of modes, above which the standard deviation is taken from

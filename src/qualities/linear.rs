@@ -20,11 +20,11 @@ pub type Matrix = SMatrix<f64, STATES, STATES>;
 pub type Vector = SVector<f64, STATES>;
 pub type ByCoefficient = SMatrix<f64, STATES, COEFFICIENTS>;
 
-/// Equations of an axis with their slopes along each value of the posterior: rates A x + B u of the states
-/// and the pitch control, and with a lag A x + B u + m α̇.
+/// Linear equations of an axis, with their slopes along each value of the posterior. The rates of
+/// the states x with the pitch control u are A x + B u, or with a lag A x + B u + m α̇.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearModel {
-    /// A without aerodynamics.
+    /// Matrix A without aerodynamics.
     pub rigid: Matrix,
     pub slopes: Vec<Matrix>,
     pub control_slopes: Vec<Vector>,
@@ -39,7 +39,7 @@ pub struct LinearModel {
 pub struct Lag {
     /// Index of α among the states.
     pub alpha: usize,
-    /// Slopes of m.
+    /// Slopes of m along each value of the posterior.
     pub slopes: Vec<Vector>,
 }
 
@@ -76,8 +76,9 @@ impl LinearModel {
 }
 
 impl Lag {
-    /// Solves for the rates. With e the unit vector of α, ẋ = (I − m eᵀ)⁻¹ (A x + B u), and the inverse is
-    /// I + m eᵀ/(1 − eᵀm). The slopes follow from those of (I − m eᵀ) A.
+    /// Solves the equations with a lag for the rates. Let e be the unit vector of α and I the
+    /// identity. Then ẋ = (I − m eᵀ)⁻¹ (A x + B u), and the inverse is I + m eᵀ/(1 − eᵀm). The
+    /// slopes follow from the slopes of (I − m eᵀ) A.
     fn solved(&self, explicit: &Solved, values: &DVector<f64>) -> Solved {
         let effect = weighted_sum(&self.slopes, values);
         let share = effect / (1.0 - effect[self.alpha]);
@@ -122,7 +123,7 @@ pub struct Effect {
     pub by_control: f64,
     /// Change with α̇, s.
     pub by_alpha_rate: f64,
-    /// Share of the coefficient at trim.
+    /// Part of the coefficient at trim.
     pub at_trim: f64,
 }
 

@@ -1,8 +1,8 @@
 //! Longitudinal equations about steady flight: states velocity, α, q, θ.
 //!
 //! The rows of α, q and θ are the equations that are estimated ([`crate::dynamics::Longitudinal`])
-//! with their own slopes. They take the velocity as measured; here it is a state, at constant
-//! thrust and density:
+//! with their own slopes. Estimation takes the velocity V as measured. Here V is a state, at
+//! constant thrust T and density, with γ the flight-path angle:
 //!
 //! m V̇ = T_x cos α + T_z sin α − q̄S (CA cos α + CN sin α) − m g sin γ,  q̄ ~ V².
 //!

@@ -36,7 +36,7 @@ impl LinearModel {
 }
 
 impl Solved {
-    /// Entry of A with its slopes.
+    /// Entry of the matrix A with its slopes.
     fn a(&self, i: usize, j: usize) -> Dual {
         let slopes = self.slopes.iter().map(|m| m[(i, j)]);
         Dual::new(self.matrix[(i, j)], slopes.collect())

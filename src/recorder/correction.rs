@@ -1,8 +1,8 @@
 //! Corrections of flights by the errors of the other flights.
 //!
 //! A flight that determines an error by itself keeps its own estimate. Another flight gets the
-//! posterior from its weak evidence and the errors of the others. An error far from that of the
-//! others corrects nothing.
+//! posterior from its weak evidence and the errors of the others. If the error of a flight is far
+//! from the other flights', the flight is not corrected by it.
 
 use std::collections::BTreeSet;
 
@@ -56,8 +56,8 @@ pub fn correct_flights(
 }
 
 impl Findings {
-    /// Completes the errors of an instrument that its flight does not determine, and withdraws
-    /// corrections by errors that are far from those of the other flights.
+    /// Completes the errors of an instrument that its flight does not determine. Withdraws
+    /// corrections by errors that are far from the errors of the other flights.
     fn complete(&mut self, row: &mut InstrumentRow, settings: &Compatibility) {
         for (one, trend) in self.examined.iter().zip(&mut self.rows) {
             let (series, error) = (&one.series, one.series.error);
@@ -89,7 +89,7 @@ impl Findings {
     }
 }
 
-/// Value on a grid whose step is a power of two.
+/// Rounds a value to a grid whose step, a power of two, is a fraction of the bound.
 fn on_grid(value: f64, bound: f64) -> f64 {
     let step = (bound / STEPS_IN_BOUND).log2().floor().exp2();
     step * (value / step).round()

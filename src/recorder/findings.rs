@@ -8,7 +8,7 @@ use crate::tables::{
     ALL_FLIGHTS, CommonErrorVerdict, InstrumentError, InstrumentTrend, InstrumentTrendRow,
 };
 
-/// Probability of any false alarm about the history of all series.
+/// Probability of one or more false alarms over the histories of all series.
 const ALARM_PROBABILITY: f64 = 0.01;
 
 /// Number of standard deviations above which an error common to all flights is certain.
@@ -58,12 +58,12 @@ impl ExaminedSeries {
         }
     }
 
-    /// Flights far from the others.
+    /// Ids of the flights far from the others.
     pub fn far(&self) -> &[String] {
         self.common.as_ref().map_or(&[], |common| &common.far)
     }
 
-    /// `true` if the part of the mean that corrections leave is certainly no ordinary error.
+    /// `true` if the mean error that remains after corrections is certainly larger than ordinary.
     fn is_wrong_in_every_flight(&self) -> bool {
         self.common.as_ref().is_some_and(|common| {
             let size = (common.mean - self.series.corrected).abs();

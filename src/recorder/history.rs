@@ -1,9 +1,10 @@
 //! Steps and drifts of an error in the order of the flights.
 //!
-//! A step divides the flights in two parts with a mean each; a drift is a line over the flights. Either
-//! is a regression with the scatter between flights estimated beside it, and its size over its standard
-//! error has Student's t distribution. The probability of the largest step is that of one place times
-//! the number of places (Bonferroni), so false alarms are no more frequent than stated.
+//! A step divides the flights in two parts with a mean each; a drift is a line over the flights.
+//! Either is fitted by a regression, together with the scatter between flights; its size over its
+//! standard error has Student's t distribution. The probability of the largest step is the
+//! probability of a step at one place times the number of places (Bonferroni). False alarms are
+//! therefore no more frequent than stated.
 
 use super::common_error::CommonError;
 use super::error_series::{ErrorSample, ErrorSeries};

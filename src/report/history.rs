@@ -90,7 +90,7 @@ pub fn time_scale(history: &History) -> Scale {
     until(duration_s.max(1e-3))
 }
 
-/// Time axis from zero to an end that need not be round.
+/// Time axis from zero to `end_s`, which need not be a round number.
 #[must_use]
 pub fn until(end_s: f64) -> Scale {
     Scale {

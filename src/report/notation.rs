@@ -111,7 +111,8 @@ pub fn without_unit(signal: &str) -> &str {
         .unwrap_or(signal)
 }
 
-/// A number with `significant` digits and a typographic minus; a dash if missing or not finite.
+/// Writes a number with `significant` digits and a typographic minus; a dash if it is missing or
+/// not finite.
 #[must_use]
 pub fn number(value: Option<f64>, significant: usize) -> String {
     let Some(value) = value.filter(|v| v.is_finite()) else {

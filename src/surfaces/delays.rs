@@ -1,9 +1,10 @@
 //! Delays of the surfaces from the evidence of many maneuvers.
 //!
-//! A recorder delays all its channels alike, or each bus by its own delay: τ_s = μ + d_s. μ and d_s
-//! are normal with standard deviations that the data determine, from well below a millisecond to
-//! the tens of milliseconds of a bus. A surface that hardly moves thus gets the delay of the
-//! others, with a bound as wide as they differ.
+//! A recorder delays all its channels alike, or each bus by its own delay. The delay of a surface s
+//! is τ_s = μ + d_s, with a common part μ and its own part d_s. μ and d_s are normal with standard
+//! deviations that the data determine, from well below a millisecond to the tens of milliseconds of
+//! a bus. A surface that hardly moves thus gets the delay of the others, with a bound as wide as
+//! the difference between surfaces.
 //!
 //! Maneuvers are weighted by Student's t, since a model that does not fit a maneuver biases its
 //! delays. The bound is the larger of the posterior's and the jackknife's, and at least the error
@@ -15,9 +16,9 @@ use super::evidence::{DelayEvidence, FlightEvidence, SurfaceDelay};
 use crate::numerics::random_effects::{Observation, RandomEffects};
 use crate::numerics::symmetric;
 
-/// Error of the equations in a delay, as a share of the sampling interval, since signals are linear
-/// between samples. In simulated campaigns without delay the estimate is 0.45 ms at a sampling
-/// interval of 25 ms.
+/// Error that linear interpolation between samples leaves in a delay, as a share of the sampling
+/// interval. In simulated campaigns without delay the estimate is 0.45 ms at a sampling interval of
+/// 25 ms.
 const OF_STEP: f64 = 0.02;
 
 /// Standard deviations that delays may have, in common and by surface, s: each twice the one
@@ -116,7 +117,7 @@ fn surfaces_of(groups: &[Vec<&DelayEvidence>]) -> Vec<String> {
     surfaces
 }
 
-/// Quadratic cost ½ τᵀ H τ − τᵀ h of all surfaces' delays.
+/// Information on the delays τ of all surfaces: matrix H and vector h of the cost ½ τᵀ H τ − τᵀ h.
 #[derive(Clone, Debug)]
 struct Information {
     matrix: DMatrix<f64>,
@@ -154,8 +155,8 @@ impl Information {
         self.moment += weight * &other.moment;
     }
 
-    /// Squared distance of the own delays from given ones, over their degrees of freedom; the own
-    /// delays have a wide prior.
+    /// Squared distance of a maneuver's own delays from given delays, and its degrees of freedom.
+    /// The own delays have a wide prior.
     fn distance(&self, delays: &DVector<f64>) -> Option<(f64, f64)> {
         let count = delays.len();
         let own = &self.matrix + DMatrix::identity(count, count) * OWN_S.powi(-2);
@@ -168,7 +169,8 @@ impl Information {
 
 type Robust = (DVector<f64>, Vec<f64>, Vec<f64>);
 
-/// Delays with weights of the maneuvers, standard deviations, and those of the jackknife.
+/// Estimates the delays with robust weights of the maneuvers. Returns delays, their standard
+/// deviations, and the standard deviations of the jackknife.
 fn robust(groups: &[Vec<Information>], count: usize) -> Option<Robust> {
     let mut weights: Vec<Vec<f64>> = groups.iter().map(|g| vec![1.0; g.len()]).collect();
     let mut sums = weighted_sums(groups, &weights, count);
@@ -286,7 +288,7 @@ struct SpreadPosterior {
 }
 
 impl SpreadPosterior {
-    /// The prior has covariance own² I + common² 1 1ᵀ.
+    /// Posterior for one pair of spreads. The prior covariance is own² I + common² 1 1ᵀ.
     fn new(data: &Information, common_s: f64, own_s: f64) -> Option<SpreadPosterior> {
         let count = data.moment.len();
         let (own, common) = (own_s * own_s, common_s * common_s);

@@ -13,7 +13,7 @@ use super::weighted_fit::{Prior, WeightedFit};
 const OF_STATES: f64 = 3.0;
 
 /// Prior standard deviation of a derivative along a surface about the tunnel's value, in sizes of
-/// its table, for the delays: it fixes the derivatives of surfaces that hardly move.
+/// its table, when delays are estimated. It fixes the derivatives of surfaces that hardly move.
 const OF_SURFACES: f64 = 0.5;
 
 /// Standard deviation of the tunnel's values in the comparison of effects, in sizes of the table:
@@ -28,9 +28,9 @@ const WITHOUT_TABLE: f64 = 1e3;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DelayEvidence {
     pub surfaces: Vec<String>,
-    /// H by rows, 1/s².
+    /// Matrix H, row by row, 1/s².
     pub information: Vec<f64>,
-    /// h, 1/s.
+    /// Vector h, 1/s.
     pub moment: Vec<f64>,
 }
 
@@ -61,7 +61,7 @@ pub struct FlightEvidence {
     pub step_s: f64,
     /// One entry per maneuver.
     pub delays: Vec<DelayEvidence>,
-    /// Delays that the flight gives by itself.
+    /// Delays from this flight alone.
     pub own_delays: Vec<SurfaceDelay>,
     /// One entry per maneuver and surface.
     pub effects: Vec<SurfaceEffect>,

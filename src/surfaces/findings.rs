@@ -23,7 +23,8 @@ struct MeanEffect {
 }
 
 impl MeanEffect {
-    /// Mean weighted by the bounds; its own bound includes the scatter of the maneuvers.
+    /// Mean of the effects, weighted by their bounds. The bound of the mean includes the scatter
+    /// between maneuvers.
     fn of<'a>(effects: impl Iterator<Item = &'a SurfaceEffect> + Clone) -> MeanEffect {
         let weights = effects.clone().map(|e| e.bound.powi(-2));
         let information: f64 = weights.clone().sum();

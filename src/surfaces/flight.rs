@@ -1,4 +1,4 @@
-//! Evidence of a flight: that of its maneuvers, linearised about their common delays.
+//! Evidence of a flight: the evidence of its maneuvers, linearised about their common delays.
 
 use super::delays;
 use super::evidence::{FlightEvidence, SurfaceDelay};
@@ -45,7 +45,7 @@ pub fn flight_evidence(
     evidence
 }
 
-/// Delay of a surface among some; zero for another surface.
+/// Delay of a surface; zero for a surface that is not in the list.
 fn known_delay_s(delays: &[SurfaceDelay], surface: &str) -> f64 {
     let known = delays.iter().find(|delay| delay.surface == surface);
     known.map_or(0.0, |delay| delay.delay_s)

@@ -16,8 +16,8 @@ pub type Spectrum = Vec<Complex<f64>>;
 /// Lowest frequency, Hz: below it the motion is trim and drift.
 const LOWEST_HZ: f64 = 0.1;
 
-/// Highest frequency, Hz. Surfaces and airframe move below it; above it the rates' noise dominates,
-/// and up to 5 Hz the delays of simulated campaigns change by less than 0.1 ms.
+/// Highest frequency, Hz. Surfaces and airframe move below it, and the rates' noise dominates above
+/// it. Up to 5 Hz the delays of simulated campaigns change by less than 0.1 ms.
 const HIGHEST_HZ: f64 = 2.5;
 
 /// Largest share of the sampling rate, below which the slope of the rates keeps its phase.
@@ -106,7 +106,8 @@ fn without_mean(series: &[f64], factors: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Taper at a sample, and its slope per sample: a raised cosine at either end, one between.
+/// Taper at a sample, and its slope per sample. The taper is a raised cosine at either end, and one
+/// between.
 fn taper(sample: usize, samples: usize) -> (f64, f64) {
     let rise = TAPERED * samples as f64;
     let from_start = sample as f64 + 0.5;
@@ -123,8 +124,9 @@ fn taper(sample: usize, samples: usize) -> (f64, f64) {
 
 /// Series of a surface and its spectra, prepared for shifts in time.
 ///
-/// With w the taper, y(t + τ) has the spectrum e^(jωτ) ∫ w(t − τ) y(t) e^(−jωt) dt. Since the taper
-/// rises over seconds, w(t − τ) ≈ w(t) − τ w'(t).
+/// Let w be the taper, τ the shift, s, and ω the angular frequency, rad/s. The tapered series y(t +
+/// τ) has the spectrum e^(jωτ) ∫ w(t − τ) y(t) e^(−jωt) dt. Since the taper rises over seconds, w(t
+/// − τ) ≈ w(t) − τ w'(t).
 #[derive(Clone, Debug)]
 pub struct Shifted {
     spectrum: Spectrum,

@@ -67,7 +67,8 @@ use super::settings::{Criterion, Settings};
 use crate::numerics::order_statistics::upper_median;
 use crate::numerics::student;
 
-/// Standard deviations beyond which a residual has no influence on the order of the polynomial.
+/// Distance from the trend beyond which a residual has no further influence on the choice of the
+/// order, standard deviations.
 const OUTLYING: f64 = 3.0;
 
 /// A fitted trend.
@@ -87,7 +88,7 @@ pub(super) struct TrendFit {
     deviation_of_one_more: f64,
     degrees_of_freedom: usize,
     criterion: f64,
-    /// In the points' order.
+    /// Residual of each point, in the points' order.
     residuals: Vec<Residual>,
 }
 

@@ -8,7 +8,7 @@ use super::scatter::scatter_squared;
 
 /// Variance of the residuals beyond the bounds, in two parts.
 pub(super) struct LackOfFit {
-    /// λ², the variance of the derivative about the curve.
+    /// Squared lack of fit λ²: variance of the derivative about the curve.
     pub lack2: f64,
     /// Variance of the maneuvers' own deviations, from maneuvers of one flown α.
     pub own2: f64,
@@ -39,7 +39,7 @@ impl LackOfFit {
 struct AboutMeans {
     /// Residual of each maneuver.
     residuals: DVector<f64>,
-    /// One less each maneuver's share in the mean.
+    /// One minus each maneuver's share in its mean.
     freedom: Vec<f64>,
     /// Mean residual of each flown α.
     means: Vec<f64>,

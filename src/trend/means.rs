@@ -1,10 +1,11 @@
 //! Means of a derivative at the flown angles of attack, where the maneuvers are too few for a
 //! trend.
 //!
-//! The mean of the maneuvers of one flown α has weights 1/(b² + τ²), with b their bounds. τ² is the
-//! value for which the weighted sum of squared residuals equals their degrees of freedom, as for a
-//! trend. For two maneuvers it is ((y₁ − y₂)² − b₁² − b₂²)/2, or zero. The interval is the normal
-//! one: bounds are standard deviations, and no variance is estimated from one or two values alone.
+//! The mean of the maneuvers of one flown α has weights 1/(b² + τ²), with b their bounds. The
+//! scatter τ² between maneuvers is chosen so that the weighted sum of squared residuals equals
+//! their degrees of freedom, as for a trend. For two estimates y₁ and y₂ it is ((y₁ − y₂)² − b₁² −
+//! b₂²)/2, or zero if that is negative. The interval is the normal one: bounds are standard
+//! deviations, and no variance is estimated from one or two values alone.
 
 use super::point::Point;
 
@@ -13,9 +14,9 @@ use super::point::Point;
 pub(super) struct Mean {
     pub alpha_deg: f64,
     pub value: f64,
-    /// From bounds and scatter, without errors that the maneuvers share.
+    /// Standard error from bounds and scatter, without errors that the maneuvers share.
     pub standard_error: f64,
-    /// τ.
+    /// Scatter τ between the maneuvers.
     pub scatter: f64,
     /// Standard deviation of one more maneuver's estimate: bound and scatter.
     pub one_more: f64,

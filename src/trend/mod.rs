@@ -1,9 +1,9 @@
-//! Trend fits the estimates of each derivative across α by least squares, for the derivative's group
-//! of classes and for each class alone.
+//! Trend fits the estimates of each derivative across α by least squares, for the derivative's
+//! group of classes and for each class alone.
 //!
-//! The fit is in [`fit`]: a polynomial or spline in α that a criterion chooses, with weights
-//! 1/(bound² + τ²), where τ is the scatter between maneuvers of a class beyond their bounds. Where the
-//! maneuvers are too few for a trend, [`means`] gives a mean at each flown α.
+//! The fit is in [`fit`]: a polynomial or spline in α, whose order a criterion chooses. The weights
+//! are 1/(bound² + τ²), with τ the scatter between maneuvers of a class beyond their bounds. Where
+//! the maneuvers are too few for a trend, [`means`] gives a mean at each flown α.
 
 mod basis;
 #[cfg(test)]

@@ -6,9 +6,9 @@ pub(super) struct Point {
     pub alpha_deg: f64,
     pub value: f64,
     pub bound: f64,
-    /// Index of its class among those of the trend.
+    /// Index of the maneuver's class among the classes of the trend.
     pub class: usize,
-    /// Index of its flown α among those of the trend.
+    /// Index of the maneuver's flown α among the flown α of the trend.
     pub flown: usize,
 }
 
@@ -18,7 +18,8 @@ impl Point {
     }
 }
 
-/// Counts the flown α of points sorted by α: one spans half a step of the published grid.
+/// Numbers the flown α of points sorted by α. Points within half a step of the published grid count
+/// as one flown α.
 pub(super) fn count_flown<'a>(points: impl Iterator<Item = &'a mut Point>, step_deg: f64) {
     let mut current: Option<(usize, f64)> = None;
     for point in points {
@@ -34,7 +35,7 @@ pub(super) fn count_flown<'a>(points: impl Iterator<Item = &'a mut Point>, step_
     }
 }
 
-/// The flown α, deg, ascending: each the mean of its maneuvers, to a tenth.
+/// Flown α, deg, ascending: each is the mean of its maneuvers, rounded to a tenth.
 pub(super) fn flown_alphas(points: &[Point]) -> Vec<f64> {
     let mean = |own: &[Point]| own.iter().map(|p| p.alpha_deg).sum::<f64>() / own.len() as f64;
     points

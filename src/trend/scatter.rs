@@ -12,8 +12,8 @@ pub(super) const HUBER: f64 = 1.5;
 pub(super) const HUBER_VARIANCE: f64 = 0.778_465;
 /// Least bound, as a share of the median bound: bounds are uncertain by a factor of a few.
 const BOUND_FLOOR: f64 = 0.25;
-/// Least number of maneuvers of a class with a scatter of its own; classes with fewer share that of
-/// all.
+/// Least number of maneuvers of a class with a scatter of its own; classes with fewer maneuvers
+/// share the scatter of all.
 const OWN_SCATTER: usize = 8;
 
 /// Bounds squared, none smaller than the floor.
@@ -45,7 +45,8 @@ pub(super) fn strata(points: &[Point]) -> Vec<Vec<usize>> {
     strata
 }
 
-/// b² + τ² of each point, with τ of its class if that is a stratum, otherwise τ of all.
+/// Variance b² + τ² of each point. τ is that of its class if the class is a stratum, otherwise that
+/// of all points.
 pub(super) fn total_variances(
     residuals: &DVector<f64>,
     variances: &[f64],
@@ -62,8 +63,8 @@ pub(super) fn total_variances(
     total
 }
 
-/// Solves for τ² of some of the points: the sum of their squared residuals over their variances,
-/// outliers cut, equals its expectation. The sum falls as τ² grows, so bisection finds it.
+/// Solves for τ² of some of the points. The sum of their squared residuals over their variances,
+/// with outliers cut, must equal its expectation. The sum falls as τ² grows, so bisection finds τ².
 pub(super) fn scatter_squared(
     residuals: &DVector<f64>,
     variances: &[f64],

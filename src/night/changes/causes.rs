@@ -15,7 +15,8 @@ pub(super) struct Causes {
     gone_flights: BTreeSet<String>,
     /// Causes of changed maneuvers, by the derivatives that they estimate and by class.
     of_derivatives: BTreeMap<String, BTreeMap<String, BTreeSet<String>>>,
-    /// Classes that were flown. A trend's group that is no class has maneuvers of several.
+    /// Classes that were flown. A trend's group that is not a class has maneuvers of several
+    /// classes.
     classes: BTreeSet<String>,
 }
 
@@ -54,8 +55,8 @@ impl Causes {
         phrase(causes.iter().map(|c| c.words.as_str()))
     }
 
-    /// Causes by settings and methods up to the estimate; those of other classes only if there are
-    /// no others.
+    /// Causes by settings and methods up to the estimate. Settings of other classes are listed only
+    /// if there are no other causes.
     fn of_settings(&self, class: &str) -> Vec<&Cause> {
         let (of_others, own): (Vec<&Cause>, Vec<&Cause>) = self
             .of_origin(false)
@@ -125,7 +126,7 @@ impl Causes {
     }
 }
 
-/// `true` for a setting of another class than this.
+/// `true` for a setting of a class other than this one.
 fn is_of_other_class(cause: &Cause, class: &str) -> bool {
     let mut path = cause.subject.split('.');
     matches!(path.next(), Some("classes" | "recognition"))

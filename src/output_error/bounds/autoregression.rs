@@ -44,8 +44,8 @@ impl Autoregression {
         best
     }
 
-    /// Extends the process by one order. Returns false, unchanged, without a further
-    /// autocovariance, or if no process can have it.
+    /// Extends the process by one order. Returns `false` and leaves the process unchanged if there
+    /// is no further autocovariance, or if no process can have it.
     fn lengthen(&mut self, autocovariances: &[f64]) -> bool {
         let a = &mut self.coefficients;
         let Some((next, past)) = autocovariances
@@ -90,10 +90,10 @@ impl Autoregression {
         self.innovation / (gain * gain)
     }
 
-    /// Samples until the impulse response has decayed, at most `longest`.
+    /// Number of samples until the impulse response has decayed, at most `longest`.
     pub fn memory(&self, longest: usize) -> usize {
         const DEAD: f64 = 1e-3;
-        /// Response so small that it cannot grow again.
+        /// Response below which the computation ends, because it cannot grow above `DEAD` again.
         const GONE: f64 = 1e-9;
         let order = self.coefficients.len();
         let (mut answer, mut last) = (vec![1.0], 0);

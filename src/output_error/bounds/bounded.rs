@@ -1,5 +1,5 @@
-//! Data of the bounds (1.7) besides the likelihood: residuals with their sensitivities in blocks,
-//! and the noise of signals that the equations take as exact.
+//! Data that the bounds (1.7) need besides the likelihood: residuals with their sensitivities in
+//! blocks, and the noise of signals that the equations take as exact.
 
 use nalgebra::DMatrix;
 
@@ -17,7 +17,8 @@ pub trait Bounded: Likelihood {
     /// series are independent.
     fn series(&self, response: &Self::Response, weights: &[f64; OUTPUTS]) -> Vec<BlockSeries>;
 
-    /// Σ Sᵀ W R W S for white residuals.
+    /// Covariance Σ Sᵀ W R W S of the gradient for white residuals, with sensitivities S, weights W
+    /// and noise variances R.
     fn white_covariance(&self, response: &Self::Response, weights: &[f64; OUTPUTS])
     -> DMatrix<f64>;
 

@@ -2,10 +2,11 @@
 //! for noise. A bias or scale error moves a maneuver's estimates as a whole and hardly shows in the
 //! residuals.
 //!
-//! The estimates solve Σ Sᵀ W v = 0. An error of one standard deviation changes the residuals at
-//! the same parameters to v′, so the estimates move by H⁻¹ Σ Sᵀ W (v′ − v), to first order in the
-//! error. A surface's scale error or bias is equivalent to its derivatives
-//! in error, so v′ − v follows from sensitivities. For other errors it is integrated.
+//! Let S be the sensitivities, W the weights, v the residuals and H = Σ Sᵀ W S the information
+//! matrix. The estimates solve Σ Sᵀ W v = 0. An error of one standard deviation changes the
+//! residuals at the same parameters to v′, so the estimates change by H⁻¹ Σ Sᵀ W (v′ − v), to first
+//! order in the error. A surface's scale error or bias is equivalent to its derivatives in error,
+//! so v′ − v follows from sensitivities. For other errors it is integrated.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -24,7 +25,7 @@ use crate::output_error::likelihood::outcome::Fit;
 use crate::settings::settings;
 
 settings! {
-    /// Uncertainty that calibration leaves of a signal, standard deviations: reading = (1 + scale) ·
+    /// Uncertainty of a signal after calibration, standard deviations: reading = (1 + scale) ·
     /// truth + bias.
     #[derive(Copy)]
     pub struct Calibration {
@@ -40,9 +41,9 @@ settings! {
 pub struct Misreading<'a> {
     pub signal: &'a str,
     pub scale: f64,
-    /// In the signal's unit.
+    /// Bias, in the signal's unit.
     pub bias: f64,
-    /// Delay of a surface; other signals have none.
+    /// Delay of a surface, s; zero for other signals.
     pub delay_s: f64,
 }
 
@@ -58,7 +59,7 @@ impl<'a> Misreading<'a> {
         }
     }
 
-    /// Effect of the error, which changes the parameters by `change`.
+    /// Effect of the error, given the change of the parameters.
     #[must_use]
     pub fn effect(&self, change: &DVector<f64>) -> ErrorEffect {
         let signal = self.signal.to_owned();
@@ -72,7 +73,7 @@ impl<'a> Misreading<'a> {
         ErrorEffect::new(error, deviation, change)
     }
 
-    /// Window as it would have been recorded with the error.
+    /// Window as an instrument with the error would have recorded it.
     #[must_use]
     pub fn of_window(&self, window: &Window) -> Window {
         let misread = window.misread(self.signal, self.scale, self.bias);
@@ -211,16 +212,16 @@ impl<const NX: usize, E: Equations<NX>> Fitted<'_, NX, E> {
 /// Name of a signal that equals one throughout.
 const ONE: &str = "one";
 
-/// Effects of errors of all surfaces, from one pass. A surface acts through its derivatives alone: its
-/// scale error changes the outputs as errors of its derivatives, and its bias as errors of the
-/// coefficients' constants.
+/// Effects of errors of all surfaces, from one pass. A surface acts through its derivatives alone.
+/// Its scale error changes the outputs as an error of these derivatives does, and its bias as
+/// errors of the coefficients' constants do.
 struct SurfaceErrors<'a> {
     /// Derivatives along surfaces, with their values.
     derivatives: Vec<(&'a Derivative, f64)>,
-    /// Places of the case's parameters among those of this pass.
+    /// Places of the case's parameters among the parameters of this pass.
     places: Vec<usize>,
     names: Vec<String>,
-    /// Σ Sᵀ W S of all parameters of this pass.
+    /// Information Σ Sᵀ W S on all parameters of this pass.
     information: DMatrix<f64>,
 }
 

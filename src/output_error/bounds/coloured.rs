@@ -44,13 +44,13 @@ use crate::output_error::case::blocks::BlockSums;
 
 /// Largest number of rounds in which the absorbed part is added back.
 const ROUNDS: usize = 30;
-/// Relative change of an output's long-run variance below which its noise has settled.
+/// Relative change of an output's long-run variance in a round below which its noise has settled.
 const SETTLED: f64 = 0.01;
-/// Change of the absorbed part, as a share of the variance, below which white noise that has settled
-/// is not computed again: a bound is accurate to some hundredths only.
+/// Change of the absorbed variance, as a share of the variance, below which settled white noise is
+/// not computed again. A bound is accurate to some hundredths only.
 const UNCHANGED: f64 = 1e-3;
-/// Share of the noise variance that must remain in the residuals for white noise to be found in one
-/// round, by the ratio of the residuals' variance to that share.
+/// Least share of the noise variance that remains in the residuals for which white noise is found
+/// in one round: the residuals' variance is divided by the share.
 const MOSTLY_LEFT: f64 = 0.95;
 
 /// Estimated noise of each output, in the order of the outputs.
@@ -226,11 +226,12 @@ struct NoiseIteration<'a> {
     by_fast: AlignedMatrix,
     /// Covariance of the parameters from the noise of the blocks' means.
     by_slow: AlignedMatrix,
-    /// `by_slow` if the blocks' means were white with unit variance.
+    /// Covariance of the parameters if the blocks' means were white with unit variance.
     by_white: AlignedMatrix,
-    /// C, the change of the estimates with each block mean; `None` until the noise is coloured.
+    /// Change C of the estimates with each block mean; `None` until the noise is coloured.
     changes: Option<AlignedMatrix>,
-    /// R C of the process with innovations of variance one; `None` for white noise.
+    /// Product R C, with R the autocovariance of the process for innovations of variance one;
+    /// `None` for white noise.
     spread: Option<AlignedMatrix>,
     /// Mean variance of the block means that the parameters absorb (diagonal of S K Sᵀ), in the round
     /// in which the absorbed part was last added.
@@ -286,9 +287,10 @@ impl<'a> NoiseIteration<'a> {
         self.variance = autocovariances.first().copied().unwrap_or(0.0);
     }
 
-    /// Runs one round: adds the part that parameters of this covariance absorb to the residuals'
-    /// autocovariances, and fits the noise to the sum. For white noise the variance that leaves the
-    /// observed residuals is computed directly, so only the other outputs can change it later.
+    /// Runs one round: adds the part that the parameters absorb, for their present covariance, to
+    /// the residuals' autocovariances, and fits the noise to the sum. White noise of which the
+    /// residuals keep most is solved for directly, so only other outputs can change its variance
+    /// later.
     fn iterate(&mut self, covariance: &AlignedMatrix) {
         let (pairs, length) = (self.pairs[0], self.series.block_length);
         let absorbed_variance = covariance.dot(&self.series.between) / (length * length * pairs);

@@ -23,7 +23,7 @@ pub struct Considered<'a, const NX: usize, E: Equations<NX>> {
     pub wide: &'a Case<NX, E>,
     /// Value of every parameter of `wide`, by name.
     pub values: BTreeMap<&'a str, f64>,
-    /// Index of each parameter of `case` among those of the fit.
+    /// Index of each parameter of `case` among the parameters of the fit.
     pub places: Vec<usize>,
 }
 

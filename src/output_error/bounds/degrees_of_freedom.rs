@@ -22,7 +22,7 @@
 use super::autoregression::Autoregression;
 use crate::numerics::matrix::AlignedMatrix;
 
-/// Variance of each parameter, with the variance of that estimate.
+/// Estimated variance of each parameter, with the variance of that estimate.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct VarianceEstimates {
     variances: Vec<f64>,
@@ -65,7 +65,7 @@ impl VarianceEstimates {
         let mut twice = filtered.clone();
         twice.filter_columns(&noise.coefficients);
         let covariance = coefficient_covariance(&noise.coefficients, *degrees_of_freedom);
-        // Q, and −½ of its slopes along the coefficients.
+        // Q, and −½ times its slopes along the coefficients.
         let square = filtered.lagged_products_by_column(filtered, 0);
         let slopes: Vec<Vec<f64>> = (1..=noise.coefficients.len())
             .map(|lag| twice.lagged_products_by_column(filtered, lag))
@@ -103,7 +103,7 @@ impl VarianceEstimates {
     }
 }
 
-/// Covariance of the coefficients of a process fitted to a number of values, (L Lᵀ − U Uᵀ)/N.
+/// Covariance (L Lᵀ − U Uᵀ)/N of the coefficients of a process that is fitted to N values.
 fn coefficient_covariance(coefficients: &[f64], values: f64) -> Vec<Vec<f64>> {
     let p = coefficients.len();
     let lower = |i: usize, k: usize| if i == k { 1.0 } else { coefficients[i - k - 1] };

@@ -15,8 +15,8 @@ use nalgebra::SVector;
 
 use crate::dynamics::COEFFICIENTS;
 
-/// Term of the build-up: one derivative's coefficient, the state its regressor is proportional to
-/// (if any), and the column of regressors or factors of proportion.
+/// Term of the build-up: coefficient of one derivative; state to which its regressor is
+/// proportional, if any; and column of regressors, or of factors of proportion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Term {
     pub coefficient: usize,

@@ -73,9 +73,9 @@ pub(crate) struct LaneLayout {
 }
 
 impl LaneLayout {
-    /// Layout of the derivatives `terms`, sorted by coefficient, and of the numbers `initial_states`
-    /// and `biases` of other parameters. `followed` are the states of the axis that regressors can be
-    /// proportional to.
+    /// Layout for the derivatives `terms`, sorted by coefficient, and for this number of initial
+    /// states and biases. `followed` are the states of the axis that regressors can be proportional
+    /// to.
     pub fn new(
         terms: &[Term],
         followed: &[usize],
@@ -89,8 +89,8 @@ impl LaneLayout {
         layout
     }
 
-    /// Layout for many parameters without a regressor (`others`): they take the slots of the groups
-    /// in which no derivative stands, and the rest follows in the last group.
+    /// Layout for many parameters without a regressor (`others`). They take the slots of the groups
+    /// that have no derivative; the rest follows in the last group.
     pub fn dense(terms: &[Term], followed: &[usize], others: usize) -> LaneLayout {
         let slots = GroupSlots::new(terms, followed).apart(terms);
         let mut layout = LaneLayout::with_terms(terms, followed, &slots);
@@ -141,7 +141,7 @@ impl LaneLayout {
         self.columns.dedup();
     }
 
-    /// Puts `count` parameters without a regressor into the last group.
+    /// Appends `count` parameters without a regressor in the last group.
     fn place_others(&mut self, count: usize) {
         let first = self.groups[COEFFICIENTS - 1].end;
         self.groups[COEFFICIENTS] = first..first + padded(count);
@@ -190,8 +190,8 @@ fn padded(count: usize) -> usize {
 /// Slots that all groups have in common: derivatives along a state, along a state times a measured
 /// signal, then along measured signals.
 struct GroupSlots {
-    /// First slots of every group: state, and the column of the signal it is multiplied by; `None` as
-    /// long as no derivative needs the slot.
+    /// First slots of every group: a state, and the column of the signal that multiplies the state;
+    /// `None` while no derivative needs the slot.
     along_states: Vec<(usize, Option<usize>)>,
     columns: [Vec<usize>; COEFFICIENTS],
     /// Lanes of a group.
@@ -222,7 +222,7 @@ impl GroupSlots {
         }
     }
 
-    /// The same slots with columns of its own in each group.
+    /// Same slots, but each group has its own columns.
     fn apart(self, terms: &[Term]) -> GroupSlots {
         GroupSlots {
             columns: std::array::from_fn(|k| columns_of(terms, k)),
@@ -246,8 +246,9 @@ impl GroupSlots {
     }
 }
 
-/// Slots of derivatives along a state. Each followed state has one, which the first derivative along
-/// it takes with its column; a derivative along the same state with another column adds a slot.
+/// Slots of derivatives along a state. Each followed state has one slot, which the first derivative
+/// along this state takes with its column. A derivative along the same state with another column
+/// adds a slot.
 fn slots_along_states(terms: &[Term], followed: &[usize]) -> Vec<(usize, Option<usize>)> {
     let mut slots: Vec<(usize, Option<usize>)> = followed.iter().map(|s| (*s, None)).collect();
     for term in terms {

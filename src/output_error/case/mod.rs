@@ -31,7 +31,7 @@ use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
 
 pub use self::model::{InitialState, Model};
 
-/// Measured outputs (deg, deg/s, g), and the samples that count.
+/// Measured outputs (deg, deg/s, g), and a mask of the samples that count.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Measurements {
     pub values: Vec<[f64; OUTPUTS]>,
@@ -93,8 +93,8 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         )
     }
 
-    /// Prepares the same maneuver as recorded by another recorder. `windows` are that of the case
-    /// and that of the other recorder.
+    /// Prepares the same maneuver as another recorder would have recorded it. `windows` are the
+    /// window of this case and the window of the other recorder.
     #[must_use]
     pub fn as_recorded(
         &self,
@@ -178,7 +178,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         self.terms.len()
     }
 
-    /// Number of samples that count, of each output.
+    /// Number of samples of each output that count.
     #[must_use]
     pub fn used(&self) -> [usize; OUTPUTS] {
         std::array::from_fn(|o| self.measurements.used.iter().filter(|used| used[o]).count())

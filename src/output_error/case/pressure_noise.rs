@@ -1,8 +1,7 @@
 //! Noise of a dynamic pressure that is recorded more slowly than the other signals.
 //!
-//! Between two recorded values the signal is on the line through them, so the error of a value
-//! lasts over the samples on either side. Every coefficient acts in proportion to the dynamic
-//! pressure.
+//! Between two recorded values the signal is interpolated linearly, so the error of a value affects
+//! the samples on either side. Every coefficient acts in proportion to the dynamic pressure.
 
 use std::ops::Range;
 

@@ -1,6 +1,6 @@
-//! Sums of the normal equations, output by output: Σ s sᵀ, Σ s v, Σ s and Σ v² over the samples
-//! that count, with sensitivities s and residual v. Weights (1.4, 1.5) are applied afterwards, so
-//! other weights need no other pass.
+//! Sums of the normal equations of each output. With sensitivities s and residual v they are Σ s
+//! sᵀ, Σ s v, Σ s and Σ v² over the samples that count. Weights (1.4, 1.5) are applied afterwards,
+//! so other weights need no other pass.
 //!
 //! A sample's row holds the sensitivities, the residual and a one, so all sums of an output are one
 //! symmetric matrix. A coarse pass skips samples; its sums count the remaining ones as many times.
@@ -28,9 +28,9 @@ use crate::output_error::case::layout::LaneLayout;
 pub(crate) struct NormalSums {
     /// Gram matrix of the rows (s, v, 1) of each output; the lower triangle counts.
     gram: [AlignedBuffer; OUTPUTS],
-    /// Σ v (s, v, 1) of each output.
+    /// Moments Σ v (s, v, 1) of each output.
     moments: [AlignedBuffer; OUTPUTS],
-    /// Number of samples that count, of each output.
+    /// Number of samples of each output that count.
     counts: [usize; OUTPUTS],
     /// Distance between the samples of the pass.
     stride: usize,
@@ -135,12 +135,12 @@ impl NormalSums {
         self.stride * self.counts[output]
     }
 
-    /// Σ v² of an output.
+    /// Sum Σ v² of an output.
     pub fn square(&self, output: usize) -> f64 {
         self.stride as f64 * self.moments[output].slice()[self.layout.residual]
     }
 
-    /// Σ_o w_o Σ s v of all parameters.
+    /// Gradient Σ_o w_o Σ s v over the outputs o with weights w_o, for all parameters.
     pub fn gradient(&self, weights: &[f64; OUTPUTS]) -> DVector<f64> {
         let sum_of = |place: ParameterPlace| -> f64 {
             (0..OUTPUTS)
@@ -152,7 +152,7 @@ impl NormalSums {
         DVector::from_vec(sums)
     }
 
-    /// Σ s sᵀ of one output, for all parameters.
+    /// Sum Σ s sᵀ of one output, for all parameters.
     pub fn squares(&self, output: usize) -> DMatrix<f64> {
         self.symmetric_by_parameter(|a, b| {
             if a.acts_on(output) && b.acts_on(output) {
@@ -163,7 +163,7 @@ impl NormalSums {
         })
     }
 
-    /// Σ_o w_o Σ s sᵀ of all parameters.
+    /// Information Σ_o w_o Σ s sᵀ over the outputs o with weights w_o, for all parameters.
     pub fn information(&self, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {
         let width = self.layout.width();
         let mut sum = vec![0.0; width * width];
@@ -253,8 +253,8 @@ impl Sink for NormalAccumulator<'_> {
 
 impl NormalSums {
     /// Writes residual and one into the rows of a chunk's samples that count, and clears the other
-    /// rows. `residual` returns that of a sample and output, or `None` if the sample does not
-    /// count.
+    /// rows. `residual` returns the residual of a sample and output, or `None` if the sample does
+    /// not count.
     #[inline(always)]
     pub fn complete_rows(
         &mut self,

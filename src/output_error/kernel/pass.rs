@@ -1,11 +1,12 @@
 //! One pass over a maneuver: the states, and the sensitivities of all parameters beside them.
 //!
 //! A pass goes chunk by chunk. The [`Trajectory`] integrates the states and records the slopes of
-//! each stage. [`Propagators`] turn the slopes into matrices for all steps of the chunk side by side.
-//! With them all sensitivities take a step at once, s ← Φ s + Σ_j Γ_jk r_j over the stages j, where k
-//! is the coefficient of a derivative and r its regressor. Outputs have the sensitivities
-//! C s + D_k r. Parameters lie side by side in the lanes of the processor's vectors ([`LaneLayout`]).
-//! While the sink sums one chunk, the trajectory of the next one advances between the rows.
+//! each stage. [`Propagators`] turn the slopes into matrices for all steps of the chunk side by
+//! side. Let s be the sensitivities of the states to a derivative, k the coefficient of the
+//! derivative, and r_j its regressor at the stage j. All sensitivities take a step at once,
+//! s ← Φ s + Σ_j Γ_jk r_j. The outputs have the sensitivities C s + D_k r. Parameters lie side by side in
+//! the lanes of the processor's vectors ([`LaneLayout`]). While the sink sums one chunk, the
+//! trajectory of the next one advances between the rows.
 //!
 //! The loops are compiled for several widths of vectors and chosen when the program runs. Each lane
 //! is computed alike in all of them, with fused multiplication, so every width gives the same bits.
@@ -222,7 +223,7 @@ pub(crate) trait Correction<const NX: usize> {
     fn output_factors(&self, k: usize) -> Option<&[f64; VECTOR]>;
 
     /// Corrects the sensitivities `s` of the states in the vectors at some lanes, after those of
-    /// the outputs, `y`, were computed at the chunk's sample k. Changes `y` to the sensitivities
+    /// the outputs, `y`, were computed at the chunk's sample k. Replaces `y` by the sensitivities
     /// that the sink receives.
     fn correct<S: Simd, const N: usize>(
         &self,
@@ -366,7 +367,7 @@ impl<S: Simd, const NX: usize, K: Correction<NX>> Propagation<'_, S, NX, K> {
     }
 }
 
-/// C s + D r for lanes of one group.
+/// Sensitivities C s + D r of the outputs, for lanes of one group.
 #[inline(always)]
 fn output_sensitivities<S: Simd, const NX: usize, E: Equations<NX>>(
     simd: S,
@@ -388,7 +389,7 @@ fn output_sensitivities<S: Simd, const NX: usize, E: Equations<NX>>(
     y
 }
 
-/// Φ s + Σ Γ r for lanes of some groups.
+/// Sensitivities Φ s + Σ Γ r of the states after a step, for lanes of some groups.
 #[inline(always)]
 fn next_sensitivities<S: Simd, const NX: usize, E: Equations<NX>, const N: usize>(
     simd: S,

@@ -36,13 +36,13 @@ use crate::output_error::case::chunking::CHUNK;
 /// Propagators and output slopes of a chunk: entry by entry, sample after sample.
 #[repr(align(64))]
 pub(crate) struct Propagators<const NX: usize> {
-    /// Φ by state and state.
+    /// Matrix Φ, by state after and state before the step.
     pub phi: [[[f64; CHUNK]; NX]; NX],
-    /// Γ by stage, coefficient and state.
+    /// Matrices Γ, by stage, coefficient and state.
     pub gamma: [[[[f64; CHUNK]; NX]; COEFFICIENTS]; STAGES],
-    /// C: total slopes of the outputs along states.
+    /// Total slopes C of the outputs along the states.
     pub c: [[[f64; CHUNK]; NX]; OUTPUTS],
-    /// D: slopes of the outputs along coefficients.
+    /// Slopes D of the outputs along the coefficients.
     pub d: [[[f64; CHUNK]; COEFFICIENTS]; OUTPUTS],
 }
 
@@ -165,7 +165,7 @@ impl<const NX: usize> Propagators<NX> {
     }
 }
 
-/// M A of a stage.
+/// Product M A of a stage.
 #[inline(always)]
 fn times_a<S: Simd, const NX: usize, E: Equations<NX>>(
     simd: S,

@@ -1,8 +1,9 @@
-//! Newton-Raphson with the Gauss-Newton second gradient (1.3-1.5), damped where a full step does not
-//! lower the cost.
+//! Newton-Raphson with the Gauss-Newton second gradient (1.3-1.5), damped where a full step does
+//! not lower the cost.
 //!
-//! Far from the minimum the iteration uses a coarse response, of fewer and longer steps. That only
-//! improves the start: from there on every response is whole, and decides where the iteration ends.
+//! Far from the minimum the iteration uses a coarse response, of fewer and longer steps. The coarse
+//! iteration only improves the start. From there on every response is whole and decides where the
+//! iteration ends.
 
 use nalgebra::{Cholesky, DVector};
 
@@ -60,7 +61,7 @@ pub fn minimise<D: Likelihood>(
     fit
 }
 
-/// End of the coarse iteration.
+/// Result of the coarse iteration.
 struct CoarseFit {
     values: Vec<f64>,
     iterations: usize,
@@ -217,7 +218,8 @@ fn full_step(sums: &Sums) -> Option<DVector<f64>> {
     damped_step(sums, 0.0).or_else(|| damped_step(sums, FIRST_DAMPING))
 }
 
-/// Solves (H + damping · diag H) d = g at unit diagonal.
+/// Solves (H + damping · diag H) d = g for the step d, with the information H scaled to unit
+/// diagonal and the gradient g.
 fn damped_step(sums: &Sums, damping: f64) -> Option<DVector<f64>> {
     let unit = scale(&sums.information);
     let mut h = scaled(&sums.information, &unit);

@@ -16,9 +16,9 @@ pub struct SharedParameters {
 }
 
 impl SharedParameters {
-    /// Places the parameters of maneuvers, each with a label for its own ones, its parameters' names,
-    /// and the number of derivatives, which come first. `is_own` selects the derivatives that each
-    /// maneuver keeps to itself.
+    /// Places the parameters of maneuvers. Each maneuver has a label for its own parameters, the
+    /// names of all its parameters, and the number of derivatives, which come first. `is_own`
+    /// selects the derivatives that each maneuver keeps to itself.
     ///
     /// # Errors
     /// A sentence that names the maneuver whose free derivatives are not those of the first.
@@ -96,8 +96,8 @@ impl SharedParameters {
         self.members.get(member).map_or(&[], |places| places)
     }
 
-    /// Joint parameters from the shared derivatives and each maneuver's full set, of which its own
-    /// part is used.
+    /// Joint parameters, from the shared derivatives and all parameters of each maneuver; only a
+    /// maneuver's own parameters are taken from the latter.
     #[must_use]
     pub fn assemble(&self, shared: &[f64], members: &[Vec<f64>]) -> Vec<f64> {
         let mut joint = shared.to_vec();

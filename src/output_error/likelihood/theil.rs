@@ -38,7 +38,7 @@ pub struct OutputAgreement {
     square_measured: f64,
     /// Mean square of the computed values about their mean.
     square_computed: f64,
-    /// Mean product of both about their means.
+    /// Mean product of measured and computed values about their means.
     product: f64,
 }
 

@@ -1,10 +1,10 @@
 //! Linear regression on Fourier sums, weighted by the spectrum of its own residuals (Whittle).
 //!
-//! Fourier sums of stationary noise at the harmonics of its length are nearly uncorrelated, with
-//! variances along the noise's spectrum. The spectrum is that of the residuals, smoothed over
-//! neighbouring frequencies, and estimated in alternation with the parameters. Each complex equation
-//! is two real ones, its real and its imaginary part, with the same variance (Klein and Morelli
-//! 2006, chapter 7).
+//! Fourier sums of stationary noise at the harmonics of the series' length are nearly uncorrelated,
+//! and their variances follow the noise's spectrum. The spectrum is that of the residuals, smoothed
+//! over neighbouring frequencies, and estimated in alternation with the parameters. Each complex
+//! equation is two real ones, its real and its imaginary part, with the same variance (Klein and
+//! Morelli 2006, chapter 7).
 
 use nalgebra::{DMatrix, DVector};
 
@@ -122,7 +122,7 @@ impl Equations<'_> {
 }
 
 impl Regression {
-    /// Share of each equation's own response in its fitted value.
+    /// Leverage of each equation: share of its own response in its fitted value.
     fn leverages(&self) -> DVector<f64> {
         let spread = &self.weighted * &self.inverse;
         DVector::from_fn(self.weighted.nrows(), |i, _| {

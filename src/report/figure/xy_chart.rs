@@ -17,7 +17,7 @@ const MARGINS: [f64; 4] = [52.0, 8.0, 10.0, 36.0];
 /// Half of the side of a point's mark.
 const MARK: f64 = 2.2;
 
-/// An axis.
+/// Axis of a chart, linear or logarithmic.
 #[derive(Clone, Debug)]
 pub struct ChartAxis {
     pub label: String,
@@ -51,7 +51,7 @@ pub struct ChartSeries {
     pub is_joined: bool,
 }
 
-/// The chart.
+/// Chart of one quantity over another.
 #[derive(Clone, Debug)]
 pub struct XyChart<'a> {
     /// Id, unique in the page.
@@ -61,7 +61,7 @@ pub struct XyChart<'a> {
     pub description: &'a str,
     pub x: ChartAxis,
     pub y: ChartAxis,
-    /// From the outermost inwards.
+    /// Boxes of levels, from the outermost inwards.
     pub boxes: Vec<LevelBox>,
     pub series: Vec<ChartSeries>,
 }

@@ -320,7 +320,7 @@ fn rate_figure(
     }
 }
 
-/// A rate as measured in those histories that have it.
+/// Rate as measured, from the histories that contain it.
 fn measured_rates<'a>(label: &str, histories: &[&'a History]) -> Vec<(&'a History, Points)> {
     histories
         .iter()

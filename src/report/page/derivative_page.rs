@@ -78,7 +78,7 @@ pub fn groups(
     groups
 }
 
-/// Scale of angle of attack that all figures share, so that they can be laid side by side.
+/// Scale of angle of attack for all figures, so that they can be laid side by side.
 fn alpha_scale(derivatives: &[DerivativeResults]) -> Scale {
     let points = derivatives
         .iter()

@@ -1,5 +1,5 @@
-//! Charts of instruments whose errors change over the flights, are wrong in every flight, or are far from
-//! the others' in some.
+//! Charts of instruments whose errors change over the flights, are large in every flight, or are
+//! far from the others in some flights.
 
 use super::quality_charts::QualityChart;
 use crate::numerics::student::NORMAL_95;

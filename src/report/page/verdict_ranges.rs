@@ -75,7 +75,7 @@ pub fn bar_segments(ranges: &[VerdictRange]) -> Vec<Segment> {
         .collect()
 }
 
-/// More ranges than these are ordered by verdict, which is easier to read.
+/// Number of ranges above which they are ordered by verdict, which is easier to read.
 const MOST_RANGES: usize = 4;
 
 /// Ranges in words: `agrees 5°–25°, flight lower 30°–60°`.

@@ -15,7 +15,7 @@ use crate::report::notation::{self, NOTHING, angle, number};
 /// Width of the bar of verdicts over angle of attack, px.
 const BAR_WIDTH: u32 = 130;
 
-/// Larger percentages are not printed: the reference value is close to zero.
+/// Largest percentage that is printed; beyond it the reference value is close to zero.
 pub const LARGEST_PERCENTAGE: f64 = 999.5;
 
 /// One row of the table.
