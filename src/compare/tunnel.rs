@@ -331,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn a_derivative_without_a_tunnel_value_says_so() {
+    fn a_derivative_without_a_tunnel_value_has_its_own_verdict() {
         let none = one(flight(1.0, 0.1), None, &Settings::default());
         let settings = Settings {
             not_comparable: ["d".to_owned()].into(),

@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn slopes_that_the_data_show_tell_of_those_that_they_do_not() {
+    fn well_determined_slopes_determine_the_common_share_of_the_others() {
         // The first slope has a deviation of 0.005; the data have no information on the second.
         let effect = |first: f64| {
             let own = DVector::from_vec(vec![4e4, 1e-12]);

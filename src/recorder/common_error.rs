@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_of_flights_that_say_little_hold() {
+    fn bounds_of_flights_with_little_information_hold() {
         const TIMES: u32 = 300;
         let mut random = RandomStream::new(3, "recorder");
         let mut inside = 0;

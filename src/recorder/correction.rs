@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flight_that_says_nothing_takes_the_others_and_a_far_one_corrects_nothing() {
+    fn a_flight_without_evidence_takes_the_others_errors_and_a_far_one_corrects_nothing() {
         let (mut rows, mut findings) = campaign();
         let corrected = correct_flights(&mut rows, &mut findings, &Compatibility::default());
         let flights: Vec<&str> = corrected.iter().map(|c| c.flight_id.as_str()).collect();

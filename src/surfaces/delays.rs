@@ -426,7 +426,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_hold_the_truth_as_often_as_they_say() {
+    fn bounds_have_their_nominal_coverage() {
         let mut noise = Noise(11);
         let (mut held, mut all) = (0, 0);
         for _ in 0..60 {

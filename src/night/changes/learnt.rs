@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn half_the_deviation_teaches_its_logarithm_less_what_chance_would() {
+    fn half_the_deviation_gains_its_logarithm_less_the_gain_by_chance() {
         let (before, now) = (posterior(&[1.0], &[4.0]), posterior(&[1.0], &[1.0]));
         let expected = 2f64.ln() - 0.5 * (1.0 - 0.25);
         assert_relative_eq!(
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn points_that_say_the_same_teach_once() {
+    fn strongly_correlated_points_count_once() {
         // Two points correlated by 0.999...: the second adds next to nothing.
         let r = 1.0 - 1e-9;
         let before = posterior(&[0.0, 0.0], &[4.0, 4.0 * r, 4.0 * r, 4.0]);
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_posterior_teaches_nothing() {
+    fn equal_posteriors_have_no_divergence() {
         let same = posterior(&[1.0, 2.0], &[2.0, 0.5, 0.5, 1.0]);
         assert_relative_eq!(divergence(&same, &same).unwrap(), 0.0, epsilon = 1e-12);
     }
