@@ -70,7 +70,7 @@ fn share(value: Option<f64>, other: Option<f64>) -> Option<f64> {
     share.is_finite().then_some(share)
 }
 
-/// The ranges of the comparison with the tunnel, and the worst of them.
+/// Ranges of the comparison with the tunnel, and the worst ranges.
 #[must_use]
 pub fn ranges_of_tunnel(
     rows: &[ComparisonRow],
@@ -83,7 +83,7 @@ pub fn ranges_of_tunnel(
     })
 }
 
-/// The ranges of the comparison with one earlier campaign, and the worst of them.
+/// Ranges of the comparison with one earlier campaign, and the worst ranges.
 #[must_use]
 pub fn ranges_of_changes(
     rows: &[ChangeRow],

@@ -1,6 +1,6 @@
 //! The build-up as a JSBSim aerodynamics section.
 //!
-//! JSBSim's axes NORMAL (up), AXIAL (aft) and SIDE (right) are those of CN, CA and CY: its body
+//! JSBSim's axes NORMAL (up), AXIAL (aft) and SIDE (right) are the axes of CN, CA and CY: its body
 //! forces are −AXIAL, SIDE, −NORMAL. ROLL, PITCH and YAW are moments right wing down, nose up, nose
 //! right, as Cl, Cm, Cn. α and β are read in degrees, rates as `aero/bi2vel` p and r, `aero/ci2vel`
 //! q, which are p b/2V, r b/2V and q c̄/2V in radians. Vanes are forces in lbf and moments in ft

@@ -46,7 +46,7 @@ pub fn reach_deg<'a>(candidates: impl Iterator<Item = &'a Candidate>) -> (f64, f
 }
 
 /// Test points with the flight that gives their altitude and mass: the candidates as written, or
-/// those of all flights.
+/// else the points of all flights.
 fn test_points(cards: &Cards) -> Vec<(&FlightCard, &TestPoint)> {
     let first = cards.flights.values().next();
     if cards.next.candidates.is_empty() {

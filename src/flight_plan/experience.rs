@@ -10,7 +10,8 @@ use crate::numerics::order_statistics::median;
 use crate::output_error::error_effect::{ErrorEffect, SharedError};
 use crate::tables::{ContributionRow, FitRow, Outcome};
 
-/// Number of maneuvers that the campaign's share counts as, beside those of the class.
+/// Number of maneuvers for which the campaign's share counts in the mean with the class's own
+/// maneuvers.
 const PRIOR_MANEUVERS: f64 = 2.0;
 
 /// Maneuvers of the campaign with their results, in one order.

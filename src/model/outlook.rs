@@ -7,7 +7,7 @@
 //! [`Outlook`] holds the covariance of (A z + K u, B z). A maneuver then observes its rows of A z +
 //! K u with its own noise.
 //!
-//! Scales and weights remain those of the posterior; its spread over uncertain scales is in P. The
+//! Scales and weights are taken from the posterior; P includes the uncertainty of the scales. The
 //! values of the evidence have no effect, so it may have been computed with other held values.
 
 use std::collections::BTreeMap;

@@ -94,7 +94,7 @@ impl<'a> Step for IngestStep<'a> {
 
 impl IngestStep<'_> {
     /// Fault of the network, or of a file that changed while it was read. The bytes that were read
-    /// may then differ from those of the key.
+    /// may then differ from the bytes to which the key belongs.
     fn passing_fault(&self) -> Option<Problem> {
         let fault = |place: &std::path::Path, reason: &str| {
             let place = place.display().to_string();

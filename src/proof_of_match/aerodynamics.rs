@@ -339,7 +339,7 @@ pub struct CoefficientSlopes {
     pub by_derivative: Vec<f64>,
 }
 
-/// Index of a coefficient among those of both axes.
+/// Index of a coefficient among the coefficients of both axes.
 fn index(coefficient: Coefficient) -> usize {
     let first = match coefficient.axis() {
         Axis::Longitudinal => 0,

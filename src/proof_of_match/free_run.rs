@@ -236,7 +236,8 @@ impl RunEquations<'_> {
         self.instant_at(alpha_rate, state, point)
     }
 
-    /// Slopes of the loads at an instant, and those of each derivative's coefficient along it.
+    /// Slopes of the loads at an instant, and slope of each derivative's coefficient along the
+    /// derivative.
     pub fn load_slopes(&mut self, instant: &Instant, point: usize) -> (LoadSlopes, Vec<f64>) {
         let has_lag = self.aerodynamics.have_lag();
         let state = &instant.state;

@@ -28,7 +28,8 @@ use crate::numerics::sample_count::whole_steps;
 /// Seed of the draws.
 const SEED: u64 = 60;
 
-/// Longest step of the run with slopes, s. Probabilities differ by 0.2 % rms from those of steps of a quarter.
+/// Longest step of the run with slopes, s. With steps of a quarter of this length the probabilities
+/// differ by 0.2 % rms.
 const LONGEST_STEP_S: f64 = 0.1;
 
 /// Distance from the limit beyond which noise has no effect, standard deviations.

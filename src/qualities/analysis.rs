@@ -292,7 +292,7 @@ fn together(axes: impl Iterator<Item = BTreeMap<FlyingQuality, f64>>) -> Vec<(Fl
     axes.flatten().collect()
 }
 
-/// Level of each requirement, and the worst of them.
+/// Level of each requirement, then the worst level.
 fn levels_of(specification: &Specification, values: &levels::Values) -> Vec<Level> {
     let requirements = specification.requirements.iter();
     let mut found: Vec<Level> = requirements

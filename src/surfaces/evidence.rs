@@ -34,7 +34,8 @@ pub struct DelayEvidence {
     pub moment: Vec<f64>,
 }
 
-/// Delay of a surface against accelerations, rates and vanes; negative: ahead of them.
+/// Delay of a surface relative to accelerations, rates and vanes; negative if the surface is
+/// recorded early.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SurfaceDelay {
     pub surface: String,

@@ -50,13 +50,13 @@ pub struct Trends {
     pub problems: Vec<Problem>,
 }
 
-/// Fits the trends of every derivative: its group's, then its classes'. Derivatives keep the order in
-/// which they first appear.
+/// Fits the trends of every derivative: its group's, then its classes'. Derivatives keep the order
+/// in which they first appear.
 ///
-/// `estimates` are those of converged fits. Estimates with status `estimated`, a value and a bound
-/// (the corrected one where there is one) count. A group of fewer than three maneuvers has means
-/// instead of a trend; a class of fewer is skipped. A trend is published at the multiples of the step
-/// and at the derivative's `breakpoints`, deg, inside the range of its data.
+/// `estimates` must come from converged fits. Estimates with status `estimated`, a value and a
+/// bound (the corrected one where there is one) count. A group of fewer than three maneuvers has
+/// means instead of a trend; a class of fewer is skipped. A trend is published at the multiples of
+/// the step and at the derivative's `breakpoints`, deg, inside the range of its data.
 #[must_use]
 pub fn trends(
     estimates: &[EstimateRow],

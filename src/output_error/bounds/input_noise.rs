@@ -204,8 +204,8 @@ impl<const NX: usize, E: Equations<NX>> Adjoint<'_, NX, E> {
         at
     }
 
-    /// Covariance of the coefficients' errors at a sample; the noise of each surface and of the dynamic
-    /// pressure acts on all of them.
+    /// Covariance of the errors of the coefficients at a sample; the noise of each surface and of
+    /// the dynamic pressure acts on all coefficients.
     #[inline(always)]
     fn coefficient_noise(&self, k: usize) -> [[f64; COEFFICIENTS]; COEFFICIENTS] {
         let mut covariance = [[0.0; COEFFICIENTS]; COEFFICIENTS];

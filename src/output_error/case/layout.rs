@@ -2,20 +2,21 @@
 //!
 //! Terms of this file:
 //!
-//! - A *vector* is [`VECTOR`] numbers that the processor computes at once; a *lane* is the place of
-//!   one of them, counted through all vectors. Each lane holds the sensitivities to one parameter.
+//! - A *vector* is [`VECTOR`] numbers that the processor computes at once. A *lane* is the place of
+//!   one number, counted through all vectors. Each lane holds the sensitivities to one parameter.
 //! - A *group* is the lanes of one coefficient's derivatives, in whole vectors.
-//! - A *slot* is a place within a group. The same slot of each group has the same kind of regressor.
+//! - A *slot* is a place within a group. The same slot of each group has the same kind of
+//!   regressor.
 //! - A *row* is the regressors of one point in time; a *column* is one regressor over all points.
 //!
 //! # Lanes
 //!
 //! Lanes are, in order:
 //!
-//! 1. the group of each coefficient. All groups have the same number of lanes. A vector thus contains
-//!    derivatives of one coefficient only, and needs one factor ∂(rates)/∂(coefficient). The first
-//!    slots are derivatives along a state, in the order of the states, then derivatives along a
-//!    state times a measured signal, then those along measured signals;
+//! 1. the group of each coefficient. All groups have the same number of lanes. A vector thus
+//!    contains derivatives of one coefficient only, and needs one factor ∂(rates)/∂(coefficient).
+//!    The first slots are derivatives along a state, in the order of the states, then derivatives
+//!    along a state times a measured signal, then those along measured signals;
 //! 2. the group of the parameters without a regressor, such as initial states.
 //!
 //! A bias shifts an output and not the states, so it needs no lane in the integration. Two lanes
@@ -23,11 +24,11 @@
 //!
 //! # Regressors
 //!
-//! Usually each surface has one derivative in each of the three coefficients. Their regressor is the
-//! same column, so all groups read one row of shared columns, if the columns of all coefficients fit
-//! into the widest group. A slot without a derivative is computed and ignored. In a *dense* layout
-//! each group has a row of its own, with zero in the slots without a derivative; parameters without
-//! a regressor take these slots.
+//! Usually each surface has one derivative in each of the three coefficients. Their regressor is
+//! the same column, so all groups read one row of shared columns, if the columns of all
+//! coefficients fit into the widest group. A slot without a derivative is computed and ignored. In
+//! a *dense* layout each group has a row of its own, with zero in the slots without a derivative;
+//! parameters without a regressor take these slots.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -177,7 +178,7 @@ impl LaneLayout {
         VECTOR * self.used.len().max(self.groups[COEFFICIENTS].end / VECTOR)
     }
 
-    /// First lane of the initial states, behind those of the derivatives.
+    /// First lane of the initial states, which follow the derivatives.
     pub fn first_initial_state(&self) -> usize {
         self.groups[COEFFICIENTS].start
     }

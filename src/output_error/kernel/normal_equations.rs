@@ -320,7 +320,7 @@ impl NormalSums {
     }
 }
 
-/// Adds the rows of some samples, from `first` on, to those of their blocks.
+/// Adds the rows of some samples, from `first` on, to the rows of their blocks.
 #[inline(always)]
 fn add_to_blocks<S: Simd>(
     simd: S,

@@ -218,13 +218,13 @@ fn initial_sensitivities<const NX: usize>(
 
 /// Correction of the states by the measurements, between a sample's outputs and the next step.
 pub(crate) trait Correction<const NX: usize> {
-    /// Returns the factors of the first vector's regressors in the outputs, if they differ from
-    /// those of the step's first stage.
+    /// Returns the factors of the first vector's regressors in the outputs, if they differ from the
+    /// factors at the step's first stage.
     fn output_factors(&self, k: usize) -> Option<&[f64; VECTOR]>;
 
-    /// Corrects the sensitivities `s` of the states in the vectors at some lanes, after those of
-    /// the outputs, `y`, were computed at the chunk's sample k. Replaces `y` by the sensitivities
-    /// that the sink receives.
+    /// Corrects the sensitivities `s` of the states in the vectors at some lanes. The sensitivities
+    /// `y` of the outputs were computed before, at the chunk's sample k. Replaces `y` by the
+    /// sensitivities that the sink receives.
     fn correct<S: Simd, const N: usize>(
         &self,
         simd: S,

@@ -62,7 +62,8 @@ struct Coefficients<const NX: usize> {
 }
 
 impl<'a, const NX: usize, E: Equations<NX>> Reference<'a, NX, E> {
-    /// Pass over the maneuver of a case; aircraft, window and model are those of the case.
+    /// Pass over the maneuver of a case; aircraft, window and model must be the ones from which the
+    /// case was made.
     #[must_use]
     pub fn new(
         aircraft: &'a Aircraft,

@@ -49,7 +49,7 @@ impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
     /// that each maneuver keeps to itself.
     ///
     /// # Errors
-    /// A sentence that names the maneuver whose free derivatives are not those of the first.
+    /// A sentence that names the maneuver whose free derivatives differ from the first maneuver's.
     pub fn new(
         cases: impl IntoIterator<Item = (&'a str, &'a Case<NX, E>)>,
         is_own: impl Fn(&str) -> bool,

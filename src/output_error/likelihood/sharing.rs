@@ -21,7 +21,7 @@ impl SharedParameters {
     /// selects the derivatives that each maneuver keeps to itself.
     ///
     /// # Errors
-    /// A sentence that names the maneuver whose free derivatives are not those of the first.
+    /// A sentence that names the maneuver whose free derivatives differ from the first maneuver's.
     pub fn new<'a>(
         members: impl IntoIterator<Item = (&'a str, &'a [String], usize)>,
         is_own: impl Fn(&str) -> bool,
@@ -53,7 +53,8 @@ impl SharedParameters {
         }
     }
 
-    /// Sets the shared derivatives: those of the first maneuver that no maneuver keeps to itself.
+    /// Sets the shared derivatives: the first maneuver's, without derivatives that each maneuver
+    /// keeps to itself.
     fn share(&mut self, derivatives: &[String], is_own: impl Fn(&str) -> bool) {
         self.derivatives = derivatives.to_vec();
         for (j, name) in derivatives.iter().enumerate() {
