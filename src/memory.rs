@@ -14,7 +14,7 @@ pub const LARGEST_KEPT: i32 = 1 << 20;
 pub const MOST_KEPT: i32 = 16 << 20;
 
 /// Sets the limits of glibc's allocator; does nothing with another allocator.
-pub fn keep() {
+pub fn keep_freed_memory() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     #[expect(
         unsafe_code,

@@ -159,7 +159,7 @@ enum Command {
 /// Runs the program.
 #[must_use]
 pub fn main() -> ExitCode {
-    crate::memory::keep();
+    crate::memory::keep_freed_memory();
     // Without it the limit ends the program, and nothing else changes.
     let _ = signals::outlive_file_limits();
     let code = match Cli::try_parse() {

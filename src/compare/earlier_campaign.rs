@@ -31,7 +31,7 @@ impl Earlier {
 
     /// Value and standard error of the earlier trend at an α, linear between its published α; `None`
     /// outside of them or in another unit.
-    fn at(&self, now: &TrendRow) -> Option<(f64, f64)> {
+    fn trend_at(&self, now: &TrendRow) -> Option<(f64, f64)> {
         let same = |e: &&PublishedTrend| {
             e.derivative == now.derivative
                 && e.group == now.group
@@ -70,7 +70,7 @@ pub fn changes(
             .is_some_and(|g| g.name == t.group)
     };
     let row = |t: &TrendRow| {
-        let before = earlier.at(t);
+        let before = earlier.trend_at(t);
         let judged = judge(
             t.value,
             t.standard_error,

@@ -6,7 +6,7 @@ use super::prepared_case::PreparedCase;
 use super::task::Task;
 use crate::dynamics::motion::Window;
 use crate::dynamics::{Equations, OUTPUTS};
-use crate::output_error::calibration_errors::{Fitted, Misreading};
+use crate::output_error::calibration_errors::{FittedManeuver, Misreading};
 use crate::output_error::{Diverged, Fit, calibration_errors};
 
 /// Added to the reason of a fit whose bounds lack the effect of calibration errors.
@@ -62,7 +62,7 @@ impl<'a> Task<'a> {
             case,
             ..
         } = prepared;
-        Fitted {
+        FittedManeuver {
             aircraft,
             window,
             model,

@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::alpha_slopes::AlphaSlopes;
-use crate::filter_error::bounds::{Bounds, WidePass};
+use crate::filter_error::bounds::{FilterBounds, WidePass};
 use crate::filter_error::slopes::SlopeEffect;
 
 /// Slopes of the derivatives over α, and the values at which a fit holds them. Slopes of one name are
@@ -36,7 +36,7 @@ impl HeldSlopes {
         }
     }
 
-    pub fn effect(&self, pass: &WidePass, bounds: &Bounds) -> Option<SlopeEffect> {
+    pub fn effect(&self, pass: &WidePass, bounds: &FilterBounds) -> Option<SlopeEffect> {
         pass.slope_effect(bounds, &self.names, &self.values)
     }
 

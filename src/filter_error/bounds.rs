@@ -10,7 +10,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::filter::{Filter, Response};
+use super::filter::{Filter, FilterResponse};
 use super::joint_filter::JointFilter;
 use super::scoring::Scored;
 use super::slopes::{SlopeEffect, SlopeInformation};
@@ -25,7 +25,7 @@ use crate::output_error::sharing::{SharedParameters, add_matrix, add_vector};
 
 /// Covariances of the own parameters of filters: derivatives, biases and initial states.
 #[derive(Clone, Debug)]
-pub struct Bounds {
+pub struct FilterBounds {
     pub covariance: DMatrix<f64>,
     pub condition_number: f64,
     /// Inverse H⁻¹ of the information on the filter's own parameters, with the noise held at its
@@ -42,7 +42,7 @@ pub fn bounds<const NX: usize, E: InGusts<NX>>(
     filter: &JointFilter<NX, E>,
     scored: &Scored,
     max_condition_number: f64,
-) -> Result<Bounds, (Option<f64>, Vec<usize>)> {
+) -> Result<FilterBounds, (Option<f64>, Vec<usize>)> {
     let free: Vec<usize> = (0..filter.parameters())
         .filter(|j| scored.free[*j])
         .collect();
@@ -50,7 +50,8 @@ pub fn bounds<const NX: usize, E: InGusts<NX>>(
     let of_free = DMatrix::from_fn(free.len(), free.len(), |i, j| {
         information[(free[i], free[j])]
     });
-    let (of_free, condition_number) = match Identification::of(&of_free, max_condition_number) {
+    let (of_free, condition_number) = match Identification::identify(&of_free, max_condition_number)
+    {
         Identification::Determined {
             inverse,
             condition_number,
@@ -77,7 +78,7 @@ pub fn bounds<const NX: usize, E: InGusts<NX>>(
     let covariance = own(&inverse);
     let at_known_noise = symmetric::inverse(&own(&information));
     let at_known_noise = at_known_noise.unwrap_or_else(|| covariance.clone());
-    Ok(Bounds {
+    Ok(FilterBounds {
         covariance,
         condition_number,
         inverse: at_known_noise,
@@ -87,7 +88,7 @@ pub fn bounds<const NX: usize, E: InGusts<NX>>(
 impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     /// Whitened innovations with their sensitivities to the filter's own parameters, one series per
     /// output.
-    fn series(&self, response: &Response) -> Vec<BlockSeries> {
+    fn series(&self, response: &FilterResponse) -> Vec<BlockSeries> {
         let (sums, n) = (&response.sums, self.first_noise());
         let length = sums.samples_per_block();
         let mut all = vec![0.0; self.parameters()];
@@ -112,7 +113,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     }
 }
 
-impl Bounds {
+impl FilterBounds {
     /// Covariance of a filter's own parameters from H⁻¹ and the innovations' autocovariance, at known
     /// noise: the noise's parameters hardly correlate with the others.
     #[must_use]
@@ -172,7 +173,7 @@ impl WidePass {
     /// Computes the pass of the wide filter `wide` at the fit of `filter`. `values` has the
     /// parameters by name; a parameter without a value is zero. `None` if the wide filter diverges.
     #[must_use]
-    pub fn of<const NX: usize, E: InGusts<NX>>(
+    pub fn pass_at_fit<const NX: usize, E: InGusts<NX>>(
         filter: &Filter<NX, E>,
         parameters: &[f64],
         wide: &Filter<NX, E>,
@@ -231,13 +232,13 @@ impl WidePass {
         self.names.iter().map(joint).collect()
     }
 
-    fn place(&self, name: &str) -> Option<usize> {
+    fn index_of(&self, name: &str) -> Option<usize> {
         self.names.iter().position(|n| n == name)
     }
 
     /// Column of the information along a parameter, for the filter's own parameters.
     fn cross(&self, along: Option<usize>) -> DVector<f64> {
-        let entry = |name: &String| match (self.place(name), along) {
+        let entry = |name: &String| match (self.index_of(name), along) {
             (Some(row), Some(column)) => self.information[(row, column)],
             _ => 0.0,
         };
@@ -248,7 +249,7 @@ impl WidePass {
     #[must_use]
     pub fn held_shifts(&self, uncertainties: &BTreeMap<&str, f64>) -> Vec<DVector<f64>> {
         let shift =
-            |(name, uncertainty): (&&str, &f64)| self.cross(self.place(name)) * *uncertainty;
+            |(name, uncertainty): (&&str, &f64)| self.cross(self.index_of(name)) * *uncertainty;
         uncertainties.iter().map(shift).collect()
     }
 
@@ -257,11 +258,14 @@ impl WidePass {
     #[must_use]
     pub fn slope_effect(
         &self,
-        bounds: &Bounds,
+        bounds: &FilterBounds,
         slopes: &[String],
         values: &[f64],
     ) -> Option<SlopeEffect> {
-        let places: Vec<usize> = slopes.iter().filter_map(|name| self.place(name)).collect();
+        let places: Vec<usize> = slopes
+            .iter()
+            .filter_map(|name| self.index_of(name))
+            .collect();
         if places.len() != values.len() || places.is_empty() {
             return None;
         }

@@ -14,7 +14,7 @@ use super::gains::{
 };
 use super::input_noise::InputNoise;
 use super::linearised::{Discrete, Linearised};
-use super::noise::{Noise, NoiseParameter, Prior, RotaryCost};
+use super::noise::{Noise, NoiseParameter, NoisePrior, RotaryCost};
 use super::pass::{
     Corrections, FilterPass, LaneBlocks, LaneGain, PassOutputs, RecordedRows, RowSink,
 };
@@ -45,13 +45,13 @@ pub struct Filter<const NX: usize, E: InGusts<NX>> {
     patterns: Vec<Pattern>,
     pattern_of: Vec<u8>,
     /// Priors of biases and noise, with the parameter of each.
-    priors: Vec<(usize, Prior)>,
+    priors: Vec<(usize, NoisePrior)>,
     names: Vec<String>,
 }
 
 /// Result of one pass of the filter over the maneuver.
 #[derive(Clone, Debug)]
-pub struct Response {
+pub struct FilterResponse {
     /// Outputs predicted from the earlier samples.
     pub predicted: Vec<[f64; OUTPUTS]>,
     /// Measured minus predicted outputs; zero where a sample does not count.
@@ -67,7 +67,7 @@ pub struct Response {
     other_information: DMatrix<f64>,
 }
 
-impl Response {
+impl FilterResponse {
     /// Gradient of −J.
     #[must_use]
     pub fn gradient(&self) -> DVector<f64> {
@@ -151,12 +151,12 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     }
 
     /// Priors of the biases with known uncertainty, and of the noise.
-    fn priors(&self, biases: &[Option<f64>]) -> Vec<(usize, Prior)> {
+    fn priors(&self, biases: &[Option<f64>]) -> Vec<(usize, NoisePrior)> {
         let first = self.case.derivatives();
         let of_biases = biases
             .iter()
             .enumerate()
-            .filter_map(|(b, deviation)| Some((first + b, Prior::Normal(0.0, (*deviation)?))));
+            .filter_map(|(b, deviation)| Some((first + b, NoisePrior::Normal(0.0, (*deviation)?))));
         let of_noise = self.noise_parameters.iter().enumerate();
         let of_noise = of_noise
             .filter_map(|(n, parameter)| Some((self.first_noise() + n, parameter.prior()?)));
@@ -210,7 +210,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     ///
     /// # Errors
     /// [`Diverged`] when the state leaves its bounds or the filter has no finite gain.
-    pub fn respond(&self, parameters: &[f64]) -> Result<Response, Diverged> {
+    pub fn respond(&self, parameters: &[f64]) -> Result<FilterResponse, Diverged> {
         let gains = self.gains(parameters)?;
         let mut response = self.empty_response();
         let mut sums = NormalSums::new(
@@ -231,7 +231,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     ///
     /// # Errors
     /// [`Diverged`] when the state leaves its bounds or the filter has no finite gain.
-    pub fn innovations(&self, parameters: &[f64]) -> Result<Response, Diverged> {
+    pub fn innovations(&self, parameters: &[f64]) -> Result<FilterResponse, Diverged> {
         let gains = self.gains(parameters)?;
         let mut response = self.empty_response();
         self.run(parameters, &gains, &mut response, None::<&mut NormalSums>)?;
@@ -260,9 +260,9 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         Ok(response.predicted)
     }
 
-    fn empty_response(&self) -> Response {
+    fn empty_response(&self) -> FilterResponse {
         let (samples, parameters) = (self.samples(), self.parameters());
-        Response {
+        FilterResponse {
             predicted: vec![[0.0; OUTPUTS]; samples],
             innovations: vec![[0.0; OUTPUTS]; samples],
             whitened: vec![[0.0; OUTPUTS]; samples],
@@ -277,7 +277,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         &self,
         parameters: &[f64],
         gains: &[PatternGain<NX>],
-        response: &mut Response,
+        response: &mut FilterResponse,
         sink: Option<&mut K>,
     ) -> Result<(), Diverged> {
         let corrections = self.corrections(parameters, gains);
@@ -290,7 +290,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         case: &Case<NX, E>,
         parameters: &[f64],
         corrections: &Corrections<NX>,
-        response: &mut Response,
+        response: &mut FilterResponse,
         sink: Option<&mut K>,
     ) -> Result<(), Diverged> {
         Arch::new().dispatch(FilterPass {
@@ -480,7 +480,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         let filter = if is_still {
             SteadyFilter::still(system)
         } else {
-            SteadyFilter::of(system)?
+            SteadyFilter::solve_system(system)?
         };
         gains::gains(&filter, &noise, &slopes, &numbered, &self.patterns)
     }
@@ -509,7 +509,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         &self,
         parameters: &[f64],
         gains: &[PatternGain<NX>],
-        response: &mut Response,
+        response: &mut FilterResponse,
     ) {
         let squares: f64 = response.whitened.iter().flatten().map(|u| u * u).sum();
         response.cost = 0.5 * squares;
@@ -544,7 +544,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         }
     }
 
-    fn add_rotary_cost(&self, rotary: &RotaryCost, response: &mut Response) {
+    fn add_rotary_cost(&self, rotary: &RotaryCost, response: &mut FilterResponse) {
         response.cost += rotary.cost;
         let place = |kind: NoiseParameter| {
             let place = self.noise_parameters.iter().position(|p| *p == kind);

@@ -4,7 +4,7 @@
 use nalgebra::{Cholesky, SMatrix};
 
 use super::noise::{Noise, NoiseParameter};
-use super::riccati::{Observation, States, SteadyFilter, SystemSlope};
+use super::riccati::{OutputSlopes, States, SteadyFilter, SystemSlope};
 use crate::dynamics::OUTPUTS;
 use crate::numerics::small::{product, product_transposed, sandwich};
 
@@ -91,7 +91,7 @@ pub(super) fn gains<const NX: usize>(
     }
     let mut gains = Vec::with_capacity(patterns.len());
     for pattern in patterns {
-        let mut own = PatternGain::of(&filter.prediction, c, noise, pattern)?;
+        let mut own = PatternGain::for_pattern(&filter.prediction, c, noise, pattern)?;
         own.slopes = own.slopes_along(&filter.prediction, c, &changes, pattern);
         own.add_output_noise(noise, noise_parameters, pattern);
         gains.push(own);
@@ -112,9 +112,9 @@ impl<const NX: usize> PatternGain<NX> {
     }
 
     #[inline(always)]
-    fn of(
+    fn for_pattern(
         prediction: &States<NX>,
-        c: &Observation<NX>,
+        c: &OutputSlopes<NX>,
         noise: &Noise,
         pattern: &Pattern,
     ) -> Option<Self> {
@@ -152,8 +152,8 @@ impl<const NX: usize> PatternGain<NX> {
     fn slopes_along(
         &self,
         prediction: &States<NX>,
-        c: &Observation<NX>,
-        changes: &[(usize, Observation<NX>, States<NX>)],
+        c: &OutputSlopes<NX>,
+        changes: &[(usize, OutputSlopes<NX>, States<NX>)],
         pattern: &Pattern,
     ) -> Vec<GainSlope<NX>> {
         let seen = product_transposed(prediction, c);

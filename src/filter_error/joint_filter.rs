@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::filter::{Filter, Response};
+use super::filter::{Filter, FilterResponse};
 use super::noise::{Noise, NoiseParameter};
 use crate::dynamics::{InGusts, OUTPUTS};
 use crate::output_error::Diverged;
@@ -28,13 +28,13 @@ pub struct JointFilter<'f, const NX: usize, E: InGusts<NX>> {
 #[derive(Clone, Debug)]
 pub struct JointResponse {
     /// Response of each maneuver.
-    pub members: Vec<Response>,
+    pub members: Vec<FilterResponse>,
     /// Cost J of all maneuvers, priors included.
     pub cost: f64,
 }
 
 impl JointResponse {
-    fn of(members: Vec<Response>) -> Self {
+    fn sum_members(members: Vec<FilterResponse>) -> Self {
         JointResponse {
             cost: members.iter().map(|r| r.cost).sum(),
             members,
@@ -138,7 +138,7 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
             filter.respond(&values_at(&places, parameters))
         };
         let members: Result<_, _> = self.members().map(respond).collect();
-        Ok(JointResponse::of(members?))
+        Ok(JointResponse::sum_members(members?))
     }
 
     /// Computes the innovations alone.
@@ -150,7 +150,7 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
             filter.innovations(&values_at(&places, parameters))
         };
         let members: Result<_, _> = self.members().map(respond).collect();
-        Ok(JointResponse::of(members?))
+        Ok(JointResponse::sum_members(members?))
     }
 
     /// Gradient of −J.
@@ -166,7 +166,7 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
     /// Expected second gradient of J.
     #[must_use]
     pub fn information(&self, response: &JointResponse) -> DMatrix<f64> {
-        self.sum_of(response, Response::information)
+        self.sum_of(response, FilterResponse::information)
     }
 
     /// Part of the information that comes from the covariance of the innovations and the priors.
@@ -177,7 +177,7 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
     fn sum_of(
         &self,
         response: &JointResponse,
-        matrix: impl Fn(&Response) -> DMatrix<f64>,
+        matrix: impl Fn(&FilterResponse) -> DMatrix<f64>,
     ) -> DMatrix<f64> {
         let n = self.parameters();
         let mut sum = DMatrix::zeros(n, n);

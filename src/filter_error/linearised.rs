@@ -16,14 +16,14 @@ const STRIDE: usize = 4;
 #[derive(Clone, Debug)]
 pub(super) struct Linearised<const NX: usize> {
     step_s: f64,
-    held: Slopes<NX>,
+    held: StateSlopes<NX>,
     /// Slopes per unit of each free derivative.
-    free: Vec<Slopes<NX>>,
+    free: Vec<StateSlopes<NX>>,
 }
 
 /// Slopes of rates (1/s) and of outputs along the states.
 #[derive(Clone, Copy, Debug)]
-struct Slopes<const NX: usize> {
+struct StateSlopes<const NX: usize> {
     rates: SMatrix<f64, NX, NX>,
     outputs: SMatrix<f64, OUTPUTS, NX>,
 }
@@ -35,15 +35,15 @@ pub(super) struct Discrete<const NX: usize> {
     pub outputs: SMatrix<f64, OUTPUTS, NX>,
 }
 
-impl<const NX: usize> Slopes<NX> {
+impl<const NX: usize> StateSlopes<NX> {
     fn zeros() -> Self {
-        Slopes {
+        StateSlopes {
             rates: SMatrix::zeros(),
             outputs: SMatrix::zeros(),
         }
     }
 
-    fn add(&mut self, other: &Slopes<NX>, factor: f64) {
+    fn add(&mut self, other: &StateSlopes<NX>, factor: f64) {
         self.rates += other.rates * factor;
         self.outputs += other.outputs * factor;
     }
@@ -53,8 +53,8 @@ impl<const NX: usize> Linearised<NX> {
     pub fn of<E: Equations<NX>>(case: &Case<NX, E>) -> Self {
         let mut linearised = Linearised {
             step_s: case.step_s,
-            held: Slopes::zeros(),
-            free: vec![Slopes::zeros(); case.derivatives()],
+            held: StateSlopes::zeros(),
+            free: vec![StateSlopes::zeros(); case.derivatives()],
         };
         let samples = (0..case.samples()).step_by(STRIDE);
         let share = 1.0 / samples.len().max(1) as f64;
@@ -113,9 +113,9 @@ impl<const NX: usize> Linearised<NX> {
 /// Slopes of rates and outputs at one sample, by coefficient.
 struct UnitSlopes<const NX: usize> {
     /// Slopes at zero coefficients.
-    still: Slopes<NX>,
+    still: StateSlopes<NX>,
     /// Changes of the slopes at constant coefficients, per unit of each coefficient.
-    changes: [Slopes<NX>; COEFFICIENTS],
+    changes: [StateSlopes<NX>; COEFFICIENTS],
     rates: SMatrix<f64, NX, COEFFICIENTS>,
     outputs: SMatrix<f64, OUTPUTS, COEFFICIENTS>,
 }
@@ -126,7 +126,7 @@ impl<const NX: usize> UnitSlopes<NX> {
             &case.motion.rate_inputs[2 * sample],
             &case.motion.sensor_inputs[sample],
         );
-        let slopes = |c: &[f64; COEFFICIENTS]| Slopes {
+        let slopes = |c: &[f64; COEFFICIENTS]| StateSlopes {
             rates: E::rates(inputs, x, c).by_state,
             outputs: E::outputs(inputs, sensors, x, c).by_state,
         };
@@ -147,13 +147,13 @@ impl<const NX: usize> UnitSlopes<NX> {
     }
 
     /// Slopes per unit of a coefficient that does not depend on the state.
-    fn along_coefficient(&self, k: usize) -> Slopes<NX> {
+    fn along_coefficient(&self, k: usize) -> StateSlopes<NX> {
         self.changes[k]
     }
 
     /// Slopes per unit of a coefficient's slope along a state.
-    fn through_coefficient(&self, k: usize, state: usize) -> Slopes<NX> {
-        let mut slopes = Slopes::<NX>::zeros();
+    fn through_coefficient(&self, k: usize, state: usize) -> StateSlopes<NX> {
+        let mut slopes = StateSlopes::<NX>::zeros();
         slopes
             .rates
             .column_mut(state)

@@ -68,7 +68,7 @@ pub enum NoiseParameter {
 
 /// Prior distribution of a noise parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Prior {
+pub enum NoisePrior {
     /// Normal distribution with this mean and standard deviation of the parameter.
     Normal(f64, f64),
     /// Normal distribution of the size about zero; the parameter is the logarithm of the size, and
@@ -76,16 +76,16 @@ pub enum Prior {
     Size(f64),
 }
 
-impl Prior {
+impl NoisePrior {
     /// Cost, its slope and its expected curvature at a value of the parameter.
     #[must_use]
     pub fn cost(self, value: f64) -> [f64; 3] {
         match self {
-            Prior::Normal(mean, deviation) => {
+            NoisePrior::Normal(mean, deviation) => {
                 let z = (value - mean) / deviation;
                 [0.5 * z * z, z / deviation, deviation.powi(-2)]
             }
-            Prior::Size(size) => {
+            NoisePrior::Size(size) => {
                 let square = (2.0 * (value - size)).exp();
                 [0.5 * square, square, 2.0 * square]
             }
@@ -118,12 +118,12 @@ impl NoiseParameter {
 
     /// Prior of the parameter; outputs have none.
     #[must_use]
-    pub fn prior(self) -> Option<Prior> {
+    pub fn prior(self) -> Option<NoisePrior> {
         match self {
-            NoiseParameter::Angle => Some(Prior::Size(SEVERE_ANGLE.ln())),
-            NoiseParameter::Gust(_) => Some(Prior::Size(SEVERE_GUST.ln())),
-            NoiseParameter::Corner => Some(Prior::Normal(USUAL_CORNER.ln(), CORNER_SPREAD)),
-            NoiseParameter::Correlation(_) => Some(Prior::Normal(0.0, CORRELATION_SPREAD)),
+            NoiseParameter::Angle => Some(NoisePrior::Size(SEVERE_ANGLE.ln())),
+            NoiseParameter::Gust(_) => Some(NoisePrior::Size(SEVERE_GUST.ln())),
+            NoiseParameter::Corner => Some(NoisePrior::Normal(USUAL_CORNER.ln(), CORNER_SPREAD)),
+            NoiseParameter::Correlation(_) => Some(NoisePrior::Normal(0.0, CORRELATION_SPREAD)),
             NoiseParameter::Output(_) => None,
         }
     }
@@ -251,7 +251,7 @@ impl Noise {
     pub fn rotary_cost(&self, gust: usize, step_s: f64) -> Option<RotaryCost> {
         let excess = self.rotary_excess(gust, step_s);
         (excess < 0.0).then(|| {
-            let [cost, slope, curvature] = Prior::Normal(0.0, ROTARY_SPREAD).cost(excess);
+            let [cost, slope, curvature] = NoisePrior::Normal(0.0, ROTARY_SPREAD).cost(excess);
             RotaryCost {
                 cost,
                 slope,

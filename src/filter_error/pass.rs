@@ -64,7 +64,7 @@ impl LaneBlocks {
 
     /// Rows of the vector at a lane; `rows` is their number, a constant when compiled.
     #[inline(always)]
-    fn at<S: Simd>(&self, rows: usize, lane: usize) -> LaneRows<'_, S> {
+    fn rows_of_lane<S: Simd>(&self, rows: usize, lane: usize) -> LaneRows<'_, S> {
         let first = lane / VECTOR * rows * VECTOR;
         let block = &self.values.slice()[first..first + rows * VECTOR];
         LaneRows {
@@ -281,10 +281,10 @@ impl<const NX: usize, E: InGusts<NX>> Correction<NX> for &ChunkCorrections<'_, N
     ) {
         let corrections = self.corrections;
         let gain = &corrections.gains[usize::from(self.patterns[k])];
-        let mut slopes = [gain.slopes.at::<S>(NX * OUTPUTS, lanes[0]); N];
+        let mut slopes = [gain.slopes.rows_of_lane::<S>(NX * OUTPUTS, lanes[0]); N];
         for n in 0..N {
-            slopes[n] = gain.slopes.at(NX * OUTPUTS, lanes[n]);
-            let biases = corrections.bias_rows.at::<S>(OUTPUTS, lanes[n]);
+            slopes[n] = gain.slopes.rows_of_lane(NX * OUTPUTS, lanes[n]);
+            let biases = corrections.bias_rows.rows_of_lane::<S>(OUTPUTS, lanes[n]);
             for o in 0..OUTPUTS {
                 y[n][o] = simd.add_f64s(y[n][o], biases.row(o));
             }
@@ -386,7 +386,7 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink> WithSimd for FilterPass<'_, NX
         let samples = case.samples();
         let mut rows = AlignedBuffer::zeros(CHUNK * OUTPUTS * layout.width());
         let rows = rows.slice_mut();
-        let mut regressors = AlignedBuffer::zeros(POINTS * layout.row);
+        let mut regressors = AlignedBuffer::zeros(POINTS * layout.row_length);
         let regressors = regressors.slice_mut();
         let mut build_up = ChunkBuildUp::<NX>::ZERO;
         let mut history = StageHistory::<NX>::EMPTY;

@@ -30,13 +30,13 @@ const SETTLED: f64 = 1e-13;
 /// Square matrix of the states.
 pub(super) type States<const NX: usize> = SMatrix<f64, NX, NX>;
 /// Slopes of the outputs along the states (C).
-pub(super) type Observation<const NX: usize> = SMatrix<f64, OUTPUTS, NX>;
+pub(super) type OutputSlopes<const NX: usize> = SMatrix<f64, OUTPUTS, NX>;
 
 /// Linear system with noise: the matrices A, C and Q, and the diagonal of R.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NoisySystem<const NX: usize> {
     pub a: States<NX>,
-    pub c: Observation<NX>,
+    pub c: OutputSlopes<NX>,
     pub q: States<NX>,
     /// Variances of the outputs' noise, the diagonal of R.
     pub r: [f64; OUTPUTS],
@@ -61,7 +61,7 @@ pub(super) struct SteadyFilter<const NX: usize> {
 impl<const NX: usize> SteadyFilter<NX> {
     /// Solves the Riccati equation; `None` if it has no finite solution.
     #[inline(always)]
-    pub fn of(system: NoisySystem<NX>) -> Option<Self> {
+    pub fn solve_system(system: NoisySystem<NX>) -> Option<Self> {
         let prediction = solve(&system)?;
         let mut s = sandwich(&system.c, &prediction);
         for o in 0..OUTPUTS {
@@ -140,7 +140,7 @@ impl<const NX: usize> SteadyFilter<NX> {
 /// finite.
 #[inline(always)]
 fn solve<const NX: usize>(system: &NoisySystem<NX>) -> Option<States<NX>> {
-    let mut information = Observation::<NX>::zeros();
+    let mut information = OutputSlopes::<NX>::zeros();
     for o in 0..OUTPUTS {
         information.set_row(o, &(system.c.row(o) / system.r[o]));
     }

@@ -141,7 +141,8 @@ impl Scored {
         let mut failed = false;
         while *damping < MOST_DAMPING {
             if let Some(step) = step(information, gradient, *damping) {
-                let next = moved(&self.parameters, &step, floors, filter.first_noise());
+                let next =
+                    stepped_parameters(&self.parameters, &step, floors, filter.first_noise());
                 let lowers = |response: &JointResponse| response.cost < self.response.cost;
                 // A step after one that failed may fail as well: its cost alone is cheap.
                 let may_lower = !failed || filter.innovations(&next).is_ok_and(|r| lowers(&r));
@@ -181,7 +182,12 @@ fn own_gain(step: &DVector<f64>, information: &DMatrix<f64>, own: usize) -> f64 
 }
 
 /// Parameters after a step; noise changes by a factor at most, and stays above its floor.
-fn moved(values: &[f64], step: &DVector<f64>, floors: &[f64], first_noise: usize) -> Vec<f64> {
+fn stepped_parameters(
+    values: &[f64],
+    step: &DVector<f64>,
+    floors: &[f64],
+    first_noise: usize,
+) -> Vec<f64> {
     let all = values.iter().zip(step.iter()).zip(floors).enumerate();
     all.map(|(j, ((value, step), floor))| {
         let step = if j < first_noise {

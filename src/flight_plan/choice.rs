@@ -128,10 +128,10 @@ impl CardChoice {
     #[must_use]
     pub fn choose(&self) -> CardSet<'_> {
         let start = |preference| {
-            let mut set = CardSet::nothing(self);
+            let mut set = CardSet::empty(self);
             set.fill(preference);
             set.exchange();
-            CardSet::times(self, &set.times)
+            CardSet::with_times(self, &set.times)
         };
         let [worth, per_minute] = [Preference::Worth, Preference::WorthPerMinute].map(start);
         if worth.worth() > per_minute.worth() {
@@ -145,7 +145,7 @@ impl CardChoice {
 impl<'a> CardSet<'a> {
     /// Set without cards.
     #[must_use]
-    pub fn nothing(choice: &'a CardChoice) -> CardSet<'a> {
+    pub fn empty(choice: &'a CardChoice) -> CardSet<'a> {
         let coefficients = choice.coefficients.iter();
         CardSet {
             choice,
@@ -156,8 +156,8 @@ impl<'a> CardSet<'a> {
 
     /// Set in which each card is flown this number of times.
     #[must_use]
-    pub fn times(choice: &'a CardChoice, times: &[usize]) -> CardSet<'a> {
-        let mut set = CardSet::nothing(choice);
+    pub fn with_times(choice: &'a CardChoice, times: &[usize]) -> CardSet<'a> {
+        let mut set = CardSet::empty(choice);
         for (card, &times) in times.iter().enumerate() {
             for _ in 0..times {
                 set.fly(card);

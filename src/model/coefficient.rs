@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::evidence::Evidence;
 use super::flight_data::{FlightData, Observed};
-use super::held_values::{HeldDifferences, Posterior};
+use super::held_values::{HeldDifferences, TermsPosterior};
 use super::observation::Observation;
 use super::observed_differences::ObservedDifferences;
 use super::open_scales::add_open_scales;
@@ -13,7 +13,7 @@ use super::posterior::{Gaussian, gaussian, information, of_differences, reweight
 use super::scale_prior::Scale;
 use super::scales::{centres, most_probable};
 use super::self_check::{self, Agreement};
-use super::term::{Term, TermSources};
+use super::term::{PosteriorTerm, TermSources};
 use super::unknowns::Unknowns;
 use crate::aero::WindTunnel;
 use crate::numerics::root::EXACT;
@@ -27,7 +27,7 @@ const CHECKED_VARIANCE: f64 = 1e-6;
 /// Posterior of one coefficient, with its evidence and its self-check.
 #[derive(Clone, Debug)]
 pub struct CoefficientPosterior {
-    pub terms: Vec<Term>,
+    pub terms: Vec<PosteriorTerm>,
     pub unknowns: Unknowns,
     pub scales: Vec<Scale>,
     /// Scales before the last step, with which the noise between the points of the grids was
@@ -51,8 +51,8 @@ pub struct CoefficientPosterior {
 impl CoefficientPosterior {
     /// Posterior of a coefficient from its terms; `None` if the evidence is not finite.
     #[must_use]
-    pub fn of(
-        terms: Vec<Term>,
+    pub fn from_terms(
+        terms: Vec<PosteriorTerm>,
         evidence: &[Evidence],
         basis: &TermSources,
     ) -> Option<CoefficientPosterior> {
@@ -66,7 +66,7 @@ impl CoefficientPosterior {
             noise_scales = scales;
             (observed, scales, found) = data.fit(&terms, &weights, &noise_scales)?;
         }
-        let posterior = Posterior {
+        let posterior = TermsPosterior {
             terms: &terms,
             scales: &scales,
             gaussian: &found,
@@ -98,7 +98,7 @@ pub struct Data {
 impl Data {
     /// Collects the evidence about a coefficient's terms.
     #[must_use]
-    pub fn new(terms: &[Term], evidence: &[Evidence], basis: &TermSources) -> Data {
+    pub fn new(terms: &[PosteriorTerm], evidence: &[Evidence], basis: &TermSources) -> Data {
         Data::with_planned(terms, evidence, &[], basis).0
     }
 
@@ -107,7 +107,7 @@ impl Data {
     /// the campaign, are among the unknowns. The planned maneuvers themselves are not evidence.
     #[must_use]
     pub fn with_planned(
-        terms: &[Term],
+        terms: &[PosteriorTerm],
         evidence: &[Evidence],
         planned: &[Evidence],
         basis: &TermSources,
@@ -152,9 +152,9 @@ impl Data {
 
     /// Adds the noise between the points of the grids to each maneuver's own noise, for these
     /// scales.
-    pub fn set_between(&mut self, terms: &[Term], scales: &[Scale]) {
+    pub fn add_grid_noise(&mut self, terms: &[PosteriorTerm], scales: &[Scale]) {
         for (flight, own) in self.flights.iter_mut().zip(&self.places) {
-            flight.set_between(&observed(own, &self.observations), terms, scales);
+            flight.add_grid_noise(&observed(own, &self.observations), terms, scales);
         }
     }
 
@@ -162,11 +162,11 @@ impl Data {
     /// and the Gaussian; the noise between the points of the grids has the scales of the start.
     fn fit(
         &mut self,
-        terms: &[Term],
+        terms: &[PosteriorTerm],
         weights: &[f64],
         start: &[Scale],
     ) -> Option<(ObservedDifferences, Vec<Scale>, Gaussian)> {
-        self.set_between(terms, start);
+        self.add_grid_noise(terms, start);
         let sums = information(&self.flights, weights, self.unknowns.count);
         let own = of_differences(&sums, &self.unknowns)?;
         let observed = ObservedDifferences::new(terms, &self.unknowns, &own);
@@ -179,7 +179,7 @@ impl Data {
     /// other flights.
     fn held(
         &self,
-        posterior: &Posterior,
+        posterior: &TermsPosterior,
         weights: &[f64],
         evidence: &[Evidence],
         tunnel: &WindTunnel,
@@ -201,7 +201,7 @@ impl Data {
 
     fn posterior(
         self,
-        terms: Vec<Term>,
+        terms: Vec<PosteriorTerm>,
         scales: Vec<Scale>,
         weights: &[f64],
         gaussian: Gaussian,

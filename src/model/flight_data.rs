@@ -7,7 +7,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::observation::Observation;
 use super::scale_prior::Scale;
-use super::term::{Term, between_points};
+use super::term::{PosteriorTerm, between_points};
 use super::unknowns::{SparseRow, Unknowns, is_of_campaign};
 use crate::output_error::error_effect::SharedError;
 
@@ -55,7 +55,7 @@ pub type Observed<'a> = (usize, usize, &'a Observation);
 impl FlightData {
     /// Evidence of one flight's maneuvers.
     #[must_use]
-    pub fn new(observed: &[Observed], terms: &[Term], unknowns: &Unknowns) -> FlightData {
+    pub fn new(observed: &[Observed], terms: &[PosteriorTerm], unknowns: &Unknowns) -> FlightData {
         let count = observed.iter().map(|(_, _, o)| o.terms.len()).sum();
         let mut data = FlightData {
             maneuvers: vec![],
@@ -88,7 +88,12 @@ impl FlightData {
     }
 
     /// Sets each maneuver's noise to its own noise plus the noise between the points of the grids.
-    pub fn set_between(&mut self, observed: &[Observed], terms: &[Term], scales: &[Scale]) {
+    pub fn add_grid_noise(
+        &mut self,
+        observed: &[Observed],
+        terms: &[PosteriorTerm],
+        scales: &[Scale],
+    ) {
         for (noise, (_, _, observation)) in self.noise.iter_mut().zip(observed) {
             let Observation {
                 design, condition, ..

@@ -79,13 +79,13 @@ impl Model {
         if !is_estimated(Coefficient::CN) || !is_estimated(Coefficient::CA) {
             return vec![];
         }
-        let mut held = HeldErrors::of(flown.evidence);
+        let mut held = HeldErrors::with_tunnel_uncertainty(flown.evidence);
         if held_by_posterior {
             held.take_posterior(self, &flown.evidence.maneuver.maneuver_id);
         }
         let total = flown.total(&derivatives);
         let mut rows = vec![flown.row(TOTAL, DerivativeUnit::Number, &derivatives, &total, &held)];
-        for regressor in leaves(&derivatives) {
+        for regressor in simple_regressors(&derivatives) {
             let slope = flown.slope(&derivatives, regressor, &total);
             let has_estimate = derivatives.iter().enumerate().any(|(i, d)| {
                 let weight = slope.lift[i].abs() + slope.drag[i].abs();
@@ -142,7 +142,11 @@ impl PublishedManeuver<'_> {
     }
 
     /// Weights of the derivatives in lift and drag, from each one's regressor or its slope.
-    fn turned(&self, derivatives: &[&Derivative], own: impl Fn(&Derivative) -> f64) -> Weights {
+    fn weights_from_regressors(
+        &self,
+        derivatives: &[&Derivative],
+        own: impl Fn(&Derivative) -> f64,
+    ) -> Weights {
         let Maneuver {
             alpha_deg,
             qbar_psf,
@@ -164,11 +168,11 @@ impl PublishedManeuver<'_> {
     }
 
     fn total(&self, derivatives: &[&Derivative]) -> Weights {
-        self.turned(derivatives, |d| d.regressor.value(&|part| self.mean(part)))
+        self.weights_from_regressors(derivatives, |d| d.regressor.value(&|part| self.mean(part)))
     }
 
     fn slope(&self, derivatives: &[&Derivative], along: &Regressor, total: &Weights) -> Weights {
-        let mut slope = self.turned(derivatives, |d| {
+        let mut slope = self.weights_from_regressors(derivatives, |d| {
             d.regressor.slope(along, &|part| self.mean(part))
         });
         if *along == Regressor::Alpha {
@@ -236,7 +240,7 @@ impl PublishedManeuver<'_> {
 
 impl HeldErrors {
     /// Errors of the held values with the tunnel's uncertainty.
-    fn of(evidence: &Evidence) -> HeldErrors {
+    fn with_tunnel_uncertainty(evidence: &Evidence) -> HeldErrors {
         let effects: Vec<_> = evidence.held_effects().collect();
         let deviations = effects.iter().map(|(_, effect)| effect.deviation.powi(2));
         let variances = DVector::from_iterator(effects.len(), deviations);
@@ -272,7 +276,7 @@ impl HeldErrors {
 
 /// Distinct regressors of the derivatives that are neither constant nor composed of other
 /// regressors.
-fn leaves<'a>(derivatives: &[&'a Derivative]) -> Vec<&'a Regressor> {
+fn simple_regressors<'a>(derivatives: &[&'a Derivative]) -> Vec<&'a Regressor> {
     let mut leaves: Vec<&Regressor> = Vec::new();
     for leaf in derivatives.iter().flat_map(|d| d.regressor.leaves()) {
         if *leaf != Regressor::Constant && !leaves.contains(&leaf) {

@@ -15,7 +15,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::evidence::Evidence;
-use super::term::Term;
+use super::term::PosteriorTerm;
 use crate::aero::{Condition, WindTunnel};
 use crate::maneuver::Status;
 use crate::numerics::symmetric::{scale, scaled};
@@ -41,7 +41,7 @@ pub struct Observation {
 }
 
 /// One row of an observation: an estimate, or the sum that replaces a constant.
-struct Row {
+struct ObservationRow {
     term: usize,
     /// Weights of the maneuver's parameters in the row.
     of_parameters: Vec<(usize, f64)>,
@@ -52,9 +52,9 @@ struct Row {
 impl Evidence<'_> {
     /// Evidence about a coefficient's terms; `None` if the maneuver estimates none of them.
     #[must_use]
-    pub fn about(&self, terms: &[Term], tunnel: &WindTunnel) -> Option<Observation> {
+    pub fn about(&self, terms: &[PosteriorTerm], tunnel: &WindTunnel) -> Option<Observation> {
         let condition = self.maneuver.condition(tunnel);
-        let rows: Vec<Row> = (0..terms.len())
+        let rows: Vec<ObservationRow> = (0..terms.len())
             .filter_map(|i| self.row(terms, i, tunnel, &condition))
             .collect();
         if rows.is_empty() {
@@ -88,7 +88,13 @@ impl Evidence<'_> {
         })
     }
 
-    fn row(&self, terms: &[Term], i: usize, tunnel: &WindTunnel, at: &Condition) -> Option<Row> {
+    fn row(
+        &self,
+        terms: &[PosteriorTerm],
+        i: usize,
+        tunnel: &WindTunnel,
+        at: &Condition,
+    ) -> Option<ObservationRow> {
         let term = &terms[i];
         let (own, mut value) = self.estimated(&term.derivative)?;
         let mut of_parameters = vec![(own, 1.0)];
@@ -102,7 +108,7 @@ impl Evidence<'_> {
             }
         }
         let known = tunnel.at(&term.prior.name, at).map_or(0.0, |t| t.value);
-        Some(Row {
+        Some(ObservationRow {
             term: i,
             of_parameters,
             difference: value - known,
@@ -124,7 +130,7 @@ impl Evidence<'_> {
         row.wind_tunnel
     }
 
-    fn matrix_of(&self, rows: &[Row]) -> DMatrix<f64> {
+    fn matrix_of(&self, rows: &[ObservationRow]) -> DMatrix<f64> {
         let mut matrix = DMatrix::zeros(rows.len(), self.covariance.names.len());
         for (i, row) in rows.iter().enumerate() {
             for &(parameter, weight) in &row.of_parameters {
@@ -134,7 +140,12 @@ impl Evidence<'_> {
         matrix
     }
 
-    fn design(&self, terms: &[Term], rows: &[Row], of_rows: &DMatrix<f64>) -> DMatrix<f64> {
+    fn design(
+        &self,
+        terms: &[PosteriorTerm],
+        rows: &[ObservationRow],
+        of_rows: &DMatrix<f64>,
+    ) -> DMatrix<f64> {
         let mut design = DMatrix::zeros(rows.len(), terms.len());
         for (i, row) in rows.iter().enumerate() {
             let term = &terms[row.term];
@@ -162,7 +173,7 @@ impl Evidence<'_> {
     /// its sum less that of the slope times α.
     pub fn add_derivative(
         &self,
-        terms: &[Term],
+        terms: &[PosteriorTerm],
         name: &str,
         effect: f64,
         row: usize,

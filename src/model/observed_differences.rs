@@ -6,7 +6,7 @@ use super::flight_data::Information;
 use super::posterior::inner_root;
 use super::prior_covariance::PriorCovariance;
 use super::scale_prior::{Scale, ScalePrior};
-use super::term::Term;
+use super::term::PosteriorTerm;
 use super::unknowns::Unknowns;
 use crate::numerics::root::{BlockRoot, root, root_of_some};
 use crate::numerics::symmetric::square;
@@ -45,7 +45,7 @@ impl ObservedDifferences {
     /// Selects the differences about which there is information.
     #[must_use]
     pub fn new(
-        terms: &[Term],
+        terms: &[PosteriorTerm],
         unknowns: &Unknowns,
         information: &Information,
     ) -> ObservedDifferences {
@@ -81,7 +81,7 @@ impl ObservedDifferences {
     pub fn root(&self, scales: &[Scale], least: f64) -> BlockRoot {
         let mut whole = BlockRoot::default();
         for (term, scale) in self.terms.iter().zip(scales) {
-            whole.push(root(&term.covariance.at(scale), least));
+            whole.push(root(&term.covariance.for_scale(scale), least));
         }
         whole
     }
@@ -92,7 +92,7 @@ impl ObservedDifferences {
         let Information { matrix, vector } = &self.information;
         let (mut root, mut of_all) = (BlockRoot::default(), BlockRoot::default());
         for (term, scale) in self.terms.iter().zip(scales) {
-            let with_all = root_of_some(&term.with_all.at(scale), &term.points, least);
+            let with_all = root_of_some(&term.with_all.for_scale(scale), &term.points, least);
             root.push(with_all.select_rows(&term.points));
             of_all.push(with_all);
         }

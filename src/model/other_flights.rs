@@ -10,7 +10,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::flight_data::FlightData;
 use super::posterior::Gaussian;
-use super::unknowns::{SparseRow, between, sum};
+use super::unknowns::{SparseRow, covariance_between, weighted_sum};
 
 /// Posterior of all flights other than one.
 pub struct OtherFlights<'a> {
@@ -50,17 +50,17 @@ impl<'a> OtherFlights<'a> {
 
     /// Means and covariance of weighted sums of the unknowns, one sum per row.
     #[must_use]
-    pub fn of(&self, rows: &[SparseRow]) -> (DVector<f64>, DMatrix<f64>) {
+    pub fn means_and_covariance(&self, rows: &[SparseRow]) -> (DVector<f64>, DMatrix<f64>) {
         let Gaussian { mean, covariance } = self.whole;
-        let sums = rows.iter().map(|row| sum(row, mean));
+        let sums = rows.iter().map(|row| weighted_sum(row, mean));
         let mut values = DVector::from_iterator(rows.len(), sums);
         let mut spread = DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
-            between(&rows[i], &rows[j], covariance)
+            covariance_between(&rows[i], &rows[j], covariance)
         });
         if let Some(own) = &self.own {
             let own_rows = &own.flight.rows;
             let cross = DMatrix::from_fn(rows.len(), own_rows.len(), |i, j| {
-                between(&rows[i], &own_rows[j], covariance)
+                covariance_between(&rows[i], &own_rows[j], covariance)
             });
             values -= &cross * &own.weighted;
             spread += &cross * own.root.solve(&cross.transpose());

@@ -22,15 +22,15 @@ use super::local::{LocalValue, local_shares};
 use super::observation::Observation;
 use super::posterior::{gaussian, information};
 use super::settings::Settings;
-use super::term::{Term, TermSources, between_points};
-use super::unknowns::{SparseRow, Unknowns, between, is_of_campaign};
+use super::term::{PosteriorTerm, TermSources, between_points};
+use super::unknowns::{SparseRow, Unknowns, covariance_between, is_of_campaign};
 use crate::aero::{Buildup, Condition, WindTunnel};
 use crate::numerics::root::EXACT;
 use crate::output_error::error_effect::SharedError;
 
 /// Quantity at a flight condition.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Point {
+pub struct OutlookPoint {
     pub quantity: PointQuantity,
     pub condition: Condition,
 }
@@ -40,8 +40,8 @@ pub struct Point {
 pub enum PointQuantity {
     /// A derivative, or sum of derivatives, as published.
     Published(String),
-    /// Linear combination of the values of [`Model::at`]. Its variance is the sum of its variances in
-    /// each coefficient.
+    /// Linear combination of the values of [`Model::posterior_at_condition`]. Its variance is the
+    /// sum of its variances in each coefficient.
     Combination(Vec<(LocalValue, f64)>),
 }
 
@@ -73,7 +73,7 @@ impl Model {
     pub fn outlook(
         &self,
         (evidence, planned): (&[Evidence], &[Evidence]),
-        points: &[Point],
+        points: &[OutlookPoint],
         (buildup, tunnel): (&Buildup, &WindTunnel),
         settings: &Settings,
     ) -> Vec<Outlook> {
@@ -96,7 +96,7 @@ impl Model {
     pub fn breakpoints_deg(&self, derivative: &str) -> Option<(&'static str, &[f64])> {
         let all = self.coefficients.iter();
         let mut terms = all.flat_map(|(_, posterior)| &posterior.terms);
-        let own = |t: &&Term| t.prior.name == derivative || t.derivative == derivative;
+        let own = |t: &&PosteriorTerm| t.prior.name == derivative || t.derivative == derivative;
         let term = terms.find(own)?;
         Some((term.unit, &term.breakpoints_deg))
     }
@@ -113,11 +113,11 @@ impl CoefficientPosterior {
     fn outlook(
         &self,
         (evidence, planned): (&[Evidence], &[Evidence]),
-        points: &[Point],
+        points: &[OutlookPoint],
         basis: &TermSources,
     ) -> Option<Outlook> {
         let (mut data, observed) = Data::with_planned(&self.terms, evidence, planned, basis);
-        data.set_between(&self.terms, &self.noise_scales);
+        data.add_grid_noise(&self.terms, &self.noise_scales);
         let covariance = self.covariance(&data, evidence.len())?;
         let unknowns = &data.unknowns;
         let mut rows: Vec<SparseRow> = vec![];
@@ -140,7 +140,7 @@ impl CoefficientPosterior {
             .collect();
         rows.extend(asked.iter().map(|(_, row)| row.clone()));
         let mut joint = DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
-            between(&rows[i], &rows[j], &covariance)
+            covariance_between(&rows[i], &rows[j], &covariance)
         });
         let mut calibrated = joint.view_mut((0, 0), (of_planned, of_planned));
         calibrated += calibration(&observed, &own, of_planned);
@@ -182,7 +182,7 @@ impl CoefficientPosterior {
 
     /// Row of a point over the unknowns; `None` for a point that does not depend on the
     /// coefficient.
-    fn row(&self, point: &Point, unknowns: &Unknowns) -> Option<SparseRow> {
+    fn row(&self, point: &OutlookPoint, unknowns: &Unknowns) -> Option<SparseRow> {
         match &point.quantity {
             PointQuantity::Published(name) => self.published_row(name, &point.condition, unknowns),
             PointQuantity::Combination(values) => {
@@ -204,7 +204,7 @@ impl CoefficientPosterior {
             let weighted = shares.into_iter();
             weighted.map(move |(node, share)| (start + node, weight * share))
         };
-        let place = |is: &dyn Fn(&Term) -> bool| self.terms.iter().position(is);
+        let place = |is: &dyn Fn(&PosteriorTerm) -> bool| self.terms.iter().position(is);
         if let Some(term) = place(&|t| t.prior.name == name) {
             return Some(of_term(term, 1.0).collect());
         }

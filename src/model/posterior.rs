@@ -6,7 +6,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::flight_data::{FlightData, Information};
 use super::scale_prior::Scale;
-use super::term::Term;
+use super::term::PosteriorTerm;
 use super::unknowns::Unknowns;
 use crate::numerics::root::{BlockRoot, EXACT};
 use crate::numerics::symmetric::square;
@@ -37,30 +37,30 @@ pub fn information(flights: &[FlightData], weights: &[f64], unknowns: usize) -> 
 ///
 /// With the information matrix Λ and vector η of the data ([`Information`]), the prior covariance R
 /// Rᵀ gives the posterior covariance P = R (I + Rᵀ Λ R)⁻¹ Rᵀ and the mean P η.
-pub struct Solved<'a> {
+pub struct SolvedPosterior<'a> {
     root: &'a BlockRoot,
     /// Cholesky factor L of I + Rᵀ Λ R = L Lᵀ.
     lower: DMatrix<f64>,
 }
 
-impl<'a> Solved<'a> {
+impl<'a> SolvedPosterior<'a> {
     /// Posterior; `None` if the data are not finite.
     #[must_use]
-    pub fn new(root: &'a BlockRoot, information: &Information) -> Option<Solved<'a>> {
+    pub fn new(root: &'a BlockRoot, information: &Information) -> Option<SolvedPosterior<'a>> {
         let lower = inner_root(root.right(&root.left(&information.matrix)))?;
-        Some(Solved { root, lower })
+        Some(SolvedPosterior { root, lower })
     }
 
     /// Product L⁻¹ Rᵀ A for some columns A over the unknowns, from which Aᵀ P A follows as its
     /// square.
-    fn halves(&self, mut columns: DMatrix<f64>) -> DMatrix<f64> {
+    fn whitened_columns(&self, mut columns: DMatrix<f64>) -> DMatrix<f64> {
         solve_lower(self.lower.as_view(), columns.as_view_mut());
         columns
     }
 
     /// Covariance P of the unknowns.
     fn covariance(&self) -> DMatrix<f64> {
-        square(&self.halves(self.root.transposed()))
+        square(&self.whitened_columns(self.root.transposed()))
     }
 
     /// Means and covariance that the posterior gives for a flight's rows.
@@ -71,7 +71,7 @@ impl<'a> Solved<'a> {
         information: &Information,
     ) -> (DVector<f64>, DMatrix<f64>) {
         let columns = flight.columns(information.vector.len());
-        let halves = self.halves(self.root.left(&columns));
+        let halves = self.whitened_columns(self.root.left(&columns));
         let mut seen = self.root.left_of(&information.vector);
         self.lower.solve_lower_triangular_mut(&mut seen);
         (halves.tr_mul(&seen), square(&halves))
@@ -90,7 +90,7 @@ pub fn inner_root(mut inner: DMatrix<f64>) -> Option<DMatrix<f64>> {
 /// Gaussian with a prior covariance R Rᵀ. `None` if the data are not finite.
 #[must_use]
 pub fn gaussian(root: &BlockRoot, information: &Information) -> Option<Gaussian> {
-    let covariance = Solved::new(root, information)?.covariance();
+    let covariance = SolvedPosterior::new(root, information)?.covariance();
     let mean = &covariance * &information.vector;
     mean.iter()
         .all(|v| v.is_finite())
@@ -210,10 +210,10 @@ pub fn reweighted(
 
 /// Prior covariance of the differences.
 #[must_use]
-pub fn prior(unknowns: &Unknowns, terms: &[Term], scales: &[Scale]) -> DMatrix<f64> {
+pub fn prior(unknowns: &Unknowns, terms: &[PosteriorTerm], scales: &[Scale]) -> DMatrix<f64> {
     let mut whole = DMatrix::zeros(unknowns.differences, unknowns.differences);
     for ((term, scale), &start) in terms.iter().zip(scales).zip(&unknowns.starts) {
-        let own = term.prior.covariance.at(scale);
+        let own = term.prior.covariance.for_scale(scale);
         whole.view_mut((start, start), own.shape()).copy_from(&own);
     }
     whole

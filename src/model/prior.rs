@@ -28,7 +28,7 @@ use crate::tables::Knowledge;
 
 /// Prior of one derivative, or sum of derivatives.
 #[derive(Clone, Debug)]
-pub struct Prior {
+pub struct DerivativePrior {
     pub name: String,
     pub known: Knowledge,
     pub grid: Grid,
@@ -42,7 +42,7 @@ pub struct Prior {
 
 /// Tunnel's table of a derivative, read at the points of a grid.
 #[derive(Clone, Debug)]
-pub struct Table {
+pub struct TableOnGrid {
     pub known: Knowledge,
     pub mean: Vec<f64>,
     /// Stated uncertainty at each point.
@@ -51,9 +51,9 @@ pub struct Table {
     pub size: f64,
 }
 
-impl Prior {
+impl DerivativePrior {
     #[must_use]
-    pub fn new(name: String, grid: Grid, table: Table, centre: Scale) -> Prior {
+    pub fn new(name: String, grid: Grid, table: TableOnGrid, centre: Scale) -> DerivativePrior {
         let nodes = grid.nodes();
         let n = nodes.len();
         let shape = |i: usize, j: usize| match table.known {
@@ -72,7 +72,7 @@ impl Prior {
             }),
             across: DMatrix::from_fn(n, n, |i, j| across(&nodes[i], &nodes[j])),
         };
-        Prior {
+        DerivativePrior {
             covariance,
             scale: ScalePrior::new(centre, table.known),
             name,
@@ -85,7 +85,7 @@ impl Prior {
     /// Variance of the difference at a condition about the straight line between the neighbouring
     /// points of the grid.
     #[must_use]
-    pub fn between(&self, scale: &Scale, at: &Condition) -> f64 {
+    pub fn variance_between_points(&self, scale: &Scale, at: &Condition) -> f64 {
         let shares = self.grid.shares(at);
         let nodes = self.grid.nodes();
         let PriorCovariance {

@@ -35,7 +35,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::observed_differences::{Fit, ObservedDifferences, ObservedTerm};
 use super::scale_prior::Scale;
-use super::term::Term;
+use super::term::PosteriorTerm;
 use crate::numerics::minimise::{LocalExpansion, minimum};
 
 /// Share of a term's largest prior variance below which a direction of its differences is ignored.
@@ -50,7 +50,7 @@ const TOLERANCE: f64 = 0.01;
 
 /// Medians of the priors of all scales, from which the search starts.
 #[must_use]
-pub fn centres(terms: &[Term]) -> Vec<Scale> {
+pub fn centres(terms: &[PosteriorTerm]) -> Vec<Scale> {
     terms.iter().map(|t| t.prior.scale.centre).collect()
 }
 
@@ -93,7 +93,9 @@ pub fn negative_log_posterior(
 ) -> Option<LocalExpansion> {
     let fit = observed.fit(scales, least)?;
     let both = observed.terms.iter().zip(scales);
-    let changes: Vec<Changes> = both.map(|(t, s)| Changes::new(t, s, &fit)).collect();
+    let changes: Vec<TermDerivatives> = both
+        .map(|(t, s)| TermDerivatives::new(t, s, &fit))
+        .collect();
     let n = 2 * changes.len();
     let mut local = LocalExpansion {
         value: fit.value,
@@ -115,18 +117,18 @@ pub fn negative_log_posterior(
 
 /// Products of one term's C_i from which the derivatives of f along its size and length follow. C is
 /// proportional to the square of the size, so its derivative along log size is 2 C.
-struct Changes<'a> {
+struct TermDerivatives<'a> {
     term: &'a ObservedTerm,
     /// M C_i for log size and log length, at the columns of the term's differences.
-    images: [DMatrix<f64>; 2],
+    information_changes: [DMatrix<f64>; 2],
     /// C_i a for log size and log length.
-    moved: [DVector<f64>; 2],
+    innovation_changes: [DVector<f64>; 2],
     /// ½ tr(M X) − ½ aᵀ X a, where X is C, its first and its second derivative along log length.
-    halves: [f64; 3],
+    cost_slopes: [f64; 3],
 }
 
-impl<'a> Changes<'a> {
-    fn new(term: &'a ObservedTerm, scale: &Scale, fit: &Fit) -> Changes<'a> {
+impl<'a> TermDerivatives<'a> {
+    fn new(term: &'a ObservedTerm, scale: &Scale, fit: &Fit) -> TermDerivatives<'a> {
         let slopes = term.covariance.slopes(scale);
         let (start, n) = (term.start, term.len());
         let columns = fit.information.columns(start, n);
@@ -134,10 +136,10 @@ impl<'a> Changes<'a> {
         let a = fit.innovation.rows(start, n);
         let half = |c: &DMatrix<f64>| 0.5 * own.dot(c) - 0.5 * a.dot(&(c * a));
         let halves = [&slopes.value, &slopes.by_length, &slopes.by_length_twice].map(half);
-        Changes {
-            images: [2.0 * columns * &slopes.value, columns * &slopes.by_length],
-            moved: [2.0 * &slopes.value * a, &slopes.by_length * a],
-            halves,
+        TermDerivatives {
+            information_changes: [2.0 * columns * &slopes.value, columns * &slopes.by_length],
+            innovation_changes: [2.0 * &slopes.value * a, &slopes.by_length * a],
+            cost_slopes: halves,
             term,
         }
     }
@@ -146,7 +148,7 @@ impl<'a> Changes<'a> {
     /// a scale of an earlier term or of the same one.
     fn add_pair(
         &self,
-        other: &Changes,
+        other: &TermDerivatives,
         fit: &Fit,
         (i, j): (usize, usize),
         local: &mut LocalExpansion,
@@ -155,10 +157,10 @@ impl<'a> Changes<'a> {
         let at = (own.start, before.start);
         let between = fit.information.view(at, (own.len(), before.len()));
         for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            let image = other.images[b].rows(own.start, own.len());
-            let back = self.images[a].rows(before.start, before.len());
+            let image = other.information_changes[b].rows(own.start, own.len());
+            let back = self.information_changes[a].rows(before.start, before.len());
             let trace = 0.5 * image.dot(&back.transpose());
-            let square = self.moved[a].dot(&(between * &other.moved[b]));
+            let square = self.innovation_changes[a].dot(&(between * &other.innovation_changes[b]));
             for place in [(i + a, j + b), (j + b, i + a)] {
                 local.expected[place] = trace;
                 local.curvature[place] = square - trace;
@@ -169,7 +171,7 @@ impl<'a> Changes<'a> {
     /// Adds the first derivatives of f, the terms of f_ij with C_ij, and the prior of this term's
     /// scales.
     fn add_single(&self, scale: &Scale, i: usize, local: &mut LocalExpansion) {
-        let [value, by_length, by_length_twice] = self.halves;
+        let [value, by_length, by_length_twice] = self.cost_slopes;
         let penalty = self.term.scale.penalty(scale);
         local.value += penalty.value;
         local.gradient[i] = 2.0 * value + penalty.gradient[0];

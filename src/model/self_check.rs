@@ -4,7 +4,7 @@
 use nalgebra::{Cholesky, DVector};
 
 use super::flight_data::FlightData;
-use super::posterior::{Gaussian, LeavingOut, LeftOut, Solved, information};
+use super::posterior::{Gaussian, LeavingOut, LeftOut, SolvedPosterior, information};
 use crate::numerics::root::BlockRoot;
 use crate::numerics::student::NORMAL_95;
 
@@ -68,7 +68,7 @@ pub fn maneuvers(
     let others = flights.iter().map(|f| f.of_maneuvers(|m| !is_left_out(m)));
     let others: Vec<FlightData> = others.filter(|f| !f.rows.is_empty()).collect();
     let sums = information(&others, weights, unknowns);
-    let rest = Solved::new(root, &sums)?;
+    let rest = SolvedPosterior::new(root, &sums)?;
     let mut sum = Agreement::default();
     for flight in flights {
         let own = flight.of_maneuvers(&is_left_out);

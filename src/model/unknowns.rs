@@ -12,7 +12,7 @@ use super::grid::Grid;
 use super::observation::Observation;
 use super::prior_covariance::fading;
 use super::scale_prior::Scale;
-use super::term::Term;
+use super::term::PosteriorTerm;
 use crate::aero::Condition;
 use crate::numerics::root::{BlockRoot, root};
 use crate::output_error::error_effect::SharedError;
@@ -48,7 +48,7 @@ impl Unknowns {
     /// Unknowns of a coefficient's terms and of observations by class.
     #[must_use]
     pub fn new<'o>(
-        terms: &[Term],
+        terms: &[PosteriorTerm],
         observations: impl Iterator<Item = &'o (usize, Observation)>,
         class_error: f64,
     ) -> Unknowns {
@@ -95,7 +95,12 @@ impl Unknowns {
 
     /// Rows of an observation over the unknowns.
     #[must_use]
-    pub fn rows(&self, terms: &[Term], class: usize, observation: &Observation) -> Vec<SparseRow> {
+    pub fn rows(
+        &self,
+        terms: &[PosteriorTerm],
+        class: usize,
+        observation: &Observation,
+    ) -> Vec<SparseRow> {
         let mut rows = self.difference_rows(terms, &observation.design, &observation.condition);
         for (i, (row, &term)) in rows.iter_mut().zip(&observation.terms).enumerate() {
             let bound = observation.noise[(i, i)].sqrt();
@@ -116,7 +121,7 @@ impl Unknowns {
     #[must_use]
     pub fn difference_rows(
         &self,
-        terms: &[Term],
+        terms: &[PosteriorTerm],
         design: &DMatrix<f64>,
         condition: &Condition,
     ) -> Vec<SparseRow> {
@@ -147,7 +152,7 @@ impl Unknowns {
 
     /// Root of the prior covariance of all unknowns; `least` as in [`Unknowns::root_of_others`].
     #[must_use]
-    pub fn root(&self, terms: &[Term], scales: &[Scale], least: f64) -> BlockRoot {
+    pub fn root(&self, terms: &[PosteriorTerm], scales: &[Scale], least: f64) -> BlockRoot {
         let mut whole = root_of_differences(terms, scales, least);
         self.push_others(least, &mut whole);
         whole
@@ -170,10 +175,10 @@ impl Unknowns {
 /// Root of the prior covariance of the differences. Directions below `least` of a term's largest
 /// variance are ignored.
 #[must_use]
-pub fn root_of_differences(terms: &[Term], scales: &[Scale], least: f64) -> BlockRoot {
+pub fn root_of_differences(terms: &[PosteriorTerm], scales: &[Scale], least: f64) -> BlockRoot {
     let mut whole = BlockRoot::default();
     for (term, scale) in terms.iter().zip(scales) {
-        whole.push(root(&term.prior.covariance.at(scale), least));
+        whole.push(root(&term.prior.covariance.for_scale(scale), least));
     }
     whole
 }
@@ -196,7 +201,7 @@ fn class_grid((lowest, highest): (f64, f64)) -> Grid {
 
 /// Weighted sum of the unknowns.
 #[must_use]
-pub fn sum(row: &SparseRow, unknowns: &DVector<f64>) -> f64 {
+pub fn weighted_sum(row: &SparseRow, unknowns: &DVector<f64>) -> f64 {
     row.iter()
         .map(|(place, weight)| weight * unknowns[*place])
         .sum()
@@ -204,7 +209,7 @@ pub fn sum(row: &SparseRow, unknowns: &DVector<f64>) -> f64 {
 
 /// Covariance of two weighted sums of the unknowns.
 #[must_use]
-pub fn between(first: &SparseRow, second: &SparseRow, covariance: &DMatrix<f64>) -> f64 {
+pub fn covariance_between(first: &SparseRow, second: &SparseRow, covariance: &DMatrix<f64>) -> f64 {
     let pairs = first
         .iter()
         .flat_map(|a| second.iter().map(move |b| (a, b)));

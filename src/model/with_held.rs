@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use super::campaign_model::Model;
 use super::evidence::Evidence;
 use super::held_values::HeldDifferences;
-use super::unknowns::{SparseRow, between, sum};
+use super::unknowns::{SparseRow, covariance_between, weighted_sum};
 use crate::aero::Combined;
 use crate::maneuver::Status;
 use crate::output_error::error_effect::ErrorEffect;
@@ -85,8 +85,8 @@ impl<'a> WithHeld<'a> {
             }
             Status::Estimated => {
                 if let Some(weights) = self.weights(&row.derivative, sums) {
-                    let change = sum(&weights, &self.change);
-                    let variance = between(&weights, &weights, &self.covariance);
+                    let change = weighted_sum(&weights, &self.change);
+                    let variance = covariance_between(&weights, &weights, &self.covariance);
                     let bound = |b: Option<f64>| b.map(|b| (b * b + variance).max(0.0).sqrt());
                     new.value = row.value.map(|v| v + change);
                     new.bound = bound(row.bound);

@@ -94,7 +94,7 @@ fn identify<D: Bounded>(data: &D, fit: &mut Fit<D::Response>, settings: &Setting
         return;
     }
     let sums = data.sums(&fit.response, &fit.weights);
-    match Identification::of(&sums.information, settings.max_condition_number) {
+    match Identification::identify(&sums.information, settings.max_condition_number) {
         Identification::Determined {
             condition_number, ..
         } => fit.condition_number = Some(condition_number),
@@ -118,7 +118,7 @@ pub fn add_bounds<D: Bounded>(data: &D, fit: &mut Fit<D::Response>, settings: &S
         return;
     }
     let sums = data.sums(&fit.response, &fit.weights);
-    let identification = Identification::of(&sums.information, settings.max_condition_number);
+    let identification = Identification::identify(&sums.information, settings.max_condition_number);
     if let Identification::Determined { inverse, .. } = identification {
         let bounds = cramer_rao::bounds(&inverse, data, fit);
         fit.covariance = Some(bounds.covariance);

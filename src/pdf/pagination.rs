@@ -103,7 +103,7 @@ impl PagedDocument {
                 }
                 other => {
                     if let Some(last) = self.pages.last_mut() {
-                        last.marks.push(other.moved(MARGIN, y));
+                        last.marks.push(other.shifted_by(MARGIN, y));
                     }
                 }
             }

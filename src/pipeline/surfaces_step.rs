@@ -63,7 +63,7 @@ impl<'a> Step for SurfacesStep<'a> {
 
     fn make(&self, _: &ArtefactName) -> Result<ComputedArtefact<FlightEvidence>> {
         let file = LazyRecord::new(self.flight, self.store, &[]);
-        let part = |maneuver: &&'a Maneuver| Ok((file.part(maneuver)?, *maneuver));
+        let part = |maneuver: &&'a Maneuver| Ok((file.read_maneuver(maneuver)?, *maneuver));
         let parts: Result<Vec<(Record, &Maneuver)>> = self.maneuvers.iter().map(part).collect();
         let basis = AircraftModel {
             aircraft: &self.config.aircraft,

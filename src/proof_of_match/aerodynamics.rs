@@ -125,7 +125,7 @@ pub struct Aerodynamics<'a> {
 
 /// Trim from which a simulation starts: coefficients, and factors of the derivatives.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Trim {
+pub struct SimulationTrim {
     pub coefficients: [f64; COEFFICIENTS],
     /// Factors of the derivatives at the trim.
     pub factors: Vec<f64>,
@@ -147,7 +147,7 @@ impl<'a> Aerodynamics<'a> {
                 recorded: &recorded,
                 coefficient: d.coefficient,
             };
-            (index(d.coefficient), factors.of(&d.regressor))
+            (index(d.coefficient), factors.factor_of(&d.regressor))
         };
         Aerodynamics {
             aircraft,
@@ -234,9 +234,9 @@ struct TrimmedTerm {
 
 impl<'a> AboutTrim<'a> {
     #[must_use]
-    pub fn new(aerodynamics: &'a Aerodynamics, trim: &Trim) -> AboutTrim<'a> {
+    pub fn new(aerodynamics: &'a Aerodynamics, trim: &SimulationTrim) -> AboutTrim<'a> {
         let table = &aerodynamics.table;
-        let place = table.place(trim.alpha_deg);
+        let place = table.position_of(trim.alpha_deg);
         let mut terms = [const { Vec::new() }; COEFFICIENTS];
         let mut factors: Vec<&Factor> = Vec::new();
         let own = aerodynamics.terms.iter().zip(&trim.factors).enumerate();
@@ -282,7 +282,7 @@ impl<'a> AboutTrim<'a> {
         for (value, factor) in self.values.iter_mut().zip(&self.factors) {
             *value = factor.value(flow, recorded);
         }
-        let entries = self.table.entries(self.table.place(flow.alpha_deg));
+        let entries = self.table.entries(self.table.position_of(flow.alpha_deg));
         let mut change = [0.0; COEFFICIENTS];
         for (sum, terms) in change.iter_mut().zip(&self.terms) {
             for term in terms {
@@ -301,7 +301,7 @@ impl<'a> AboutTrim<'a> {
     #[must_use]
     pub fn change_with_slopes(&mut self, flow: &Flow, recorded: &[f64]) -> CoefficientSlopes {
         let change = self.change(flow, recorded);
-        let entries = self.table.entries(self.table.place(flow.alpha_deg));
+        let entries = self.table.entries(self.table.position_of(flow.alpha_deg));
         let along = self.factors.iter().map(|f| f.slopes(flow, recorded));
         let along: Vec<FlowSlopes> = along.collect();
         let mut by_flow = [[0.0; FLOW]; COEFFICIENTS];
@@ -356,7 +356,7 @@ struct Factors<'a> {
 }
 
 impl Factors<'_> {
-    fn of(&self, regressor: &Regressor) -> Factor {
+    fn factor_of(&self, regressor: &Regressor) -> Factor {
         let rate = |axis: usize, length: f64| Factor::Rate {
             axis,
             half_length: 0.5 * length,
@@ -373,20 +373,21 @@ impl Factors<'_> {
             },
             Regressor::Surface(name) if name == signal::VELOCITY => Factor::Velocity,
             Regressor::Surface(name) if name == signal::MACH => Factor::Mach,
-            Regressor::Surface(name) => Factor::Recorded(self.place(name)),
+            Regressor::Surface(name) => Factor::Recorded(self.signal_index(name)),
             Regressor::Vane(name) => Factor::Vane {
-                place: self.place(name),
+                place: self.signal_index(name),
                 size: self.aircraft.wing_area_ft2
                     * self.coefficient.reference_length(self.aircraft),
             },
-            Regressor::Magnitude(of) => Factor::Magnitude(Box::new(self.of(of))),
-            Regressor::Product(both) => {
-                Factor::Product(Box::new([self.of(&both[0]), self.of(&both[1])]))
-            }
+            Regressor::Magnitude(of) => Factor::Magnitude(Box::new(self.factor_of(of))),
+            Regressor::Product(both) => Factor::Product(Box::new([
+                self.factor_of(&both[0]),
+                self.factor_of(&both[1]),
+            ])),
         }
     }
 
-    fn place(&self, name: &str) -> usize {
+    fn signal_index(&self, name: &str) -> usize {
         let place = self.recorded.iter().position(|own| *own == name);
         place.unwrap_or(usize::MAX)
     }

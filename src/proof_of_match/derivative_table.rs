@@ -93,7 +93,7 @@ impl DerivativeTable {
 
     #[inline]
     #[must_use]
-    pub fn place(&self, alpha_deg: f64) -> TablePosition {
+    pub fn position_of(&self, alpha_deg: f64) -> TablePosition {
         let steps = (alpha_deg - self.first_deg) / STEP_DEG;
         #[expect(
             clippy::cast_possible_truncation,

@@ -2,10 +2,10 @@
 //! used.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
-use super::aerodynamics::{AboutTrim, Aerodynamics, COEFFICIENTS, Flow, Trim};
+use super::aerodynamics::{AboutTrim, Aerodynamics, COEFFICIENTS, Flow, SimulationTrim};
 use super::load_changes::LoadSlopes;
 use super::outputs::{Outputs, outputs};
-use super::recording::Recording;
+use super::recording::ManeuverRecording;
 use crate::aircraft::Aircraft;
 use crate::numerics::runge_kutta::{self, POINT};
 use crate::rigid_body::{AirData, BodyState, CHANGING, Euler, Instant, Loads, Readings, body};
@@ -32,13 +32,13 @@ pub struct Start {
     /// Ratio of the measured dynamic pressure to that in the standard atmosphere: the density of
     /// the day.
     pub density_ratio: f64,
-    pub trim: Trim,
+    pub trim: SimulationTrim,
 }
 
 impl Start {
     /// Start with one parameter changed. Parameters are the states, then the trim coefficients.
     #[must_use]
-    pub fn moved(&self, parameter: usize, by: f64) -> Start {
+    pub fn with_change(&self, parameter: usize, by: f64) -> Start {
         let mut start = self.clone();
         match start.state.get_mut(parameter) {
             Some(state) => *state += by,
@@ -113,7 +113,7 @@ pub struct FreeRun {
 #[derive(Clone, Debug)]
 pub struct Simulation<'a> {
     pub aircraft: &'a Aircraft,
-    pub recording: &'a Recording,
+    pub recording: &'a ManeuverRecording,
     pub aerodynamics: Aerodynamics<'a>,
 }
 

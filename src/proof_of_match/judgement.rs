@@ -2,14 +2,14 @@
 
 use super::dutch_roll::DutchRoll;
 use super::free_run::FreeRun;
-use super::outputs::place;
-use super::recording::Recording;
+use super::outputs::output_index;
+use super::recording::ManeuverRecording;
 use super::specification::{Test, Tolerance};
 use crate::tables::MatchVerdict;
 
 /// Finding about one tolerance.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Finding {
+pub struct ToleranceFinding {
     pub test: String,
     pub subject: String,
     /// Number of the requirement within its test, from one.
@@ -27,7 +27,7 @@ pub struct Finding {
     pub margin: f64,
 }
 
-impl Finding {
+impl ToleranceFinding {
     #[must_use]
     pub fn verdict(&self) -> MatchVerdict {
         verdict(self.margin)
@@ -92,11 +92,11 @@ pub struct Simulated {
 /// Judges a simulation. `required_pct` of the samples must be inside.
 #[must_use]
 pub fn judge(
-    recording: &Recording,
+    recording: &ManeuverRecording,
     simulated: &Simulated,
     judged: &[Judged],
     required_pct: f64,
-) -> Vec<Finding> {
+) -> Vec<ToleranceFinding> {
     let finding = |own: &Judged| {
         let tolerance = &own.tolerance;
         let differences = if tolerance.quantity.is_of_dutch_roll() {
@@ -104,7 +104,7 @@ pub fn judge(
         } else {
             differences(recording, &simulated.run, tolerance)
         };
-        Finding {
+        ToleranceFinding {
             test: own.test.test.clone(),
             subject: own.test.subject.clone(),
             requirement: own.requirement,
@@ -135,7 +135,7 @@ impl Simulated {
 
 /// Best alternative of the requirement with the smallest margin; `None` without findings.
 #[must_use]
-pub fn decisive(findings: &[Finding]) -> Option<&Finding> {
+pub fn decisive(findings: &[ToleranceFinding]) -> Option<&ToleranceFinding> {
     let requirements = findings.chunk_by(|a, b| a.test == b.test && a.requirement == b.requirement);
     let best =
         requirements.filter_map(|own| own.iter().max_by(|a, b| a.margin.total_cmp(&b.margin)));
@@ -158,8 +158,12 @@ impl Difference {
     }
 }
 
-fn differences(recording: &Recording, run: &FreeRun, tolerance: &Tolerance) -> Vec<Difference> {
-    let Some(output) = place(tolerance.quantity) else {
+fn differences(
+    recording: &ManeuverRecording,
+    run: &FreeRun,
+    tolerance: &Tolerance,
+) -> Vec<Difference> {
+    let Some(output) = output_index(tolerance.quantity) else {
         return vec![];
     };
     let counts = |sample: &usize| !recording.repaired[*sample][output];

@@ -7,9 +7,9 @@ use super::decisive_difference::{DecisiveDifference, PredictedDutchRoll};
 use super::derivative_table::DerivativeTable;
 use super::dutch_roll::{LateralModes, OwnEstimates};
 use super::free_run::{FreeRun, Simulation};
-use super::judgement::{self, Finding, Simulated};
-use super::outputs::place;
-use super::recording::Recording;
+use super::judgement::{self, Simulated, ToleranceFinding};
+use super::outputs::output_index;
+use super::recording::ManeuverRecording;
 use super::repeat_flight::{self, MeanRun, Probabilities, Repeats};
 use super::specification::{Specification, Test};
 use super::start::{self, MatchedStart};
@@ -79,7 +79,7 @@ impl Matched {
 /// Flies a maneuver again with each model.
 #[must_use]
 pub fn fly_again(basis: &ProofInputs, flown: &RecordedManeuver) -> Matched {
-    match Flight::new(basis, flown) {
+    match RepeatableManeuver::new(basis, flown) {
         Ok(flight) => flight.matched(),
         Err(reason) => not_flown(basis, flown.maneuver, &reason),
     }
@@ -94,7 +94,7 @@ pub fn decisive_difference(
     basis: &ProofInputs,
     flown: &RecordedManeuver,
 ) -> Result<DecisiveDifference, String> {
-    Flight::new(basis, flown)?.decisive_difference()
+    RepeatableManeuver::new(basis, flown)?.decisive_difference()
 }
 
 /// Dutch roll of a lateral maneuver by its own estimates.
@@ -162,21 +162,24 @@ struct Trimmed<'a> {
 }
 
 /// A maneuver that can be flown again.
-struct Flight<'a> {
+struct RepeatableManeuver<'a> {
     basis: &'a ProofInputs<'a>,
     maneuver: &'a Maneuver,
     local: Option<&'a LocalPosterior>,
     modes: Option<LateralModes>,
     tests: Vec<&'a Test>,
-    recording: Recording,
+    recording: ManeuverRecording,
 }
 
-impl<'a> Flight<'a> {
+impl<'a> RepeatableManeuver<'a> {
     /// A maneuver that can be flown again.
     ///
     /// # Errors
     /// The reason why it cannot.
-    fn new(basis: &'a ProofInputs, flown: &RecordedManeuver<'a>) -> Result<Flight<'a>, String> {
+    fn new(
+        basis: &'a ProofInputs,
+        flown: &RecordedManeuver<'a>,
+    ) -> Result<RepeatableManeuver<'a>, String> {
         let RecordedManeuver {
             record,
             maneuver,
@@ -193,13 +196,13 @@ impl<'a> Flight<'a> {
             return Err("no test judges its class".to_owned());
         }
         let aircraft = (basis.aircraft, basis.buildup);
-        Ok(Flight {
+        Ok(RepeatableManeuver {
             basis,
             maneuver,
             local,
             modes: dutch_roll(basis, maneuver, own),
             tests,
-            recording: Recording::new(record, maneuver, aircraft, specification.trim_s)?,
+            recording: ManeuverRecording::new(record, maneuver, aircraft, specification.trim_s)?,
         })
     }
 
@@ -210,7 +213,7 @@ impl<'a> Flight<'a> {
         let local = self.local.ok_or("the posterior has nothing of its axis")?;
         let posterior = self.trimmed(basis.posterior);
         let about = (&posterior.simulation, &posterior.start);
-        let mean = MeanRun::of(about, local, (basis.buildup, self.maneuver.axis))
+        let mean = MeanRun::fly(about, local, (basis.buildup, self.maneuver.axis))
             .ok_or("its start is not determined")?;
         let follows_mean = *model == ModelSource::Posterior;
         let own = (!follows_mean).then(|| self.trimmed(database));
@@ -231,7 +234,7 @@ impl<'a> Flight<'a> {
             quantity: decisive.quantity,
             mean: decisive.mean,
             slopes: named.collect(),
-            rest: decisive.rest,
+            fixed_deviation: decisive.fixed_deviation,
             follows_mean,
         })
     }
@@ -313,7 +316,7 @@ impl<'a> Flight<'a> {
             .get_or_insert_with(|| self.history(&simulated.run, &findings));
     }
 
-    fn row(&self, model: ModelSource, finding: &Finding) -> MatchRow {
+    fn row(&self, model: ModelSource, finding: &ToleranceFinding) -> MatchRow {
         let maneuver = self.maneuver;
         let tolerance = finding.tolerance;
         MatchRow {
@@ -344,7 +347,7 @@ impl<'a> Flight<'a> {
     fn verdict(
         &self,
         model: ModelSource,
-        findings: &[Finding],
+        findings: &[ToleranceFinding],
         repeat: Option<&Probabilities>,
     ) -> MatchVerdictRow {
         let decisive = judgement::decisive(findings);
@@ -371,7 +374,7 @@ impl<'a> Flight<'a> {
     }
 
     /// Judged quantities measured and computed, each once.
-    fn history(&self, run: &FreeRun, findings: &[Finding]) -> History {
+    fn history(&self, run: &FreeRun, findings: &[ToleranceFinding]) -> History {
         let recording = &self.recording;
         let times = (0..recording.samples).map(|k| recording.start_s + k as f64 * recording.step_s);
         let mut quantities = Vec::new();
@@ -381,7 +384,7 @@ impl<'a> Flight<'a> {
             }
         }
         let output = |quantity: &crate::tables::MatchedQuantity| {
-            let output = place(*quantity)?;
+            let output = output_index(*quantity)?;
             let computed = |k: usize| run.outputs.get(k).map_or(f64::NAN, |o| o[output]);
             let samples = 0..recording.samples;
             Some(HistoryOutput {

@@ -14,8 +14,8 @@ use super::dutch_roll::{DutchRoll, LateralModes};
 use super::free_run::{FreeRun, STATES, Simulation};
 use super::judgement::{Judged, Simulated, allowed_outside};
 use super::linear_run::{Histories, LinearRun, Parameter};
-use super::outputs::{Outputs, place};
-use super::recording::Recording;
+use super::outputs::{Outputs, output_index};
+use super::recording::ManeuverRecording;
 use super::specification::Tolerance;
 use super::start::MatchedStart;
 use crate::aero::{Axis, Buildup, Regressor};
@@ -89,7 +89,7 @@ pub struct MeanRun {
 impl MeanRun {
     /// Flies the mean of a posterior; `None` if its start is not determined.
     #[must_use]
-    pub fn of(
+    pub fn fly(
         (simulation, start): (&Simulation, &MatchedStart),
         posterior: &LocalPosterior,
         (buildup, axis): (&Buildup, Axis),
@@ -97,7 +97,7 @@ impl MeanRun {
         let covariance = start.covariance.as_ref()?;
         let recording = simulation.recording;
         let stride = stride(recording);
-        let derivatives = moving(posterior, buildup);
+        let derivatives = acting_derivatives(posterior, buildup);
         let own = start_parameters(axis);
         let moved = derivatives.iter().map(|(_, d)| Parameter::Derivative(*d));
         let parameters: Vec<Parameter> = moved.chain(own.map(Parameter::Start)).collect();
@@ -121,7 +121,7 @@ impl MeanRun {
 }
 
 /// Samples in a step of the run with slopes.
-fn stride(recording: &Recording) -> usize {
+fn stride(recording: &ManeuverRecording) -> usize {
     whole_steps(LONGEST_STEP_S, recording.step_s)
         .min(recording.samples)
         .max(1)
@@ -137,7 +137,7 @@ pub fn repeats(
     model: (&Buildup, Axis),
     draws: usize,
 ) -> Option<Repeats> {
-    let about = MeanRun::of((simulation, start), posterior, model)?;
+    let about = MeanRun::fly((simulation, start), posterior, model)?;
     if about.derivatives.is_empty() {
         return None;
     }
@@ -174,7 +174,7 @@ pub fn repeats(
 /// Indices of the derivatives that affect a simulation, among the values of a posterior and in the
 /// build-up.
 #[must_use]
-pub fn moving(posterior: &LocalPosterior, buildup: &Buildup) -> Vec<(usize, usize)> {
+pub fn acting_derivatives(posterior: &LocalPosterior, buildup: &Buildup) -> Vec<(usize, usize)> {
     let index = |value: &LocalValue| {
         let is_slope = value.kind == LocalKind::Derivative && !value.is_mach_slope;
         let mut derivatives = buildup.derivatives.iter();
@@ -205,7 +205,7 @@ impl Repeats {
     #[must_use]
     pub fn probabilities(
         &self,
-        recording: &Recording,
+        recording: &ManeuverRecording,
         simulated: &Simulated,
         judged: &[Judged],
         required_pct: f64,
@@ -218,7 +218,7 @@ impl Repeats {
             return sums;
         }
         let limits = judged.iter().map(|own| {
-            let output = place(own.tolerance.quantity)?;
+            let output = output_index(own.tolerance.quantity)?;
             let stated = (&own.tolerance, output);
             Some(SampleLimits::new(
                 recording,
@@ -325,7 +325,7 @@ struct SampleLimit {
 
 impl SampleLimits {
     fn new(
-        recording: &Recording,
+        recording: &ManeuverRecording,
         (tolerance, output): (&Tolerance, usize),
         stride: usize,
         required_pct: f64,

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use super::judged_aircraft::JudgedAircraft;
 use super::levels;
 use super::linear::Differentiation;
-use super::linear::{Controls, Flight, LinearModel};
+use super::linear::{Controls, LinearModel, SteadyFlight};
 use super::quantities::AxisQuantities;
 use super::specification::Specification;
 use super::trim::Trim;
@@ -184,7 +184,7 @@ pub fn linearised(
 ) -> (LinearModel, LocalPosterior) {
     let specification = basis.specification;
     let fixed = BTreeMap::new();
-    let flight = Flight {
+    let flight = SteadyFlight {
         aircraft: basis.aircraft,
         buildup: basis.buildup,
         trim,
@@ -196,7 +196,7 @@ pub fn linearised(
             pitch: &specification.pitch_control,
         },
     };
-    let posterior = basis.model.at(axis, &trim.condition);
+    let posterior = basis.model.posterior_at_condition(axis, &trim.condition);
     let linear = match axis {
         Axis::Longitudinal => flight.longitudinal(&posterior),
         Axis::Lateral => flight.lateral(&posterior),
@@ -256,11 +256,11 @@ impl JudgedFlight<'_> {
         let draws = axes.iter().map(|a| a.draws.len()).min().unwrap_or(0);
         let mean = levels_of(
             specification,
-            &together(axes.iter().map(AxisAnalysis::values)),
+            &all_values(axes.iter().map(AxisAnalysis::values)),
         );
         let mut counts = vec![[0_usize; 4]; mean.len()];
         for draw in 0..draws {
-            let values = together(axes.iter().map(|a| a.draws[draw].clone()));
+            let values = all_values(axes.iter().map(|a| a.draws[draw].clone()));
             for (counts, level) in counts.iter_mut().zip(levels_of(specification, &values)) {
                 counts[level as usize] += 1;
             }
@@ -288,7 +288,9 @@ impl JudgedFlight<'_> {
     }
 }
 
-fn together(axes: impl Iterator<Item = BTreeMap<FlyingQuality, f64>>) -> Vec<(FlyingQuality, f64)> {
+fn all_values(
+    axes: impl Iterator<Item = BTreeMap<FlyingQuality, f64>>,
+) -> Vec<(FlyingQuality, f64)> {
     axes.flatten().collect()
 }
 

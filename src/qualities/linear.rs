@@ -45,7 +45,7 @@ pub struct Lag {
 
 /// Equations solved for the rates of the states, ẋ = A x + B u.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Solved {
+pub struct SolvedEquations {
     pub matrix: Matrix,
     pub control: Vector,
     /// Slopes of A and B along each value; empty unless they are requested.
@@ -56,13 +56,17 @@ pub struct Solved {
 impl LinearModel {
     /// Equations at values of the derivatives, solved for the rates.
     #[must_use]
-    pub fn solved(&self, values: &DVector<f64>, differentiation: Differentiation) -> Solved {
+    pub fn solved(
+        &self,
+        values: &DVector<f64>,
+        differentiation: Differentiation,
+    ) -> SolvedEquations {
         let terms = self.slopes.iter().zip(values.iter());
         let matrix = terms.fold(self.rigid, |sum, (slope, value)| sum + slope * *value);
         let control = weighted_sum(&self.control_slopes, values);
         let has_slopes = differentiation == Differentiation::Slopes;
         let count = if has_slopes { self.slopes.len() } else { 0 };
-        let explicit = Solved {
+        let explicit = SolvedEquations {
             matrix,
             control,
             slopes: self.slopes[..count].to_vec(),
@@ -79,7 +83,7 @@ impl Lag {
     /// Solves the equations with a lag for the rates. Let e be the unit vector of α and I the
     /// identity. Then ẋ = (I − m eᵀ)⁻¹ (A x + B u), and the inverse is I + m eᵀ/(1 − eᵀm). The
     /// slopes follow from the slopes of (I − m eᵀ) A.
-    fn solved(&self, explicit: &Solved, values: &DVector<f64>) -> Solved {
+    fn solved(&self, explicit: &SolvedEquations, values: &DVector<f64>) -> SolvedEquations {
         let effect = weighted_sum(&self.slopes, values);
         let share = effect / (1.0 - effect[self.alpha]);
         let solve = |matrix: Matrix| matrix + share * matrix.row(self.alpha);
@@ -91,7 +95,7 @@ impl Lag {
         let slope = |(own, lag): (&Matrix, &Vector)| solve(own + lag * matrix.row(self.alpha));
         let control_slope =
             |(own, lag): (&Vector, &Vector)| solve_vector(own + lag * control[self.alpha]);
-        Solved {
+        SolvedEquations {
             matrix,
             control,
             slopes: of_matrix.map(slope).collect(),
@@ -169,14 +173,14 @@ pub struct Controls<'a> {
 
 /// Aircraft in steady flight, with its build-up and controls.
 #[derive(Clone, Copy, Debug)]
-pub struct Flight<'a> {
+pub struct SteadyFlight<'a> {
     pub aircraft: &'a Aircraft,
     pub buildup: &'a Buildup,
     pub trim: &'a Trim,
     pub controls: Controls<'a>,
 }
 
-impl Flight<'_> {
+impl SteadyFlight<'_> {
     /// Effects of the values of a posterior. A value without a derivative in the model has no
     /// effect.
     #[must_use]
@@ -252,11 +256,11 @@ impl Flight<'_> {
                     ..Effect::default()
                 }
             }
-            part => self.part(part, states),
+            part => self.single_regressor(part, states),
         }
     }
 
-    fn part(&self, regressor: &Regressor, states: &AxisStates) -> Effect {
+    fn single_regressor(&self, regressor: &Regressor, states: &AxisStates) -> Effect {
         let trim = self.trim;
         let mut effect = Effect::constant(match regressor {
             Regressor::Constant => 1.0,

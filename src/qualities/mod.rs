@@ -34,7 +34,7 @@ use analysis::Analysis;
 
 pub use judged_aircraft::JudgedAircraft;
 pub use judged_quantity::judged_quantity;
-pub use linear::{Controls, Differentiation, Flight, LinearModel};
+pub use linear::{Controls, Differentiation, LinearModel, SteadyFlight};
 pub use specification::{LevelLimit, Range, Specification};
 pub use trim::FlownConditions;
 

@@ -110,7 +110,7 @@ impl Modes {
     /// Modes of a matrix, with their slopes along parameters; `along` has the slopes of the matrix
     /// along each parameter. `None` if the eigenvalues cannot be computed.
     #[must_use]
-    pub fn of(axis: Axis, matrix: &Matrix, along: &[Matrix]) -> Option<Modes> {
+    pub fn of_matrix(axis: Axis, matrix: &Matrix, along: &[Matrix]) -> Option<Modes> {
         let roots = roots(matrix, along)?;
         let (fast, slow, pattern) = match axis {
             Axis::Longitudinal => longitudinal(&roots),

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use super::findings::Findings;
+use super::findings::RecorderFindings;
 use crate::flight::Correction;
 use crate::ingest::Compatibility;
 use crate::tables::{InstrumentError, InstrumentRow, InstrumentVerdict};
@@ -33,7 +33,7 @@ pub struct FlightCorrections {
 /// corrections of flights whose corrections change.
 pub fn correct_flights(
     rows: &mut [InstrumentRow],
-    findings: &mut Findings,
+    findings: &mut RecorderFindings,
     settings: &Compatibility,
 ) -> Vec<FlightCorrections> {
     let mut changed = BTreeSet::new();
@@ -55,7 +55,7 @@ pub fn correct_flights(
     changed.into_iter().map(of_flight).collect()
 }
 
-impl Findings {
+impl RecorderFindings {
     /// Completes the errors of an instrument that its flight does not determine. Withdraws
     /// corrections by errors that are far from the errors of the other flights.
     fn complete(&mut self, row: &mut InstrumentRow, settings: &Compatibility) {
@@ -135,7 +135,7 @@ mod tests {
     }
 
     /// Eight flights with a scale error of 2 %, one far from them, and one that determines none.
-    fn campaign() -> (Vec<InstrumentRow>, Findings) {
+    fn campaign() -> (Vec<InstrumentRow>, RecorderFindings) {
         let scales = [
             0.019, 0.021, 0.02, 0.0195, 0.0205, 0.02, 0.0198, 0.0202, 0.3,
         ];

@@ -2,7 +2,7 @@
 
 use super::common_error::CommonError;
 use super::error_series::ErrorSeries;
-use super::history::{Change, Shape, change};
+use super::history::{Change, ChangeShape, change};
 use crate::error::{Problem, ProblemStage};
 use crate::tables::{
     ALL_FLIGHTS, CommonErrorVerdict, InstrumentError, InstrumentTrend, InstrumentTrendRow,
@@ -28,7 +28,7 @@ pub struct ExaminedSeries {
 
 /// Rows and problems of a campaign's instruments.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Findings {
+pub struct RecorderFindings {
     pub rows: Vec<InstrumentTrendRow>,
     pub problems: Vec<Problem>,
     pub examined: Vec<ExaminedSeries>,
@@ -36,11 +36,11 @@ pub struct Findings {
 
 /// Examines all series of a campaign.
 #[must_use]
-pub fn examine(series: Vec<ErrorSeries>) -> Findings {
+pub fn examine(series: Vec<ErrorSeries>) -> RecorderFindings {
     let examined: Vec<ExaminedSeries> = series.into_iter().map(ExaminedSeries::of).collect();
     let tests = examined.iter().filter(|one| one.change.is_some()).count();
     let alarm = ALARM_PROBABILITY / tests.max(1) as f64;
-    Findings {
+    RecorderFindings {
         rows: examined.iter().map(|one| one.row(alarm)).collect(),
         problems: examined.iter().flat_map(ExaminedSeries::problems).collect(),
         examined,
@@ -92,8 +92,8 @@ impl ExaminedSeries {
         // The table has scale factors, as `instruments` does.
         let offset = f64::from(u8::from(series.error == InstrumentError::Scale));
         let verdict = match (sure.map(|change| change.shape), change) {
-            (Some(Shape::Step), _) => InstrumentTrend::Step,
-            (Some(Shape::Drift), _) => InstrumentTrend::Drift,
+            (Some(ChangeShape::Step), _) => InstrumentTrend::Step,
+            (Some(ChangeShape::Drift), _) => InstrumentTrend::Drift,
             (None, Some(_)) => InstrumentTrend::Steady,
             (None, None) => InstrumentTrend::TooFewFlights,
         };

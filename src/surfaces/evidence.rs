@@ -97,7 +97,8 @@ impl ManeuverData {
         let CoefficientData { implied, terms } = coefficient;
         let shifted = terms.iter().map(|term| {
             let delay_s = term.surface.map_or(0.0, |s| delays_s[s]);
-            term.regressor.at(&self.frequencies_hz, delay_s)
+            term.regressor
+                .spectrum_at_delay(&self.frequencies_hz, delay_s)
         });
         let (columns, slopes): (Vec<Spectrum>, Vec<Spectrum>) = shifted.unzip();
         let priors: Vec<Prior> = (terms.iter().zip(&columns))
@@ -122,7 +123,11 @@ impl ManeuverData {
         for CoefficientData { implied, terms } in &self.coefficients {
             let columns: Vec<Spectrum> = terms
                 .iter()
-                .map(|term| term.regressor.at(&self.frequencies_hz, 0.0).0)
+                .map(|term| {
+                    term.regressor
+                        .spectrum_at_delay(&self.frequencies_hz, 0.0)
+                        .0
+                })
                 .collect();
             let priors: Vec<Prior> = (terms.iter().zip(&columns))
                 .map(|(term, column)| unsigned_prior(term, implied, column))

@@ -3,7 +3,7 @@
 
 use nalgebra::DVector;
 
-use super::point::Point;
+use super::point::TrendPoint;
 use super::scatter::scatter_squared;
 
 /// Variance of the residuals beyond the bounds, in two parts.
@@ -15,8 +15,8 @@ pub(super) struct LackOfFit {
 }
 
 impl LackOfFit {
-    pub(super) fn of(
-        points: &[Point],
+    pub(super) fn from_residuals(
+        points: &[TrendPoint],
         residuals: &DVector<f64>,
         variances: &[f64],
         coefficients: usize,
@@ -47,7 +47,11 @@ struct AboutMeans {
     variances: Vec<f64>,
 }
 
-fn about_their_means(points: &[Point], residuals: &DVector<f64>, variances: &[f64]) -> AboutMeans {
+fn about_their_means(
+    points: &[TrendPoint],
+    residuals: &DVector<f64>,
+    variances: &[f64],
+) -> AboutMeans {
     let mut about = AboutMeans {
         residuals: residuals.clone(),
         freedom: Vec::with_capacity(points.len()),

@@ -7,7 +7,7 @@
 //! b₂²)/2, or zero if that is negative. The interval is the normal one: bounds are standard
 //! deviations, and no variance is estimated from one or two values alone.
 
-use super::point::Point;
+use super::point::TrendPoint;
 
 /// Mean of the maneuvers of one flown angle of attack.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,7 +25,7 @@ pub(super) struct Mean {
 
 impl Mean {
     /// Mean of the points of one flown α.
-    fn of(points: &[Point]) -> Mean {
+    fn of(points: &[TrendPoint]) -> Mean {
         let scatter2 = match points {
             [a, b] => {
                 let apart2 = (a.value - b.value).powi(2);
@@ -35,7 +35,7 @@ impl Mean {
         };
         let weights = points.iter().map(|p| 1.0 / (p.bound.powi(2) + scatter2));
         let total: f64 = weights.clone().sum();
-        let weighted = |value: fn(&Point) -> f64| {
+        let weighted = |value: fn(&TrendPoint) -> f64| {
             let products = points
                 .iter()
                 .zip(weights.clone())
@@ -56,7 +56,7 @@ impl Mean {
 /// Means of at most two maneuvers: one, or one at each of two flown angles of attack.
 ///
 /// The points are sorted by α.
-pub(super) fn means(points: &[Point]) -> Vec<Mean> {
+pub(super) fn means(points: &[TrendPoint]) -> Vec<Mean> {
     points
         .chunk_by(|a, b| a.flown == b.flown)
         .map(Mean::of)

@@ -2,7 +2,7 @@
 
 /// One maneuver's estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Point {
+pub(super) struct TrendPoint {
     pub alpha_deg: f64,
     pub value: f64,
     pub bound: f64,
@@ -12,7 +12,7 @@ pub(super) struct Point {
     pub flown: usize,
 }
 
-impl Point {
+impl TrendPoint {
     pub(super) fn key(&self) -> (f64, f64, f64, usize) {
         (self.alpha_deg, self.value, self.bound, self.class)
     }
@@ -20,7 +20,7 @@ impl Point {
 
 /// Numbers the flown α of points sorted by α. Points within half a step of the published grid count
 /// as one flown α.
-pub(super) fn count_flown<'a>(points: impl Iterator<Item = &'a mut Point>, step_deg: f64) {
+pub(super) fn count_flown<'a>(points: impl Iterator<Item = &'a mut TrendPoint>, step_deg: f64) {
     let mut current: Option<(usize, f64)> = None;
     for point in points {
         let (flown, first) = match current {
@@ -36,8 +36,8 @@ pub(super) fn count_flown<'a>(points: impl Iterator<Item = &'a mut Point>, step_
 }
 
 /// Flown α, deg, ascending: each is the mean of its maneuvers, rounded to a tenth.
-pub(super) fn flown_alphas(points: &[Point]) -> Vec<f64> {
-    let mean = |own: &[Point]| own.iter().map(|p| p.alpha_deg).sum::<f64>() / own.len() as f64;
+pub(super) fn flown_alphas(points: &[TrendPoint]) -> Vec<f64> {
+    let mean = |own: &[TrendPoint]| own.iter().map(|p| p.alpha_deg).sum::<f64>() / own.len() as f64;
     points
         .chunk_by(|a, b| a.flown == b.flown)
         .map(|own| (10.0 * mean(own)).round() / 10.0)

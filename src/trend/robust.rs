@@ -56,7 +56,7 @@ pub(super) struct RobustSolution {
 impl RobustSolution {
     /// Solves for points with these values and squared bounds `bounds2`, with one τ for each
     /// stratum; `None` if the normal equations have none.
-    pub(super) fn of(
+    pub(super) fn solve(
         design: &DMatrix<f64>,
         values: &DVector<f64>,
         bounds2: &[f64],

@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use super::point::Point;
+use super::point::TrendPoint;
 use crate::numerics::order_statistics::upper_median;
 
 /// Standard deviations beyond which the influence of a residual stays constant: Huber's weights. The
@@ -17,14 +17,14 @@ const BOUND_FLOOR: f64 = 0.25;
 const OWN_SCATTER: usize = 8;
 
 /// Bounds squared, none smaller than the floor.
-pub(super) fn floored_variances(points: &[Point]) -> Vec<f64> {
+pub(super) fn floored_variances(points: &[TrendPoint]) -> Vec<f64> {
     let floor = BOUND_FLOOR * upper_median(points.iter().map(|p| p.bound)).unwrap_or(0.0);
     points.iter().map(|p| p.bound.max(floor).powi(2)).collect()
 }
 
 /// The points of each stratum, a set with one τ: every class with a scatter of its own, then all
 /// points, if any remain.
-pub(super) fn strata(points: &[Point]) -> Vec<Vec<usize>> {
+pub(super) fn strata(points: &[TrendPoint]) -> Vec<Vec<usize>> {
     let classes = points
         .iter()
         .map(|p| p.class)

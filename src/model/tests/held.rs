@@ -50,10 +50,12 @@ fn the_other_flights_are_as_if_one_s_own_had_not_been_there() {
     let own = others.remove(1);
     let rest = of(&others).unwrap();
     let asked = vec![vec![(0, 1.0), (4, -0.5)], vec![(7, 2.0)]];
-    let without = OtherFlights::new(&rest, None, &weights).unwrap().of(&asked);
+    let without = OtherFlights::new(&rest, None, &weights)
+        .unwrap()
+        .means_and_covariance(&asked);
     let left = OtherFlights::new(&whole, Some(&own), &weights)
         .unwrap()
-        .of(&asked);
+        .means_and_covariance(&asked);
     assert_relative_eq!(left.0, without.0, epsilon = 1e-9);
     assert_relative_eq!(left.1, without.1, epsilon = 1e-9);
 }

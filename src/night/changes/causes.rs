@@ -136,15 +136,19 @@ fn is_of_other_class(cause: &Cause, class: &str) -> bool {
 /// Joins causes to one phrase; a long list is cut, [`crate::lineage::Changes::causes`] has all.
 fn phrase<'a>(causes: impl Iterator<Item = &'a str>) -> String {
     /// Largest number of causes in a phrase, so that it fits a line of the report.
-    const MOST: usize = 4;
+    const MOST_CAUSES: usize = 4;
     let mut unique: Vec<&str> = Vec::new();
     for cause in causes.flat_map(|c| c.split("; ")) {
         if !unique.contains(&cause) {
             unique.push(cause);
         }
     }
-    let more = unique.len().saturating_sub(MOST);
-    let mut text = unique.into_iter().take(MOST).collect::<Vec<_>>().join("; ");
+    let more = unique.len().saturating_sub(MOST_CAUSES);
+    let mut text = unique
+        .into_iter()
+        .take(MOST_CAUSES)
+        .collect::<Vec<_>>()
+        .join("; ");
     if more > 0 {
         text = format!("{text}; and {more} more");
     }

@@ -9,7 +9,7 @@ use crate::dynamics::{Equations, OUTPUTS};
 use crate::output_error::case::Case;
 use crate::output_error::kernel::response::Response;
 use crate::output_error::likelihood::definition::Likelihood;
-use crate::output_error::likelihood::joint::{Joint, Member};
+use crate::output_error::likelihood::joint::{Joint, JointMember};
 
 /// Data whose estimates have bounds.
 pub trait Bounded: Likelihood {
@@ -104,7 +104,7 @@ impl<const NX: usize, E: Equations<NX>> Bounded for Joint<'_, NX, E> {
     }
 }
 
-impl<const NX: usize, E: Equations<NX>> Member<'_, NX, E> {
+impl<const NX: usize, E: Equations<NX>> JointMember<'_, NX, E> {
     fn widened(&self, series: &[BlockSeries], parameters: usize) -> Vec<BlockSeries> {
         series
             .iter()

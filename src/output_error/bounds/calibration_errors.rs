@@ -107,7 +107,7 @@ impl Calibration {
 
 /// Maneuver with its fit.
 #[derive(Debug)]
-pub struct Fitted<'a, const NX: usize, E: Equations<NX>> {
+pub struct FittedManeuver<'a, const NX: usize, E: Equations<NX>> {
     pub aircraft: &'a Aircraft,
     pub window: &'a Window,
     pub model: &'a Model<'a>,
@@ -116,7 +116,7 @@ pub struct Fitted<'a, const NX: usize, E: Equations<NX>> {
     pub weights: &'a [f64; OUTPUTS],
 }
 
-impl<const NX: usize, E: Equations<NX>> Fitted<'_, NX, E> {
+impl<const NX: usize, E: Equations<NX>> FittedManeuver<'_, NX, E> {
     /// Changes of the gradient Σ Sᵀ W v by each error, in the order of the case's parameters.
     ///
     /// # Errors
@@ -177,7 +177,7 @@ impl<const NX: usize, E: Equations<NX>> Fitted<'_, NX, E> {
     /// Every derivative, held at its value in the fit.
     fn all_held(&self) -> Vec<(&Derivative, f64)> {
         let free = self.model.free.iter().filter_map(|d| {
-            let j = place(&self.case.names, &d.name)?;
+            let j = index_of(&self.case.names, &d.name)?;
             Some((*d, self.values[j]))
         });
         free.chain(self.model.held.iter().copied()).collect()
@@ -228,10 +228,10 @@ struct SurfaceErrors<'a> {
 impl<'a> SurfaceErrors<'a> {
     /// Runs the pass with the derivatives along surfaces and constant deflections free as well.
     fn new<const NX: usize, E: Equations<NX>>(
-        fitted: &Fitted<NX, E>,
+        fitted: &FittedManeuver<NX, E>,
         held: &[(&'a Derivative, f64)],
     ) -> Result<SurfaceErrors<'a>, Diverged> {
-        let Fitted { model, case, .. } = fitted;
+        let FittedManeuver { model, case, .. } = fitted;
         let is_free = |d: &Derivative| model.free.iter().any(|f| f.name == d.name);
         let (derivatives, rest): (Vec<_>, Vec<_>) = held
             .iter()
@@ -252,7 +252,7 @@ impl<'a> SurfaceErrors<'a> {
         let values = wide
             .names
             .iter()
-            .map(|name| match place(&case.names, name) {
+            .map(|name| match index_of(&case.names, name) {
                 Some(j) => fitted.values[j],
                 None => derivatives
                     .iter()
@@ -266,7 +266,7 @@ impl<'a> SurfaceErrors<'a> {
         Ok(SurfaceErrors {
             derivatives,
             places: places
-                .map(|name| place(&wide.names, name).unwrap_or(0))
+                .map(|name| index_of(&wide.names, name).unwrap_or(0))
                 .collect(),
             information: cost::sums(&response, fitted.weights).information,
             names: wide.names,
@@ -286,7 +286,7 @@ impl<'a> SurfaceErrors<'a> {
 
     /// Subtracts a change of one parameter times its column of the information matrix.
     fn subtract_column(&self, name: &str, change: f64, shift: &mut DVector<f64>) {
-        if let Some(column) = place(&self.names, name) {
+        if let Some(column) = index_of(&self.names, name) {
             for (shift, &row) in shift.iter_mut().zip(&self.places) {
                 *shift -= change * self.information[(row, column)];
             }
@@ -316,7 +316,7 @@ fn is_along(derivative: &Derivative, surface: &str) -> bool {
     derivative.regressor.surface() == Some(surface)
 }
 
-fn place(names: &[String], name: &str) -> Option<usize> {
+fn index_of(names: &[String], name: &str) -> Option<usize> {
     names.iter().position(|n| n == name)
 }
 
@@ -330,7 +330,8 @@ fn constant_name(coefficient: Coefficient, regressor: &Regressor) -> String {
 }
 
 /// Adds the effect of errors common to all data to a fit's corrected covariance. Each error is
-/// given by its change of the gradient at one standard deviation ([`Fitted::gradient_shifts`]).
+/// given by its change of the gradient at one standard deviation
+/// ([`FittedManeuver::gradient_shifts`]).
 pub fn add_calibration_errors<D: Likelihood>(
     data: &D,
     errors: &[Misreading],

@@ -56,7 +56,7 @@ pub fn residual_noise<D: Bounded>(
     max_condition_number: f64,
 ) -> Option<ResidualNoise> {
     let sums = data.sums(&fit.response, &fit.weights);
-    match Identification::of(&sums.information, max_condition_number) {
+    match Identification::identify(&sums.information, max_condition_number) {
         Identification::Determined { inverse, .. } => {
             let series = data.series(&fit.response, &fit.weights);
             Some(coloured::residual_noise(&inverse, &series))

@@ -6,7 +6,7 @@ use std::marker::PhantomData;
 use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
 
-use super::build_up::Term;
+use super::build_up::BuildUpTerm;
 use super::chunking::{WIDEST_STRIDE, ZERO_POINTS};
 use crate::aero::{Derivative, Regressor};
 use crate::aircraft::Aircraft;
@@ -114,7 +114,7 @@ impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
     }
 
     /// Term of a derivative, with a new column where no earlier derivative has the same.
-    pub fn term(&mut self, derivative: &'a Derivative) -> Term {
+    pub fn term(&mut self, derivative: &'a Derivative) -> BuildUpTerm {
         let known = self
             .derivatives
             .iter()
@@ -123,7 +123,7 @@ impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
             self.derivatives.push(derivative);
             self.derivatives.len() - 1
         });
-        Term {
+        BuildUpTerm {
             coefficient: derivative.coefficient.index(),
             state: derivative.regressor.find(E::state_of),
             column,

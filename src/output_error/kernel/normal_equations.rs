@@ -125,8 +125,8 @@ impl NormalSums {
             };
         }
         BlockSums {
-            count: sums[self.layout.one],
-            residual: sums[self.layout.residual],
+            count: sums[self.layout.one_lane],
+            residual: sums[self.layout.residual_lane],
         }
     }
 
@@ -137,7 +137,7 @@ impl NormalSums {
 
     /// Sum Σ v² of an output.
     pub fn square(&self, output: usize) -> f64 {
-        self.stride as f64 * self.moments[output].slice()[self.layout.residual]
+        self.stride as f64 * self.moments[output].slice()[self.layout.residual_lane]
     }
 
     /// Gradient Σ_o w_o Σ s v over the outputs o with weights w_o, for all parameters.
@@ -192,7 +192,7 @@ impl NormalSums {
         let lanes = &self.layout.parameter_lanes;
         let (derivatives, initial_states) = lanes.split_at(self.derivatives);
         let biases = self.biased_outputs.iter().map(|&o| ParameterPlace {
-            lane: self.layout.one,
+            lane: self.layout.one_lane,
             only_output: Some(o),
         });
         lane_places(derivatives)
@@ -268,8 +268,8 @@ impl NormalSums {
             for o in 0..OUTPUTS {
                 let row = &mut rows[(k * OUTPUTS + o) * width..][..width];
                 if let Some(residual) = residual(k, o) {
-                    row[layout.residual] = residual;
-                    row[layout.one] = 1.0;
+                    row[layout.residual_lane] = residual;
+                    row[layout.one_lane] = 1.0;
                     counts[o] += 1;
                 } else {
                     row.fill(0.0);
@@ -314,8 +314,14 @@ impl NormalSums {
                 stride: OUTPUTS * width,
                 count: samples,
             };
-            own.add_weighted_sum(simd, layout.residual, moments[o].slice_mut());
-            own.add_gram_interleaved(simd, &layout.used, gram[o].slice_mut(), width, interleaved);
+            own.add_weighted_sum(simd, layout.residual_lane, moments[o].slice_mut());
+            own.add_gram_interleaved(
+                simd,
+                &layout.lanes_used,
+                gram[o].slice_mut(),
+                width,
+                interleaved,
+            );
         }
     }
 }

@@ -128,7 +128,7 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
         let sensitivities = sensitivities.slice_mut();
         let mut rows = AlignedBuffer::zeros(CHUNK * OUTPUTS * layout.width());
         let rows = rows.slice_mut();
-        let mut regressors = AlignedBuffer::zeros(POINTS * layout.row);
+        let mut regressors = AlignedBuffer::zeros(POINTS * layout.row_length);
         let regressors = regressors.slice_mut();
         let mut build_up = ChunkBuildUp::<NX>::ZERO;
         let mut histories = [StageHistory::<NX>::EMPTY; 2];
@@ -361,7 +361,7 @@ impl<S: Simd, const NX: usize, K: Correction<NX>> Propagation<'_, S, NX, K> {
     /// Regressors of a vector at the start, the middle and the end of a step.
     #[inline(always)]
     fn points(&self, k: usize, place: usize) -> [S::f64s; 3] {
-        let row = self.layout.row / S::F64_LANES;
+        let row = self.layout.row_length / S::F64_LANES;
         let from = &self.regressors[2 * k * row + place..];
         [from[0], from[row], from[2 * row]]
     }

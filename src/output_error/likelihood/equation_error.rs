@@ -26,7 +26,7 @@ use crate::dynamics::motion::slope_reach;
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
 use crate::numerics::harmonics::Harmonics;
 use crate::numerics::symmetric::{scale, scaled};
-use crate::output_error::case::build_up::Term;
+use crate::output_error::case::build_up::BuildUpTerm;
 use crate::output_error::case::{Case, Measurements};
 
 /// Weight of the prior values relative to the data, at unit diagonal: small, but enough to fix
@@ -167,7 +167,7 @@ pub fn regression<const NX: usize, E: Equations<NX>>(
         values: vec![None; parameters],
         covariance: DMatrix::zeros(parameters, parameters),
     };
-    let Some(spectra) = Spectra::of(case, wide) else {
+    let Some(spectra) = Spectra::transform(case, wide) else {
         return found;
     };
     for k in 0..COEFFICIENTS {
@@ -220,7 +220,7 @@ impl<'a> Spectra<'a> {
         clippy::cast_sign_loss,
         reason = "small positive numbers"
     )]
-    fn of<const NX: usize, E: Equations<NX>>(
+    fn transform<const NX: usize, E: Equations<NX>>(
         case: &Case<NX, E>,
         wide: &'a Case<NX, E>,
     ) -> Option<Spectra<'a>> {
@@ -231,7 +231,8 @@ impl<'a> Spectra<'a> {
         let first = (BAND_HZ[0] * duration_s).ceil().max(1.0) as usize;
         let end = ((BAND_HZ[1] * duration_s) as usize + 1).min(samples / 2);
         let kept = kept_samples(&case.measurements, case.step_s);
-        let trend = Trend::of(kept.get(inner.clone())?).filter(|_| first < end)?;
+        let trend =
+            StraightLine::through_samples(kept.get(inner.clone())?).filter(|_| first < end)?;
         let mut series = implied_without_accelerations(case);
         let regressors = add_regressors(wide, &mut series);
         let window = slope_window(reach);
@@ -255,8 +256,8 @@ impl<'a> Spectra<'a> {
     }
 
     /// Regression of a coefficient on the regressors of these columns.
-    fn regress(&self, coefficient: usize, columns: &[usize]) -> Option<whittle::Regression> {
-        let equations = whittle::Equations {
+    fn regress(&self, coefficient: usize, columns: &[usize]) -> Option<whittle::WhittleRegression> {
+        let equations = whittle::SpectralEquations {
             response: &self.sums.column(coefficient).into_owned(),
             regressors: &self.sums.select_columns(columns),
             smoothing: self.smoothing,
@@ -304,7 +305,8 @@ fn add_regressors<'a, const NX: usize, E: Equations<NX>>(
 ) -> BTreeMap<&'a str, Option<usize>> {
     let mut places: BTreeMap<&str, Option<usize>> = BTreeMap::new();
     for (j, (name, term)) in wide.names.iter().zip(&wide.terms).enumerate() {
-        let is_same = |other: &Term| (other.column, other.state) == (term.column, term.state);
+        let is_same =
+            |other: &BuildUpTerm| (other.column, other.state) == (term.column, term.state);
         let place = if let Some(other) = wide.terms[..j].iter().position(is_same) {
             places[wide.names[other].as_str()]
         } else {
@@ -375,7 +377,7 @@ fn kept_samples(measurements: &Measurements, step_s: f64) -> Vec<bool> {
 
 /// Straight line over the samples that count. The line is removed from every series, so that the
 /// equations still hold. A drift would otherwise leak into all harmonics.
-struct Trend<'a> {
+struct StraightLine<'a> {
     kept: &'a [bool],
     samples: f64,
     /// Mean place of the samples, and the sum of squares about it.
@@ -383,10 +385,10 @@ struct Trend<'a> {
     spread: f64,
 }
 
-impl Trend<'_> {
+impl StraightLine<'_> {
     /// `None` for fewer samples than a straight line needs.
-    fn of(kept: &[bool]) -> Option<Trend<'_>> {
-        let mut trend = Trend {
+    fn through_samples(kept: &[bool]) -> Option<StraightLine<'_>> {
+        let mut trend = StraightLine {
             kept,
             samples: 0.0,
             middle: 0.0,
@@ -472,8 +474,10 @@ mod tests {
         let kept: Vec<bool> = (0..50).map(|n| !(20..25).contains(&n)).collect();
         let mut series: Vec<f64> = (0..50).map(|n| 3.0 - 0.2 * f64::from(n)).collect();
         series[22] = 1e6;
-        Trend::of(&kept).unwrap().remove(&mut series);
+        StraightLine::through_samples(&kept)
+            .unwrap()
+            .remove(&mut series);
         assert!(series.iter().all(|x| x.abs() < 1e-12), "{series:?}");
-        assert!(Trend::of(&[true, false]).is_none());
+        assert!(StraightLine::through_samples(&[true, false]).is_none());
     }
 }

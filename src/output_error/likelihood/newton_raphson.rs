@@ -92,7 +92,7 @@ fn approach<D: Likelihood>(
         let full = full_step(&sums)?;
         fit.iterations += 1;
         if sums.gradient.dot(&full) <= COARSE_TOLERANCE * sums.weighted_square {
-            fit.values = moved(&fit.values, &full);
+            fit.values = stepped_parameters(&fit.values, &full);
             break;
         }
         let Some(better) = search.lower(&fit.values, &sums, response) else {
@@ -175,7 +175,7 @@ impl<'a, D: Likelihood> StepSearch<'a, D> {
     ) -> Option<(Vec<f64>, Sums)> {
         while self.damping < MOST_DAMPING {
             if let Some(step) = damped_step(sums, self.damping) {
-                let next = moved(values, &step);
+                let next = stepped_parameters(values, &step);
                 if self.data.respond(self.detail, &next, trial).is_ok() {
                     let lower = self.data.sums(trial, self.weights);
                     let gain = sums.weighted_square - lower.weighted_square;
@@ -192,7 +192,7 @@ impl<'a, D: Likelihood> StepSearch<'a, D> {
     }
 }
 
-fn moved(values: &[f64], step: &DVector<f64>) -> Vec<f64> {
+fn stepped_parameters(values: &[f64], step: &DVector<f64>) -> Vec<f64> {
     values.iter().zip(step.iter()).map(|(v, d)| v + d).collect()
 }
 

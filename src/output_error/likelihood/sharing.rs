@@ -30,13 +30,13 @@ impl SharedParameters {
         for (label, names, derivatives) in members {
             let derivatives = &names[..derivatives];
             if all.members.is_empty() {
-                all.share(derivatives, &is_own);
+                all.set_shared(derivatives, &is_own);
             } else if *derivatives != all.derivatives {
                 return Err(format!(
                     "{label} has other free derivatives than the maneuvers it is joined with"
                 ));
             }
-            let places = all.place(label, names);
+            let places = all.place_member(label, names);
             all.members.push(places);
         }
         Ok(all)
@@ -55,7 +55,7 @@ impl SharedParameters {
 
     /// Sets the shared derivatives: the first maneuver's, without derivatives that each maneuver
     /// keeps to itself.
-    fn share(&mut self, derivatives: &[String], is_own: impl Fn(&str) -> bool) {
+    fn set_shared(&mut self, derivatives: &[String], is_own: impl Fn(&str) -> bool) {
         self.derivatives = derivatives.to_vec();
         for (j, name) in derivatives.iter().enumerate() {
             if !is_own(name) {
@@ -66,7 +66,7 @@ impl SharedParameters {
     }
 
     /// Places a maneuver's parameters; its own are appended to the joint ones.
-    fn place(&mut self, label: &str, names: &[String]) -> Vec<usize> {
+    fn place_member(&mut self, label: &str, names: &[String]) -> Vec<usize> {
         let mut places = Vec::with_capacity(names.len());
         for (j, name) in names.iter().enumerate() {
             if let Some(place) = self.shared.iter().position(|&s| s == j) {

@@ -45,7 +45,7 @@ pub struct OutputAgreement {
 impl OutputAgreement {
     /// Moments of pairs (measured, computed).
     #[must_use]
-    pub fn of(pairs: &[(f64, f64)]) -> OutputAgreement {
+    pub fn of_pairs(pairs: &[(f64, f64)]) -> OutputAgreement {
         let mean_measured = mean(pairs, |z, _| z);
         let mean_computed = mean(pairs, |_, y| y);
         OutputAgreement {
@@ -68,7 +68,7 @@ impl OutputAgreement {
         std::array::from_fn(|o| {
             let counted = samples.clone().filter(|((_, used), _)| used[o]);
             let pairs: Vec<(f64, f64)> = counted.map(|((z, _), y)| (z[o], y[o])).collect();
-            OutputAgreement::of(&pairs)
+            OutputAgreement::of_pairs(&pairs)
         })
     }
 
@@ -156,7 +156,7 @@ mod tests {
     }
 
     fn agreement(z: impl Fn(usize) -> f64, y: impl Fn(usize) -> f64) -> OutputAgreement {
-        OutputAgreement::of(&(0..400).map(|k| (z(k), y(k))).collect::<Vec<_>>())
+        OutputAgreement::of_pairs(&(0..400).map(|k| (z(k), y(k))).collect::<Vec<_>>())
     }
 
     #[test]
@@ -208,7 +208,7 @@ mod tests {
         let pairs: Vec<(f64, f64)> = (0..57)
             .map(|k| (sine(k) + 0.3, 0.7 * cosine(3 * k) - 0.1 * sine(k)))
             .collect();
-        let a = OutputAgreement::of(&pairs);
+        let a = OutputAgreement::of_pairs(&pairs);
         let u = a.theil().unwrap();
         assert_relative_eq!(
             u.bias + u.variance + u.covariance,
@@ -229,7 +229,7 @@ mod tests {
         );
         let both = theil(&[(good, 1.0), (bad, 1.0)]).unwrap();
         assert!(both.coefficient < bad.theil().unwrap().coefficient && both.bias > 0.999);
-        assert_eq!(OutputAgreement::of(&[]).theil(), None);
+        assert_eq!(OutputAgreement::of_pairs(&[]).theil(), None);
         assert_eq!(agreement(|_| 2.0, sine).r_squared(), None);
     }
 }

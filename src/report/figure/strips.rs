@@ -431,12 +431,12 @@ pub fn missing_mark((left, right): (f64, f64), bottom: f64) -> String {
 /// Multiples of the step within a scale, with their labels.
 fn ticks(scale: Scale) -> impl Iterator<Item = (f64, String)> {
     /// Limit for a step that is tiny beside the range.
-    const MOST: i32 = 50;
+    const MOST_TICKS: i32 = 50;
     let digits = Digits::of_ticks(scale.decimals());
     let first = (scale.min / scale.step - 1e-6).ceil();
     let last = scale.max / scale.step + 1e-6;
     let is_finite = first.is_finite() && last.is_finite();
-    (0..MOST)
+    (0..MOST_TICKS)
         .map(move |i| first + f64::from(i))
         .take_while(move |n| is_finite && *n <= last)
         .map(move |n| (n * scale.step, digits.write(Some(n * scale.step))))

@@ -161,7 +161,7 @@ impl Pen<'_> {
         Some(MARGINS[1] + (1.0 - self.chart.y.share(value)?) * height)
     }
 
-    fn place(&self, (x, y): (f64, f64)) -> Option<(f64, f64)> {
+    fn point_in_frame(&self, (x, y): (f64, f64)) -> Option<(f64, f64)> {
         Some((self.x(x)?, self.y(y)?))
     }
 
@@ -266,10 +266,13 @@ impl Pen<'_> {
         let mut outlines = String::new();
         let (mut line, mut marks) = (String::new(), String::new());
         for point in &series.points {
-            let Some((x, y)) = self.place(point.at) else {
+            let Some((x, y)) = self.point_in_frame(point.at) else {
                 continue;
             };
-            let places = point.outline.iter().filter_map(|at| self.place(*at));
+            let places = point
+                .outline
+                .iter()
+                .filter_map(|at| self.point_in_frame(*at));
             for (i, (x, y)) in places.enumerate() {
                 let command = if i == 0 { 'M' } else { 'L' };
                 let _ = write!(outlines, "{command}{} {}", coordinate(x), coordinate(y));
@@ -292,7 +295,7 @@ impl Pen<'_> {
         }
         svg.path(&marks, PathStyle::filled(series.colour));
         for point in series.points.iter().filter(|p| !p.label.is_empty()) {
-            if let Some((x, y)) = self.place(point.at) {
+            if let Some((x, y)) = self.point_in_frame(point.at) {
                 let style = TextStyle::coloured(series.colour);
                 svg.text((x + 4.0, y - 4.0), &point.label, style);
             }

@@ -306,7 +306,7 @@ fn rate_figure(
             "Measured {name} of a representative maneuver of each class, on one scale. {caption}"
         ),
         width: WIDTH,
-        time: history::until(longest_s),
+        time: history::scale_until(longest_s),
         columns: vec![strips],
     };
     ClassFigure {

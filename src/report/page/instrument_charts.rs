@@ -50,7 +50,7 @@ fn chart(contents: &Contents, number: usize, trend: &InstrumentTrendRow) -> Opti
             y: (Some(mean - half), Some(mean + half)),
         }
     });
-    Some(QualityChart::of(&XyChart {
+    Some(QualityChart::from_chart(&XyChart {
         id: &id,
         title: &title,
         description: &caption,

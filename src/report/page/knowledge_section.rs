@@ -142,7 +142,7 @@ fn chart(rows: &[(&PosteriorRow, f64)], axes: &[AxisMedians]) -> Option<QualityC
         points: marks.collect(),
         is_joined: false,
     };
-    Some(QualityChart::of(&XyChart {
+    Some(QualityChart::from_chart(&XyChart {
         id: "knowledge",
         title: "Uncertainty that flights have left",
         description: caption,

@@ -9,7 +9,7 @@ use super::maneuver_page;
 use super::match_charts;
 use super::quality_charts::QualityChart;
 use crate::report::contents::Contents;
-use crate::report::notation::{NOTHING, angle, count, fixed, number};
+use crate::report::notation::{DASH, angle, count, fixed, number};
 use crate::report::table_view::TableView;
 use crate::tables::{MatchRow, MatchVerdict, MatchVerdictRow, ModelSource};
 
@@ -253,7 +253,7 @@ fn maneuver_row(
     } else {
         first.verdict.to_string()
     };
-    let nothing = || NOTHING.to_owned();
+    let nothing = || DASH.to_owned();
     let excess = decisive.and_then(|row| {
         Some(format!(
             "{} {}",
@@ -264,7 +264,7 @@ fn maneuver_row(
     let loop_ = match first.closed_loop {
         Some(1) => "closed",
         Some(_) => "open",
-        None => NOTHING,
+        None => DASH,
     };
     [
         first.maneuver_id.clone(),

@@ -6,7 +6,7 @@ use super::quality_charts::{self, ALL, QualityChart};
 use crate::aero::Axis;
 use crate::qualities::{Qualities, Specification};
 use crate::report::contents::Contents;
-use crate::report::notation::{NOTHING, angle, fixed, number};
+use crate::report::notation::{DASH, angle, fixed, number};
 use crate::report::table_view::TableView;
 use crate::tables::{Airframe, FlyingQuality, Level, LevelRow, QualityRow};
 
@@ -176,7 +176,7 @@ fn level_table(levels: &[&LevelRow], alphas: &[f64]) -> TableView {
             let own = levels
                 .iter()
                 .find(|row| is_at(row.alpha_deg, *alpha) && row.paragraph == paragraph.paragraph);
-            own.map_or_else(|| NOTHING.to_owned(), |row| level_cell(row))
+            own.map_or_else(|| DASH.to_owned(), |row| level_cell(row))
         };
         let cells = paragraphs.iter().map(cell);
         std::iter::once(angle(*alpha)).chain(cells).collect()
@@ -242,7 +242,7 @@ fn mode_table(
 
 fn mode_cell(row: Option<&&QualityRow>) -> String {
     let Some(value) = row.and_then(|row| row.value) else {
-        return NOTHING.to_owned();
+        return DASH.to_owned();
     };
     let deviation = row.and_then(|row| row.standard_deviation);
     format!("{} ± {}", number(Some(value), 3), number(deviation, 2))
