@@ -7,14 +7,14 @@
 //! [`LARGEST_KEPT`] are kept, and no more than [`MOST_KEPT`] at the end of the heap, so that the
 //! pages of a large flight are returned as before.
 
-/// Size above which blocks, such as the buffers of the archive's files, are taken from the kernel
-/// and returned to it, bytes.
+/// Size above which glibc requests a block from the kernel and returns it when freed, bytes.
+/// Buffers of the archive's files are such blocks.
 pub const LARGEST_KEPT: i32 = 1 << 20;
 /// Free bytes at the end of a heap beyond which it shrinks.
 pub const MOST_KEPT: i32 = 16 << 20;
 
 /// Sets the limits of glibc's allocator; does nothing with another allocator.
-pub fn keep() {
+pub fn keep_freed_memory() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     #[expect(
         unsafe_code,

@@ -6,7 +6,7 @@ use crate::lineage::{
 use crate::numerics::digits::rounded;
 
 /// Largest number of lines of one kind that are printed.
-pub const MOST: usize = 10;
+pub const MOST_LISTED: usize = 10;
 
 /// Prints what a night changed since the one before.
 pub fn print(night: &str, changes: &Changes) {
@@ -114,10 +114,13 @@ fn print_list<T>(title: &str, items: &[T], words: impl Fn(&T) -> String) {
         return;
     }
     out!("{title}: {}", items.len());
-    for item in items.iter().take(MOST) {
+    for item in items.iter().take(MOST_LISTED) {
         out!("  {}", words(item));
     }
-    if items.len() > MOST {
-        out!("  and {} more (all of them: --json)", items.len() - MOST);
+    if items.len() > MOST_LISTED {
+        out!(
+            "  and {} more (all of them: --json)",
+            items.len() - MOST_LISTED
+        );
     }
 }

@@ -121,14 +121,14 @@ pub fn plan(options: &PlanOptions) -> anyhow::Result<ExitCode> {
 
 fn print_plan(plan: &ShardPlan, file: &Path) {
     let costs = plan.costs();
-    let dearest = costs.values().copied().fold(0.0, f64::max);
+    let largest_cost = costs.values().copied().fold(0.0, f64::max);
     let mean = costs.values().sum::<f64>() / costs.len() as f64;
     out!(
         "{} {} to {} shards, the most expensive {:.2} times the mean",
         plan.items.len(),
         plan.of.name(),
         plan.shards,
-        dearest / mean
+        largest_cost / mean
     );
     out!("plan: {}", file.display());
 }

@@ -113,7 +113,7 @@ enum Command {
     /// Parquet
     #[command(after_help = EXPORT_HELP)]
     Export(ExportOptions),
-    /// Plan the next flight: the test cards that teach most in its minutes
+    /// Plan the next flight: the test cards that add most information in its minutes
     #[command(after_help = next_command::NEXT_HELP)]
     Next(next_command::NextOptions),
     /// Write recordings of other formats (CSV, MATLAB, HDF5, tall Parquet) as Parquet of the archive
@@ -159,7 +159,7 @@ enum Command {
 /// Runs the program.
 #[must_use]
 pub fn main() -> ExitCode {
-    crate::memory::keep();
+    crate::memory::keep_freed_memory();
     // Without it the limit ends the program, and nothing else changes.
     let _ = signals::outlive_file_limits();
     let code = match Cli::try_parse() {

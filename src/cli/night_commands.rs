@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::bars::Bars;
-use super::changes::{self, MOST};
+use super::changes::{self, MOST_LISTED};
 use super::cluster_commands;
 use super::options::{ATTENTION, Options, Patience, REJECTED, exit_code, start_threads};
 use crate::night::{diff, explain, gc, status, verify};
@@ -116,15 +116,15 @@ pub fn status(options: &StatusOptions) -> anyhow::Result<ExitCode> {
                     first_items(items)
                 );
             }
-            for failure in stage.failed.iter().take(MOST) {
+            for failure in stage.failed.iter().take(MOST_LISTED) {
                 let (item, why) = (&failure.item, &failure.reason);
                 out!("  {}: failed: {item}: {why}", stage.stage.name());
             }
-            if stage.failed.len() > MOST {
+            if stage.failed.len() > MOST_LISTED {
                 out!(
                     "  {}: and {} more failed",
                     stage.stage.name(),
-                    stage.failed.len() - MOST
+                    stage.failed.len() - MOST_LISTED
                 );
             }
         }
@@ -197,11 +197,14 @@ pub fn verify(options: &VerifyOptions) -> anyhow::Result<ExitCode> {
                 out!("    {reason}");
             }
         }
-        for artefact in found.artefacts.iter().take(MOST) {
+        for artefact in found.artefacts.iter().take(MOST_LISTED) {
             out!("  {artefact}: damaged or gone; the next run makes it again");
         }
-        if found.artefacts.len() > MOST {
-            out!("  and {} more artefacts", found.artefacts.len() - MOST);
+        if found.artefacts.len() > MOST_LISTED {
+            out!(
+                "  and {} more artefacts",
+                found.artefacts.len() - MOST_LISTED
+            );
         }
         out!(
             "{}",

@@ -13,7 +13,7 @@ use crate::store::files;
 /// Exit code of a run that rejected something, and of a night that is no longer valid.
 pub const REJECTED: u8 = 2;
 
-/// Exit code of something that moved, is stale or missing.
+/// Exit code when values moved, or artefacts are stale or missing.
 pub const ATTENTION: u8 = 3;
 
 /// Exit code for a wrong command line: an unknown command, option or value (`EX_USAGE`).

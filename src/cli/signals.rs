@@ -1,5 +1,5 @@
-//! Signals of the operating system. When SIGTERM or SIGINT ends a run, the log gets a last line. A
-//! file above the shell's size limit fails as a write error.
+//! Signals of the operating system. When SIGTERM or SIGINT ends a run, the log gets a last line.
+//! Writing a file above the shell's size limit returns an error.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;

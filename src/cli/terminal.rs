@@ -33,7 +33,8 @@ pub fn print_error(text: Arguments) {
     let _ = std::io::stderr().write_all(visible(text).as_bytes());
 }
 
-/// Text with its control characters as escapes: names of files may hold some that a terminal obeys.
+/// Text with its control characters as escapes. Names of files may contain characters that control
+/// a terminal.
 fn visible(text: Arguments) -> String {
     let is_obeyed = |c: char| c.is_control() && !matches!(c, '\n' | '\t');
     let text = text.to_string();
@@ -54,8 +55,8 @@ pub fn note(written: Result<(), Error>) {
     }
 }
 
-/// Returns the exit code of a command whose output is complete, or 1 if some of it was lost. A pipe
-/// that its reader closed loses nothing.
+/// Returns the exit code of a command whose output is complete, or 1 if output was lost. A pipe
+/// closed by its reader does not count as lost output.
 pub fn finished(code: ExitCode) -> ExitCode {
     note(std::io::stdout().flush());
     let failure = FAILURE.lock().ok().and_then(|mut failure| failure.take());

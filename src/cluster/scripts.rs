@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slurm_task_knows_its_shard_and_requeues_itself_when_it_wants_another_try() {
+    fn a_slurm_task_has_its_shard_and_requeues_itself_for_another_try() {
         let flights = text(Scheduler::Slurm, "flights.sh");
         assert!(
             flights.starts_with("#!/bin/bash\n#SBATCH --job-name=harvest-flights\n"),

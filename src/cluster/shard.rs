@@ -2,8 +2,8 @@
 //! merge.
 //!
 //! Shards have only the store in common. An artefact is named by the fingerprint of everything that
-//! decides it. A shard that runs twice, even at the same time, therefore makes the same bytes, and
-//! what a killed shard has made stays valid. A merge is a run that finds all artefacts made.
+//! decides it. A shard that runs twice, even at the same time, therefore makes the same bytes.
+//! Artefacts of a killed shard stay valid. A merge is a run that finds all artefacts made.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

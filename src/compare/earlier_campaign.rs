@@ -1,6 +1,6 @@
-//! Comparison of a campaign with an earlier one: the trend of each derivative's group with the
-//! earlier trend of that group, z = (now − before) / √(standard error now² + standard error
-//! before²).
+//! Comparison of a campaign with an earlier one: the trend of each derivative's group is compared
+//! with the earlier trend of that group. z is the difference over its standard error, the root of
+//! the sum of both squared standard errors.
 //!
 //! If both campaigns share flights, their errors are not independent, and z is too small: the
 //! comparison may miss small changes, but reports no false ones.
@@ -15,7 +15,7 @@ use crate::trend;
 /// An earlier campaign's published trends.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Earlier {
-    /// The folder, as the analyst names it.
+    /// Folder as the analyst names it.
     pub name: String,
     pub trends: Vec<PublishedTrend>,
 }
@@ -31,7 +31,7 @@ impl Earlier {
 
     /// Value and standard error of the earlier trend at an α, linear between its published α; `None`
     /// outside of them or in another unit.
-    fn at(&self, now: &TrendRow) -> Option<(f64, f64)> {
+    fn trend_at(&self, now: &TrendRow) -> Option<(f64, f64)> {
         let same = |e: &&PublishedTrend| {
             e.derivative == now.derivative
                 && e.group == now.group
@@ -70,7 +70,7 @@ pub fn changes(
             .is_some_and(|g| g.name == t.group)
     };
     let row = |t: &TrendRow| {
-        let before = earlier.at(t);
+        let before = earlier.trend_at(t);
         let judged = judge(
             t.value,
             t.standard_error,

@@ -70,7 +70,7 @@ fn share(value: Option<f64>, other: Option<f64>) -> Option<f64> {
     share.is_finite().then_some(share)
 }
 
-/// The ranges of the comparison with the tunnel, and the worst of them.
+/// Ranges of the comparison with the tunnel, and the worst ranges.
 #[must_use]
 pub fn ranges_of_tunnel(
     rows: &[ComparisonRow],
@@ -83,7 +83,7 @@ pub fn ranges_of_tunnel(
     })
 }
 
-/// The ranges of the comparison with one earlier campaign, and the worst of them.
+/// Ranges of the comparison with one earlier campaign, and the worst ranges.
 #[must_use]
 pub fn ranges_of_changes(
     rows: &[ChangeRow],
@@ -220,7 +220,8 @@ fn range_in_words(
 }
 
 /// Size of a disagreement in words: the median in percent of the other value's magnitude, with the
-/// extremes if they are far from the median; in the derivative's unit if the other value is zero.
+/// extremes if they are far from the median. If the other value is zero, the size is in the
+/// derivative's unit.
 fn extent_in_words(run: &[ComparedAlpha]) -> String {
     let mut shares: Vec<f64> = run
         .iter()

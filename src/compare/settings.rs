@@ -18,8 +18,8 @@ settings! {
         /// tunnel's value. The default is about the repeatability of tunnel tests. Larger: more rows
         /// agree.
         pub agreement_pct: f64 = 5.0,
-        /// Share of the information below which flight taught nothing about a value, percent. Larger:
-        /// more rows with the verdict `nothing learnt`.
+        /// Share of the information on a value that comes from flight, percent, below which the
+        /// verdict is `nothing learnt`. Larger: more rows with this verdict.
         pub learnt_pct: f64 = 10.0,
         /// Largest number of rows of the table `disagreements`.
         pub worst: usize = 20,

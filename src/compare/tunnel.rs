@@ -78,7 +78,8 @@ fn compare_derivative(
     alphas.into_iter().filter_map(row).collect()
 }
 
-/// Distance of a row from a condition: by Mach number first, then by the third variable.
+/// Distances of a row from a condition in Mach number and third variable, for comparison in this
+/// order.
 fn distance(row: &PosteriorRow, condition: Option<&Condition>) -> (f64, f64) {
     let apart = |a: Option<f64>, b: Option<f64>| a.zip(b).map_or(0.0, |(a, b)| (a - b).abs());
     (
@@ -330,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn a_derivative_without_a_tunnel_value_says_so() {
+    fn a_derivative_without_a_tunnel_value_has_its_own_verdict() {
         let none = one(flight(1.0, 0.1), None, &Settings::default());
         let settings = Settings {
             not_comparable: ["d".to_owned()].into(),

@@ -20,7 +20,7 @@ All keys of `pipeline.yaml`, and the `instruments:` of `aircraft.yaml`. This pag
 sources; a test holds the two alike. `make check` reads a pipeline's files and names the first mistake with file and line.
 
 The keys that an analyst decides stand at the top level of a stage. Those under `expert:` have defaults reasoned from
-instruments, flight mechanics and numerics. They rarely need a change, and each says what a change does.
+instruments, flight mechanics and numerics. They rarely need a change, and each explanation states the effect of a change.
 
 A path `ingest: expert: checks: block_s` is written
 

@@ -7,7 +7,7 @@ use super::prepared_case::PreparedCase;
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
 use crate::dynamics::{Equations, OUTPUTS};
-use crate::output_error::calibration_errors::{Fitted, Misreading};
+use crate::output_error::calibration_errors::{FittedManeuver, Misreading};
 use crate::output_error::{Diverged, Fit, calibration_errors};
 
 /// Added to the reason of a fit whose bounds lack the effect of calibration errors.
@@ -66,7 +66,7 @@ pub(super) fn gradient_shifts<const NX: usize, E: Equations<NX>>(
         case,
         ..
     } = prepared;
-    Fitted {
+    FittedManeuver {
         aircraft,
         window,
         model,

@@ -3,13 +3,13 @@
 use std::cmp::Ordering;
 use std::fmt;
 
-use crate::filter_error::bounds::Bounds;
+use crate::filter_error::bounds::FilterBounds;
 use crate::filter_error::scoring::Scored;
 
 /// Minimum of a filter's cost with its bounds.
 pub(super) struct Minimum {
     pub scored: Scored,
-    pub bounds: Bounds,
+    pub bounds: FilterBounds,
 }
 
 impl Minimum {

@@ -86,7 +86,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
         let wide = self.filter(&all, Some(filter));
         let own = &parameters[..filter.first_noise()];
         let values = values_by_name(&model, filter.names(), own);
-        WidePass::of(filter, parameters, &wide, &values)
+        WidePass::pass_at_fit(filter, parameters, &wide, &values)
     }
 
     /// Changes of the gradient by calibration errors.

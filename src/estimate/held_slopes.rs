@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::alpha_slopes::AlphaSlopes;
-use crate::filter_error::bounds::{Bounds, WidePass};
+use crate::filter_error::bounds::{FilterBounds, WidePass};
 use crate::filter_error::slopes::SlopeEffect;
 
 /// Slopes of the derivatives over α, and the values at which a fit holds them. Slopes of one name are
@@ -38,7 +38,7 @@ impl HeldSlopes {
 
     /// Effect on the estimates of a fit if the slopes are estimated and not held; `None` without
     /// slopes.
-    pub fn effect(&self, pass: &WidePass, bounds: &Bounds) -> Option<SlopeEffect> {
+    pub fn effect(&self, pass: &WidePass, bounds: &FilterBounds) -> Option<SlopeEffect> {
         pass.slope_effect(bounds, &self.names, &self.values)
     }
 

@@ -20,7 +20,7 @@ const VERY_STRONG: f64 = 5.0;
 pub(super) fn explains(
     measurements: &Measurements,
     output_error: &Fit,
-    filter: &filter::Response,
+    filter: &filter::FilterResponse,
 ) -> bool {
     if output_error.outcome != Outcome::Converged || are_white(measurements, &filter.predicted) {
         return false;

@@ -172,7 +172,7 @@ fn inputs(contents: &ExportContents, tables: &[ExportTable], xml: &mut Xml) {
         .collect();
     surfaces.sort_unstable();
     surfaces.dedup();
-    // What tables depend on is already an input.
+    // Signals that tables depend on are already inputs.
     let is_input = |signal: &&str| {
         let has_machs = *signal == signal::MACH && tables.iter().any(|t| !t.machs.is_empty());
         has_machs || Some(*signal) == third(contents, tables)
@@ -306,8 +306,8 @@ fn variables<'a>(table: &ExportTable, third: Option<&'a str>) -> Vec<(&'static s
     variables
 }
 
-/// Writes a table's correlations: first the derivatives that name it below their own table, then those
-/// before it with the coefficient.
+/// Writes a table's correlations. Each pair has its coefficient at the later table; the earlier
+/// table refers to it.
 fn correlations(contents: &ExportContents, table: &ExportTable, xml: &mut Xml) {
     let own = |pair: &&CorrelatedDerivatives| pair.first == table.derivative;
     for pair in contents.correlations.iter().filter(own) {

@@ -20,7 +20,8 @@ pub struct ExportContents<'a> {
     pub settings: &'a Settings,
 }
 
-/// Derivatives of one coefficient that have a table: those of vanes, or all others.
+/// Derivatives of one coefficient that have a table: either along vanes, or along all other
+/// regressors.
 pub(super) fn terms<'a>(
     contents: &'a ExportContents,
     tables: &'a [ExportTable],

@@ -1,6 +1,6 @@
 //! The build-up as a JSBSim aerodynamics section.
 //!
-//! JSBSim's axes NORMAL (up), AXIAL (aft) and SIDE (right) are those of CN, CA and CY: its body
+//! JSBSim's axes NORMAL (up), AXIAL (aft) and SIDE (right) are the axes of CN, CA and CY: its body
 //! forces are −AXIAL, SIDE, −NORMAL. ROLL, PITCH and YAW are moments right wing down, nose up, nose
 //! right, as Cl, Cm, Cn. α and β are read in degrees, rates as `aero/bi2vel` p and r, `aero/ci2vel`
 //! q, which are p b/2V, r b/2V and q c̄/2V in radians. Vanes are forces in lbf and moments in ft
@@ -121,7 +121,7 @@ struct Factor {
 }
 
 impl Factor {
-    fn of(property: impl Into<String>) -> Factor {
+    fn of_property(property: impl Into<String>) -> Factor {
         Factor {
             property: property.into(),
             is_magnitude: false,
@@ -131,13 +131,16 @@ impl Factor {
 
 /// Factors of one term: the derivative and its regressor.
 fn factors(contents: &ExportContents, derivative: &Derivative) -> Vec<Factor> {
-    let mut factors = vec![Factor::of(format!("aero/harvest/{}", derivative.name))];
+    let mut factors = vec![Factor::of_property(format!(
+        "aero/harvest/{}",
+        derivative.name
+    ))];
     factors.extend(regressor_factors(contents, &derivative.regressor));
     factors
 }
 
 fn regressor_factors(contents: &ExportContents, regressor: &Regressor) -> Vec<Factor> {
-    let all = |properties: &[&str]| properties.iter().map(|p| Factor::of(*p)).collect();
+    let all = |properties: &[&str]| properties.iter().map(|p| Factor::of_property(*p)).collect();
     match regressor {
         Regressor::Constant => vec![],
         Regressor::Alpha => all(&["aero/alpha-deg"]),
@@ -147,7 +150,7 @@ fn regressor_factors(contents: &ExportContents, regressor: &Regressor) -> Vec<Fa
         Regressor::YawRate => all(&["velocities/r-aero-rad_sec", "aero/bi2vel"]),
         Regressor::AlphaRate => all(&["aero/alphadot-rad_sec", "aero/ci2vel"]),
         Regressor::Surface(signal) | Regressor::Vane(signal) => {
-            vec![Factor::of(property(contents, signal))]
+            vec![Factor::of_property(property(contents, signal))]
         }
         Regressor::Magnitude(of) => {
             let magnitude = |factor: Factor| Factor {
@@ -188,7 +191,7 @@ fn axis(
     whole.extend(length.map(str::to_owned));
     whole.push(format!("aero/harvest/{}", word(coefficient)));
     let vanes = terms(contents, tables, coefficient, true).map(|d| factors(contents, d));
-    let whole = whole.into_iter().map(Factor::of).collect();
+    let whole = whole.into_iter().map(Factor::of_property).collect();
     let products: Vec<Vec<Factor>> = std::iter::once(whole).chain(vanes).collect();
     sum(xml, &products);
     xml.close();

@@ -1,15 +1,16 @@
 //! Covariance of the estimates of filter error, with the effects of held values and of calibration
 //! errors through the filter's own weights.
 //!
-//! The white covariance is H⁻¹. The corrected one takes the innovations' autocovariance as that of
-//! output error takes the residuals', and is never below the white one.
+//! If the innovations are white, the covariance is the inverse H⁻¹ of the information matrix. The
+//! corrected covariance uses the autocovariance of the innovations, as output error uses that of
+//! the residuals. It is never below H⁻¹.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::filter::{Filter, Response};
+use super::filter::{Filter, FilterResponse};
 use super::joint_filter::JointFilter;
 use super::scoring::Scored;
 use super::slopes::{SlopeEffect, SlopeInformation};
@@ -24,23 +25,24 @@ use crate::output_error::sharing::{SharedParameters, add_matrix, add_vector};
 
 /// Covariances of the own parameters of filters: derivatives, biases and initial states.
 #[derive(Clone, Debug)]
-pub struct Bounds {
+pub struct FilterBounds {
     pub covariance: DMatrix<f64>,
     pub condition_number: f64,
-    /// H⁻¹ of the filter's own parameters at known noise.
+    /// Inverse H⁻¹ of the information on the filter's own parameters, with the noise held at its
+    /// estimate.
     inverse: DMatrix<f64>,
 }
 
 /// Computes the bounds of a fit.
 ///
 /// # Errors
-/// Condition number and parameters of the least determined direction, where the data determine no
-/// covariance.
+/// If the data determine no covariance: condition number, and the parameters of the least
+/// determined direction.
 pub fn bounds<const NX: usize, E: InGusts<NX>>(
     filter: &JointFilter<NX, E>,
     scored: &Scored,
     max_condition_number: f64,
-) -> Result<Bounds, (Option<f64>, Vec<usize>)> {
+) -> Result<FilterBounds, (Option<f64>, Vec<usize>)> {
     let free: Vec<usize> = (0..filter.parameters())
         .filter(|j| scored.free[*j])
         .collect();
@@ -48,7 +50,8 @@ pub fn bounds<const NX: usize, E: InGusts<NX>>(
     let of_free = DMatrix::from_fn(free.len(), free.len(), |i, j| {
         information[(free[i], free[j])]
     });
-    let (of_free, condition_number) = match Identification::of(&of_free, max_condition_number) {
+    let (of_free, condition_number) = match Identification::identify(&of_free, max_condition_number)
+    {
         Identification::Determined {
             inverse,
             condition_number,
@@ -75,7 +78,7 @@ pub fn bounds<const NX: usize, E: InGusts<NX>>(
     let covariance = own(&inverse);
     let at_known_noise = symmetric::inverse(&own(&information));
     let at_known_noise = at_known_noise.unwrap_or_else(|| covariance.clone());
-    Ok(Bounds {
+    Ok(FilterBounds {
         covariance,
         condition_number,
         inverse: at_known_noise,
@@ -85,7 +88,7 @@ pub fn bounds<const NX: usize, E: InGusts<NX>>(
 impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     /// Whitened innovations with their sensitivities to the filter's own parameters, one series per
     /// output.
-    fn series(&self, response: &Response) -> Vec<BlockSeries> {
+    fn series(&self, response: &FilterResponse) -> Vec<BlockSeries> {
         let (sums, n) = (&response.sums, self.first_noise());
         let length = sums.samples_per_block();
         let mut all = vec![0.0; self.parameters()];
@@ -110,7 +113,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     }
 }
 
-impl Bounds {
+impl FilterBounds {
     /// Covariance of a filter's own parameters from H⁻¹ and the innovations' autocovariance, at known
     /// noise: the noise's parameters hardly correlate with the others.
     #[must_use]
@@ -154,7 +157,8 @@ impl Bounds {
     }
 }
 
-/// Pass with the held derivatives, and slopes over α, free as well, at a fit.
+/// Information at a fit from a wide filter, in which held derivatives and slopes over α are free as
+/// well.
 #[derive(Debug)]
 pub struct WidePass {
     /// Names of the filter's own parameters.
@@ -166,10 +170,10 @@ pub struct WidePass {
 }
 
 impl WidePass {
-    /// Computes the pass of `wide` at the fit of `filter`. `values` has every parameter by name;
-    /// those without a value are zero. `None` if the wide filter diverges.
+    /// Computes the pass of the wide filter `wide` at the fit of `filter`. `values` has the
+    /// parameters by name; a parameter without a value is zero. `None` if the wide filter diverges.
     #[must_use]
-    pub fn of<const NX: usize, E: InGusts<NX>>(
+    pub fn pass_at_fit<const NX: usize, E: InGusts<NX>>(
         filter: &Filter<NX, E>,
         parameters: &[f64],
         wide: &Filter<NX, E>,
@@ -187,8 +191,8 @@ impl WidePass {
         })
     }
 
-    /// Joins the passes of maneuvers whose own parameters have these places. Held derivatives and
-    /// slopes of one name are common to the maneuvers.
+    /// Joins the passes of maneuvers; `own` places their own parameters in the joint fit. Held
+    /// derivatives and slopes of one name are common to the maneuvers.
     #[must_use]
     pub fn joined(members: &[WidePass], own: &SharedParameters) -> Self {
         let mut names: Vec<String> = vec![];
@@ -218,7 +222,7 @@ impl WidePass {
         }
     }
 
-    /// Names of the parameters among those of all maneuvers.
+    /// Names of the parameters of one maneuver in the joint fit.
     fn joint_names<'n>(&'n self, own: &'n SharedParameters, member: usize) -> Vec<&'n String> {
         let places = own.places(member);
         let joint = |name: &'n String| {
@@ -228,13 +232,13 @@ impl WidePass {
         self.names.iter().map(joint).collect()
     }
 
-    fn place(&self, name: &str) -> Option<usize> {
+    fn index_of(&self, name: &str) -> Option<usize> {
         self.names.iter().position(|n| n == name)
     }
 
     /// Column of the information along a parameter, for the filter's own parameters.
     fn cross(&self, along: Option<usize>) -> DVector<f64> {
-        let entry = |name: &String| match (self.place(name), along) {
+        let entry = |name: &String| match (self.index_of(name), along) {
             (Some(row), Some(column)) => self.information[(row, column)],
             _ => 0.0,
         };
@@ -245,20 +249,23 @@ impl WidePass {
     #[must_use]
     pub fn held_shifts(&self, uncertainties: &BTreeMap<&str, f64>) -> Vec<DVector<f64>> {
         let shift =
-            |(name, uncertainty): (&&str, &f64)| self.cross(self.place(name)) * *uncertainty;
+            |(name, uncertainty): (&&str, &f64)| self.cross(self.index_of(name)) * *uncertainty;
         uncertainties.iter().map(shift).collect()
     }
 
-    /// Effect of slopes of these sizes on the estimates; `values` has those at which the fit held
-    /// them.
+    /// Effect on the estimates of slopes over α with these prior sizes. `values` has the slopes at
+    /// which the fit held them.
     #[must_use]
     pub fn slope_effect(
         &self,
-        bounds: &Bounds,
+        bounds: &FilterBounds,
         slopes: &[String],
         values: &[f64],
     ) -> Option<SlopeEffect> {
-        let places: Vec<usize> = slopes.iter().filter_map(|name| self.place(name)).collect();
+        let places: Vec<usize> = slopes
+            .iter()
+            .filter_map(|name| self.index_of(name))
+            .collect();
         if places.len() != values.len() || places.is_empty() {
             return None;
         }

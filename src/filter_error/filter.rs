@@ -2,7 +2,8 @@
 //! parameters.
 //!
 //! Parameters in order: free derivatives, free biases and initial states, as in output error, then
-//! those of the noise ([`NoiseParameter::all`]).
+//! the parameters of the noise ([`NoiseParameter::all`]). The parameters before the noise are the
+//! filter's *own* parameters.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use nalgebra::{DMatrix, DVector, SVector};
@@ -13,7 +14,7 @@ use super::gains::{
 };
 use super::input_noise::InputNoise;
 use super::linearised::{Discrete, Linearised};
-use super::noise::{Noise, NoiseParameter, Prior, RotaryCost};
+use super::noise::{Noise, NoiseParameter, NoisePrior, RotaryCost};
 use super::pass::{
     Corrections, FilterPass, LaneBlocks, LaneGain, PassOutputs, RecordedRows, RowSink,
 };
@@ -44,20 +45,20 @@ pub struct Filter<const NX: usize, E: InGusts<NX>> {
     patterns: Vec<Pattern>,
     pattern_of: Vec<u8>,
     /// Priors of biases and noise, with the parameter of each.
-    priors: Vec<(usize, Prior)>,
+    priors: Vec<(usize, NoisePrior)>,
     names: Vec<String>,
 }
 
-/// Result of a pass.
+/// Result of one pass of the filter over the maneuver.
 #[derive(Clone, Debug)]
-pub struct Response {
-    /// Outputs as predicted from the samples before.
+pub struct FilterResponse {
+    /// Outputs predicted from the earlier samples.
     pub predicted: Vec<[f64; OUTPUTS]>,
     /// Measured minus predicted outputs; zero where a sample does not count.
     pub innovations: Vec<[f64; OUTPUTS]>,
     /// Innovations made white with unit variance.
     pub whitened: Vec<[f64; OUTPUTS]>,
-    /// J with the priors' part.
+    /// Cost J, priors included.
     pub cost: f64,
     pub(super) sums: NormalSums,
     /// Part of the gradient of −J and of the information that does not come from the innovations'
@@ -66,7 +67,7 @@ pub struct Response {
     other_information: DMatrix<f64>,
 }
 
-impl Response {
+impl FilterResponse {
     /// Gradient of −J.
     #[must_use]
     pub fn gradient(&self) -> DVector<f64> {
@@ -87,8 +88,8 @@ impl Response {
 }
 
 impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
-    /// Prepares a maneuver. `biases` has the standard uncertainty of each free bias in order, where
-    /// one is known.
+    /// Prepares a maneuver. `biases` has the standard uncertainty of each free bias in order;
+    /// `None` where it is unknown.
     #[must_use]
     pub fn new(
         aircraft: &Aircraft,
@@ -141,7 +142,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         filter
     }
 
-    /// The filter where the inputs have noise; without it they are exact.
+    /// Adds noise of the measured inputs; by default the inputs are exact.
     #[must_use]
     pub fn with_noisy_inputs(mut self, inputs: NoisyInputs) -> Self {
         self.case.noisy_inputs = inputs;
@@ -150,12 +151,12 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     }
 
     /// Priors of the biases with known uncertainty, and of the noise.
-    fn priors(&self, biases: &[Option<f64>]) -> Vec<(usize, Prior)> {
+    fn priors(&self, biases: &[Option<f64>]) -> Vec<(usize, NoisePrior)> {
         let first = self.case.derivatives();
         let of_biases = biases
             .iter()
             .enumerate()
-            .filter_map(|(b, deviation)| Some((first + b, Prior::Normal(0.0, (*deviation)?))));
+            .filter_map(|(b, deviation)| Some((first + b, NoisePrior::Normal(0.0, (*deviation)?))));
         let of_noise = self.noise_parameters.iter().enumerate();
         let of_noise = of_noise
             .filter_map(|(n, parameter)| Some((self.first_noise() + n, parameter.prior()?)));
@@ -198,7 +199,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         Noise::of_parameters(&parameters[self.first_noise()..], E::FELT_RATES.len())
     }
 
-    /// Parameters of output error with those of a noise.
+    /// Joins the filter's own parameters with the parameters of a noise.
     #[must_use]
     pub fn with_noise(&self, own: &[f64], noise: &Noise) -> Vec<f64> {
         [own, &noise.parameters(E::FELT_RATES.len())].concat()
@@ -209,7 +210,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     ///
     /// # Errors
     /// [`Diverged`] when the state leaves its bounds or the filter has no finite gain.
-    pub fn respond(&self, parameters: &[f64]) -> Result<Response, Diverged> {
+    pub fn respond(&self, parameters: &[f64]) -> Result<FilterResponse, Diverged> {
         let gains = self.gains(parameters)?;
         let mut response = self.empty_response();
         let mut sums = NormalSums::new(
@@ -230,7 +231,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     ///
     /// # Errors
     /// [`Diverged`] when the state leaves its bounds or the filter has no finite gain.
-    pub fn innovations(&self, parameters: &[f64]) -> Result<Response, Diverged> {
+    pub fn innovations(&self, parameters: &[f64]) -> Result<FilterResponse, Diverged> {
         let gains = self.gains(parameters)?;
         let mut response = self.empty_response();
         self.run(parameters, &gains, &mut response, None::<&mut NormalSums>)?;
@@ -238,11 +239,12 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         Ok(response)
     }
 
-    /// Outputs of the equations along the air's angle: they are integrated without gusts, and only the
-    /// angle follows the vane, by the gain of a random walk of the gusts' size ([`Noise::angle_gain`]).
+    /// Integrates the equations without gusts, but lets the angle of the air follow the vane. The
+    /// gain is that of a random walk as large as the gusts ([`Noise::angle_gain`]). Returns the
+    /// outputs.
     ///
-    /// A prediction from one sample to the next follows any motion. These outputs follow it as far as
-    /// the derivatives explain it, in turbulence too.
+    /// A prediction from one sample to the next follows any motion. These outputs follow the motion
+    /// only as far as the derivatives explain it, in turbulence too.
     ///
     /// # Errors
     /// [`Diverged`] when the state leaves its bounds.
@@ -258,9 +260,9 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         Ok(response.predicted)
     }
 
-    fn empty_response(&self) -> Response {
+    fn empty_response(&self) -> FilterResponse {
         let (samples, parameters) = (self.samples(), self.parameters());
-        Response {
+        FilterResponse {
             predicted: vec![[0.0; OUTPUTS]; samples],
             innovations: vec![[0.0; OUTPUTS]; samples],
             whitened: vec![[0.0; OUTPUTS]; samples],
@@ -275,7 +277,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         &self,
         parameters: &[f64],
         gains: &[PatternGain<NX>],
-        response: &mut Response,
+        response: &mut FilterResponse,
         sink: Option<&mut K>,
     ) -> Result<(), Diverged> {
         let corrections = self.corrections(parameters, gains);
@@ -288,7 +290,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         case: &Case<NX, E>,
         parameters: &[f64],
         corrections: &Corrections<NX>,
-        response: &mut Response,
+        response: &mut FilterResponse,
         sink: Option<&mut K>,
     ) -> Result<(), Diverged> {
         Arch::new().dispatch(FilterPass {
@@ -358,8 +360,8 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         Ok(shifts)
     }
 
-    /// Case of this maneuver as other instruments would have recorded it. `windows` are the filter's own
-    /// one and theirs.
+    /// Case of this maneuver as other instruments would have recorded it. `windows` are the window
+    /// of this filter and the window that the other instruments recorded.
     #[must_use]
     pub fn as_recorded(
         &self,
@@ -404,7 +406,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         row
     }
 
-    /// First state: without a rotary gust.
+    /// State at the first sample, without rotary gusts.
     fn start(&self, parameters: &[f64]) -> SVector<f64, NX> {
         if self.initial_states == 0 {
             return self.case.start;
@@ -478,7 +480,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         let filter = if is_still {
             SteadyFilter::still(system)
         } else {
-            SteadyFilter::of(system)?
+            SteadyFilter::solve_system(system)?
         };
         gains::gains(&filter, &noise, &slopes, &numbered, &self.patterns)
     }
@@ -507,7 +509,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         &self,
         parameters: &[f64],
         gains: &[PatternGain<NX>],
-        response: &mut Response,
+        response: &mut FilterResponse,
     ) {
         let squares: f64 = response.whitened.iter().flatten().map(|u| u * u).sum();
         response.cost = 0.5 * squares;
@@ -542,7 +544,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         }
     }
 
-    fn add_rotary_cost(&self, rotary: &RotaryCost, response: &mut Response) {
+    fn add_rotary_cost(&self, rotary: &RotaryCost, response: &mut FilterResponse) {
         response.cost += rotary.cost;
         let place = |kind: NoiseParameter| {
             let place = self.noise_parameters.iter().position(|p| *p == kind);
@@ -557,7 +559,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         }
     }
 
-    /// Σ v v' over the samples of a pattern.
+    /// Sum Σ v v' of the innovations v over the samples of a pattern.
     fn innovation_products(&self, pattern: usize, innovations: &[[f64; OUTPUTS]]) -> Outputs {
         let mut sum = Outputs::zeros();
         for (v, own) in innovations.iter().zip(&self.pattern_of) {
@@ -570,7 +572,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     }
 }
 
-/// Gains at some parameters, compiled for the processor at hand.
+/// Computation of the gains for given parameters, compiled for the processor at hand.
 struct GainsAt<'a, const NX: usize, E: InGusts<NX>> {
     filter: &'a Filter<NX, E>,
     parameters: &'a [f64],
@@ -585,8 +587,8 @@ impl<const NX: usize, E: InGusts<NX>> WithSimd for GainsAt<'_, NX, E> {
     }
 }
 
-/// Traces tr(S⁻¹ S_i S⁻¹ S_j) of the slopes of S along the parameters, row by row, and tr(E S⁻¹ S_j) in a
-/// last row.
+/// Traces of the slopes S_i of the innovations' covariance S along the parameters i: tr(S⁻¹ S_i S⁻¹
+/// S_j), row by row, and tr(E S⁻¹ S_j) in a last row, with E the matrix `excess`.
 fn covariance_traces<const NX: usize>(gain: &PatternGain<NX>, excess: &Outputs) -> AlignedMatrix {
     const ENTRIES: usize = OUTPUTS * OUTPUTS;
     let count = gain.slopes.len();
@@ -607,7 +609,8 @@ fn covariance_traces<const NX: usize>(gain: &PatternGain<NX>, excess: &Outputs) 
     left.product(&right)
 }
 
-/// Model of the filter's case: biases and initial states are the filter's own.
+/// Model of the filter's case, without biases and initial states, which the filter itself
+/// estimates.
 fn without_own<'a>(model: &Model<'a>) -> Model<'a> {
     Model {
         biases: vec![],
@@ -616,7 +619,7 @@ fn without_own<'a>(model: &Model<'a>) -> Model<'a> {
     }
 }
 
-/// T: the effect of a step's decay of the rotary gusts on the state.
+/// Matrix T by which the rotary gusts of the state decay in a step.
 fn decay_matrix<const NX: usize, E: InGusts<NX>>(decay: f64) -> States<NX> {
     let mut t = States::identity();
     for &(rate, felt) in E::FELT_RATES {
@@ -626,7 +629,7 @@ fn decay_matrix<const NX: usize, E: InGusts<NX>>(decay: f64) -> States<NX> {
     t
 }
 
-/// Slope of T where the decay has this slope.
+/// Slope of T along a parameter, from the slope of the decay.
 fn decay_matrix_slope<const NX: usize, E: InGusts<NX>>(slope: f64) -> States<NX> {
     let mut t = States::zeros();
     for &(rate, felt) in E::FELT_RATES {
@@ -636,7 +639,7 @@ fn decay_matrix_slope<const NX: usize, E: InGusts<NX>>(slope: f64) -> States<NX>
     t
 }
 
-/// Slope of the system along a derivative, by which the noise of the states changes by `q`.
+/// Slope of the system along a derivative; `q` is the slope of the noise of the states.
 #[inline(always)]
 fn derivative_slope<const NX: usize>(
     slope: &Discrete<NX>,
@@ -651,7 +654,7 @@ fn derivative_slope<const NX: usize>(
     }
 }
 
-/// Distinct patterns of outputs that count, and the pattern of each sample.
+/// Distinct patterns of valid outputs, and the index of each sample's pattern.
 fn patterns(used: &[[bool; OUTPUTS]]) -> (Vec<Pattern>, Vec<u8>) {
     let (mut patterns, mut of_sample) = (Vec::<Pattern>::new(), Vec::with_capacity(used.len()));
     for used in used {

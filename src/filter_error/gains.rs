@@ -4,7 +4,7 @@
 use nalgebra::{Cholesky, SMatrix};
 
 use super::noise::{Noise, NoiseParameter};
-use super::riccati::{Observation, States, SteadyFilter, SystemSlope};
+use super::riccati::{OutputSlopes, States, SteadyFilter, SystemSlope};
 use crate::dynamics::OUTPUTS;
 use crate::numerics::small::{product, product_transposed, sandwich};
 
@@ -24,9 +24,10 @@ pub(super) struct Pattern {
 #[derive(Clone, Debug)]
 pub(super) struct PatternGain<const NX: usize> {
     pub gain: Gain<NX>,
-    /// S⁻¹; zero along outputs that do not count.
+    /// Inverse S⁻¹ of the innovations' covariance; zero for outputs that do not count.
     pub inverse: Outputs,
-    /// L⁻¹ with S = L Lᵀ, which makes the innovations white; zero likewise.
+    /// Matrix L⁻¹ with S = L Lᵀ, by which the innovations become white; zero for outputs that do
+    /// not count.
     pub whitening: Outputs,
     pub log_determinant: f64,
     /// Slopes of gain and S along each parameter that has any.
@@ -47,8 +48,8 @@ pub(super) struct ParameterSlope<const NX: usize> {
     pub system: SystemSlope<NX>,
 }
 
-/// Variances of the outputs for the steady filter: that of an output that counts in only a share of
-/// the samples is divided by this share.
+/// Variances of the outputs' noise for the steady filter. If an output counts in only a share of
+/// the samples, its variance is divided by this share.
 pub(super) fn steady_variances(noise: &Noise, patterns: &[Pattern]) -> [f64; OUTPUTS] {
     let all: usize = patterns.iter().map(|p| p.samples).sum();
     std::array::from_fn(|o| noise.outputs[o].powi(2) / share(o, patterns, all))
@@ -90,7 +91,7 @@ pub(super) fn gains<const NX: usize>(
     }
     let mut gains = Vec::with_capacity(patterns.len());
     for pattern in patterns {
-        let mut own = PatternGain::of(&filter.prediction, c, noise, pattern)?;
+        let mut own = PatternGain::for_pattern(&filter.prediction, c, noise, pattern)?;
         own.slopes = own.slopes_along(&filter.prediction, c, &changes, pattern);
         own.add_output_noise(noise, noise_parameters, pattern);
         gains.push(own);
@@ -99,7 +100,7 @@ pub(super) fn gains<const NX: usize>(
 }
 
 impl<const NX: usize> PatternGain<NX> {
-    /// Gain that corrects nothing.
+    /// Gain of zero.
     pub fn none() -> Self {
         PatternGain {
             gain: Gain::zeros(),
@@ -111,9 +112,9 @@ impl<const NX: usize> PatternGain<NX> {
     }
 
     #[inline(always)]
-    fn of(
+    fn for_pattern(
         prediction: &States<NX>,
-        c: &Observation<NX>,
+        c: &OutputSlopes<NX>,
         noise: &Noise,
         pattern: &Pattern,
     ) -> Option<Self> {
@@ -142,14 +143,17 @@ impl<const NX: usize> PatternGain<NX> {
         })
     }
 
-    /// Slopes through the prediction's covariance and the outputs' slopes: dK = (dP Cᵀ + P dCᵀ −
-    /// K dS) S⁻¹.
+    /// Slope of the gain K along a parameter.
+    ///
+    /// P is the covariance of the prediction, C the slopes of the outputs along the states, S the
+    /// covariance of the innovations, and d a slope along the parameter: dK = (dP Cᵀ + P dCᵀ − K
+    /// dS) S⁻¹.
     #[inline(always)]
     fn slopes_along(
         &self,
         prediction: &States<NX>,
-        c: &Observation<NX>,
-        changes: &[(usize, Observation<NX>, States<NX>)],
+        c: &OutputSlopes<NX>,
+        changes: &[(usize, OutputSlopes<NX>, States<NX>)],
         pattern: &Pattern,
     ) -> Vec<GainSlope<NX>> {
         let seen = product_transposed(prediction, c);

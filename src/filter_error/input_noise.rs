@@ -2,11 +2,12 @@
 //! pressure as exact, so their white noise moves the computed aircraft; through a moment it is
 //! integrated to slow errors.
 //!
-//! An input's error n at one sample changes the coefficients by e n and the state, during a step, by
-//! Γ e n with Γ = ∂ẋ/∂c Δt. White errors of variance σ² give the states' noise the covariance
-//! Q = Σ σ² (Γ e)(Γ e)ᵀ in a step, summed over the inputs; the filter takes the mean over the maneuver.
-//! The effects e are linear in the derivatives, so Q has exact slopes along them. The direct part of
-//! the outputs' errors belongs to their own noise.
+//! Let n be the error of an input at one sample, and e the change of the coefficients c per unit of
+//! this input. The error changes the coefficients by e n, and the state x during a step Δt by Γ e
+//! n, with Γ = ∂ẋ/∂c Δt. White errors of variance σ² give the states' noise the covariance Q = Σ σ²
+//! (Γ e)(Γ e)ᵀ in a step, summed over the inputs. The filter uses the mean of Q over the maneuver.
+//! The effects e are linear in the derivatives, so Q has exact slopes along them. The direct part
+//! of the outputs' errors belongs to their own noise.
 
 use nalgebra::SVector;
 
@@ -18,10 +19,10 @@ use crate::output_error::surface_noise::{DerivativeValue, NoisySurface};
 /// Stride of the samples at which the effects are computed: enough for a mean.
 const STRIDE: usize = 16;
 
-/// Effect of the inputs' noise on the states of a filter.
+/// Noise of the inputs as noise of the states of a filter.
 #[derive(Clone, Debug, Default)]
 pub(super) struct InputNoise<const NX: usize> {
-    /// One for each input at each of some samples.
+    /// One effect for each input at each of the selected samples.
     effects: Vec<StateEffect<NX>>,
 }
 
@@ -29,9 +30,9 @@ pub(super) struct InputNoise<const NX: usize> {
 /// number of samples.
 #[derive(Clone, Debug)]
 struct StateEffect<const NX: usize> {
-    /// By the held derivatives.
+    /// Part of the held derivatives.
     held: SVector<f64, NX>,
-    /// Per unit of each free derivative that takes part.
+    /// Part per unit of each free derivative through which the input acts.
     free: Vec<(usize, SVector<f64, NX>)>,
 }
 
@@ -79,7 +80,7 @@ impl<const NX: usize> InputNoise<NX> {
 struct CaseSample<'a, const NX: usize, E: Equations<NX>> {
     case: &'a Case<NX, E>,
     sample: usize,
-    /// Γ, column by column.
+    /// Change Γ of the state in a step with each coefficient.
     by_coefficient: [SVector<f64, NX>; COEFFICIENTS],
 }
 
@@ -109,7 +110,8 @@ impl<'a, const NX: usize, E: Equations<NX>> CaseSample<'a, NX, E> {
         sum
     }
 
-    /// Every coefficient acts in proportion to the dynamic pressure.
+    /// Effect of noise of the dynamic pressure, to which every coefficient's effect is
+    /// proportional.
     fn of_pressure(&self, variance: f64) -> StateEffect<NX> {
         let deviation = variance.sqrt();
         let x = &self.case.motion.states[self.sample];

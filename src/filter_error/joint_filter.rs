@@ -1,14 +1,15 @@
-//! Filters of several maneuvers that share derivatives: one cost, the sum over the maneuvers. Each
-//! keeps its biases, initial states, derivatives that act as biases, and its noise with the gains.
-//! The filter of one maneuver is that of a group of one.
+//! Filters of several maneuvers that share derivatives. The cost is the sum over the maneuvers.
+//! Each maneuver keeps its own biases, initial states, derivatives that act as biases, noise and
+//! gains. A single maneuver is treated as a group of one.
 //!
-//! Parameters in order: the shared derivatives, each maneuver's own ones, then each maneuver's noise.
+//! Parameters in order: the shared derivatives, each maneuver's own parameters, then each
+//! maneuver's noise.
 
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::filter::{Filter, Response};
+use super::filter::{Filter, FilterResponse};
 use super::noise::{Noise, NoiseParameter};
 use crate::dynamics::{InGusts, OUTPUTS};
 use crate::output_error::Diverged;
@@ -18,7 +19,7 @@ use crate::output_error::sharing::{SharedParameters, add_matrix, add_vector, val
 #[derive(Debug)]
 pub struct JointFilter<'f, const NX: usize, E: InGusts<NX>> {
     filters: &'f [Filter<NX, E>],
-    /// Derivatives, biases and initial states.
+    /// Derivatives, biases and initial states of all maneuvers, with their places.
     own: &'f SharedParameters,
     noise_is_known: bool,
 }
@@ -27,13 +28,13 @@ pub struct JointFilter<'f, const NX: usize, E: InGusts<NX>> {
 #[derive(Clone, Debug)]
 pub struct JointResponse {
     /// Response of each maneuver.
-    pub members: Vec<Response>,
-    /// J with the priors' part.
+    pub members: Vec<FilterResponse>,
+    /// Cost J of all maneuvers, priors included.
     pub cost: f64,
 }
 
 impl JointResponse {
-    fn of(members: Vec<Response>) -> Self {
+    fn sum_members(members: Vec<FilterResponse>) -> Self {
         JointResponse {
             cost: members.iter().map(|r| r.cost).sum(),
             members,
@@ -137,7 +138,7 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
             filter.respond(&values_at(&places, parameters))
         };
         let members: Result<_, _> = self.members().map(respond).collect();
-        Ok(JointResponse::of(members?))
+        Ok(JointResponse::sum_members(members?))
     }
 
     /// Computes the innovations alone.
@@ -149,7 +150,7 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
             filter.innovations(&values_at(&places, parameters))
         };
         let members: Result<_, _> = self.members().map(respond).collect();
-        Ok(JointResponse::of(members?))
+        Ok(JointResponse::sum_members(members?))
     }
 
     /// Gradient of −J.
@@ -165,7 +166,7 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
     /// Expected second gradient of J.
     #[must_use]
     pub fn information(&self, response: &JointResponse) -> DMatrix<f64> {
-        self.sum_of(response, Response::information)
+        self.sum_of(response, FilterResponse::information)
     }
 
     /// Part of the information that comes from the covariance of the innovations and the priors.
@@ -176,7 +177,7 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
     fn sum_of(
         &self,
         response: &JointResponse,
-        matrix: impl Fn(&Response) -> DMatrix<f64>,
+        matrix: impl Fn(&FilterResponse) -> DMatrix<f64>,
     ) -> DMatrix<f64> {
         let n = self.parameters();
         let mut sum = DMatrix::zeros(n, n);
@@ -199,7 +200,8 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
         own.into_iter().chain(noise).collect()
     }
 
-    /// Fixes known noise, and the corner and the correlations of rotary gusts that are fixed themselves.
+    /// Marks parameters as fixed: all noise if it is known; else corner and correlations of those
+    /// rotary gusts whose size is fixed.
     pub(super) fn fix_noise(&self, free: &mut [bool]) {
         if self.noise_is_known {
             free[self.first_noise()..].fill(false);

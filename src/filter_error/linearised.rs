@@ -1,5 +1,6 @@
-//! Mean linear system of a maneuver. Rates and outputs are linear in the coefficients, and these in
-//! the derivatives, so its slopes are affine in the derivatives: A = A₀ + Σ ξ_j A_j.
+//! Mean linear system of a maneuver. Rates and outputs are linear in the coefficients, and the
+//! coefficients in the derivatives ξ_j. The slopes along the states are therefore affine in the
+//! derivatives: A = A₀ + Σ ξ_j A_j.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use nalgebra::{SMatrix, SVector};
@@ -15,34 +16,34 @@ const STRIDE: usize = 4;
 #[derive(Clone, Debug)]
 pub(super) struct Linearised<const NX: usize> {
     step_s: f64,
-    held: Slopes<NX>,
+    held: StateSlopes<NX>,
     /// Slopes per unit of each free derivative.
-    free: Vec<Slopes<NX>>,
+    free: Vec<StateSlopes<NX>>,
 }
 
 /// Slopes of rates (1/s) and of outputs along the states.
 #[derive(Clone, Copy, Debug)]
-struct Slopes<const NX: usize> {
+struct StateSlopes<const NX: usize> {
     rates: SMatrix<f64, NX, NX>,
     outputs: SMatrix<f64, OUTPUTS, NX>,
 }
 
-/// System of one step: x(k+1) = Φ x(k), y(k) = C x(k).
+/// System of one step with the states x and outputs y: x(k+1) = Φ x(k), y(k) = C x(k).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Discrete<const NX: usize> {
     pub step: SMatrix<f64, NX, NX>,
     pub outputs: SMatrix<f64, OUTPUTS, NX>,
 }
 
-impl<const NX: usize> Slopes<NX> {
+impl<const NX: usize> StateSlopes<NX> {
     fn zeros() -> Self {
-        Slopes {
+        StateSlopes {
             rates: SMatrix::zeros(),
             outputs: SMatrix::zeros(),
         }
     }
 
-    fn add(&mut self, other: &Slopes<NX>, factor: f64) {
+    fn add(&mut self, other: &StateSlopes<NX>, factor: f64) {
         self.rates += other.rates * factor;
         self.outputs += other.outputs * factor;
     }
@@ -52,8 +53,8 @@ impl<const NX: usize> Linearised<NX> {
     pub fn of<E: Equations<NX>>(case: &Case<NX, E>) -> Self {
         let mut linearised = Linearised {
             step_s: case.step_s,
-            held: Slopes::zeros(),
-            free: vec![Slopes::zeros(); case.derivatives()],
+            held: StateSlopes::zeros(),
+            free: vec![StateSlopes::zeros(); case.derivatives()],
         };
         let samples = (0..case.samples()).step_by(STRIDE);
         let share = 1.0 / samples.len().max(1) as f64;
@@ -111,10 +112,10 @@ impl<const NX: usize> Linearised<NX> {
 
 /// Slopes of rates and outputs at one sample, by coefficient.
 struct UnitSlopes<const NX: usize> {
-    /// At zero coefficients.
-    still: Slopes<NX>,
+    /// Slopes at zero coefficients.
+    still: StateSlopes<NX>,
     /// Changes of the slopes at constant coefficients, per unit of each coefficient.
-    changes: [Slopes<NX>; COEFFICIENTS],
+    changes: [StateSlopes<NX>; COEFFICIENTS],
     rates: SMatrix<f64, NX, COEFFICIENTS>,
     outputs: SMatrix<f64, OUTPUTS, COEFFICIENTS>,
 }
@@ -125,7 +126,7 @@ impl<const NX: usize> UnitSlopes<NX> {
             &case.motion.rate_inputs[2 * sample],
             &case.motion.sensor_inputs[sample],
         );
-        let slopes = |c: &[f64; COEFFICIENTS]| Slopes {
+        let slopes = |c: &[f64; COEFFICIENTS]| StateSlopes {
             rates: E::rates(inputs, x, c).by_state,
             outputs: E::outputs(inputs, sensors, x, c).by_state,
         };
@@ -146,13 +147,13 @@ impl<const NX: usize> UnitSlopes<NX> {
     }
 
     /// Slopes per unit of a coefficient that does not depend on the state.
-    fn along_coefficient(&self, k: usize) -> Slopes<NX> {
+    fn along_coefficient(&self, k: usize) -> StateSlopes<NX> {
         self.changes[k]
     }
 
     /// Slopes per unit of a coefficient's slope along a state.
-    fn through_coefficient(&self, k: usize, state: usize) -> Slopes<NX> {
-        let mut slopes = Slopes::<NX>::zeros();
+    fn through_coefficient(&self, k: usize, state: usize) -> StateSlopes<NX> {
+        let mut slopes = StateSlopes::<NX>::zeros();
         slopes
             .rates
             .column_mut(state)
@@ -168,7 +169,9 @@ impl<const NX: usize> UnitSlopes<NX> {
 /// Order of the exponential: that of a Runge-Kutta step.
 const ORDER: usize = 4;
 
-/// exp A by Horner's rule: sums S₀ = 1 and S_n = 1 + A S_(n−1) / (5 − n), the last of which it is.
+/// Matrix exponential exp A to fourth order, by Horner's rule.
+///
+/// The sums are S₀ = 1 and S_n = 1 + A S_(n−1) / (5 − n); S₄ is the result.
 struct Exponential<const N: usize> {
     a: SMatrix<f64, N, N>,
     sums: [SMatrix<f64, N, N>; ORDER + 1],
@@ -185,7 +188,7 @@ impl<const N: usize> Exponential<N> {
         Exponential { a, sums }
     }
 
-    /// Slope along dA.
+    /// Slope of exp A along the change dA of A.
     #[inline(always)]
     fn slope(&self, change: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
         let mut slope = SMatrix::zeros();
@@ -196,5 +199,5 @@ impl<const N: usize> Exponential<N> {
     }
 }
 
-/// 1/(5 − n) at the n-th sum.
+/// Factor 1/(5 − n) of the n-th sum.
 const SHARES: [f64; ORDER] = [1.0 / 4.0, 1.0 / 3.0, 1.0 / 2.0, 1.0];

@@ -1,8 +1,9 @@
 //! Filter error: maximum likelihood in moving air (Maine and Iliff 1981; Jategaonkar 2015, chapter
 //! 5).
 //!
-//! Output error charges a gust to the derivatives. Here the air adds noise to the states between
-//! samples, and a filter of steady gain corrects the states by the measurements:
+//! Output error attributes the effects of gusts to the derivatives. Filter error adds noise of the
+//! air to the states between samples, and a filter of steady gain K corrects the predicted state x̂
+//! to x̃ by the measurements z:
 //!
 //! ```text
 //! prediction   x̂(k+1) = f(T x̃(k))
@@ -11,10 +12,10 @@
 //! cost         J = ½ Σ (v' S⁻¹ v + log|S|) + priors
 //! ```
 //!
-//! f is the step of output error, and T lets the rotary gusts decay. Derivatives, biases, initial
-//! states, process noise and output noise are estimated together; the noise of the measured inputs
-//! is given. Without process noise and with exact inputs K is zero, and the innovations are the
-//! residuals of output error.
+//! f is the step of output error, h the outputs, S the covariance of the innovations v. T lets the
+//! rotary gusts decay. Derivatives, biases, initial states, process noise and output noise are
+//! estimated together; the noise of the measured inputs is given. Without process noise and with
+//! exact inputs K is zero, and the innovations are the residuals of output error.
 //!
 //! | file | content |
 //! |---|---|

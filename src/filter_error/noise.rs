@@ -1,9 +1,10 @@
 //! Noise of the process and of the outputs, and its parameters.
 //!
-//! A gust's angle is a random walk: white noise of one standard deviation per sample. A rotary gust
-//! is of first order, with one corner for all. Angle and rotary gusts correlate, because a rotary
-//! gust is the angle's change along the body (MIL-F-8785C). Parameters are logarithms of sizes and
-//! inverse hyperbolic tangents of correlations: any value is possible.
+//! The angle of the air is a random walk, whose steps from sample to sample are white noise. A
+//! rotary gust is noise of first order: white noise low-passed at a corner frequency that all
+//! rotary gusts share. Angle and rotary gusts correlate, because a rotary gust is the angle's
+//! change along the body (MIL-F-8785C). The parameters are logarithms of sizes and inverse
+//! hyperbolic tangents of correlations, so that the iteration may give them any value.
 
 use nalgebra::SMatrix;
 use serde::{Deserialize, Serialize};
@@ -17,17 +18,17 @@ const MOST_GUSTS: usize = 2;
 /// Standard deviations from which the iteration starts: light turbulence.
 const START_ANGLE: f64 = 0.05 * RAD;
 const START_GUST: f64 = 0.4 * RAD;
-/// Corner of the rotary gusts, rad/s: the span's over the airspeed of a fighter, and the spread of
-/// its logarithm. A maneuver of some ten seconds hardly determines it.
+/// Usual corner of the rotary gusts, rad/s, from span and airspeed of a fighter, and the standard
+/// deviation of its logarithm. A maneuver of some ten seconds hardly determines it.
 const USUAL_CORNER: f64 = 4.0;
 const CORNER_SPREAD: f64 = 0.7;
-/// Spread of the correlations' parameters: two thirds of the correlations are below 0.46. A maneuver
-/// of some ten seconds hardly determines them, and close to one they would leave a combination of
-/// the moments without noise.
+/// Prior standard deviation of a correlation's parameter: two thirds of the correlations are below
+/// 0.46. A maneuver of some ten seconds hardly determines a correlation. Close to one it would
+/// leave a combination of the moments without noise.
 const CORRELATION_SPREAD: f64 = 0.5;
-/// Spread of the logarithm of a rotary gust below the size that the random walk of the angle
-/// implies. A maneuver of some ten seconds may show none by chance, and bounds without it would be
-/// too small.
+/// Prior standard deviation of the logarithm of a rotary gust below the size that the angle's
+/// random walk implies. A maneuver of some ten seconds may show none by chance, and bounds without
+/// it would be too small.
 const ROTARY_SPREAD: f64 = 0.5;
 /// Standard deviations of severe turbulence (30 ft/s rms at 300 ft/s), an upper limit for air.
 const SEVERE_ANGLE: f64 = 0.7 * RAD;
@@ -36,22 +37,22 @@ const SEVERE_GUST: f64 = 6.0 * RAD;
 const LEAST_ANGLE: f64 = 1e-4 * RAD;
 const LEAST_GUST: f64 = 1e-3 * RAD;
 
-/// Largest size of a rotary gust over that of the angle's walk. Fits in simulated turbulence have up
-/// to 5, fits with surfaces recorded 0.4 s late 300 and more.
+/// Largest ratio of a rotary gust to the size that the angle's random walk implies. Fits in
+/// simulated turbulence have up to 5, fits with surfaces recorded 0.4 s late 300 and more.
 const MOST_EXCESS: f64 = 10.0;
 
 /// Noise of a maneuver.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Noise {
-    /// Angle of the air, rad per sample.
+    /// Standard deviation of the change of the air's angle from sample to sample, rad.
     pub angle: f64,
-    /// Rotary gusts, rad/s rms.
+    /// Root mean square of each rotary gust, rad/s.
     pub gusts: [f64; MOST_GUSTS],
-    /// Corner of the rotary gusts, rad/s.
+    /// Corner frequency of the rotary gusts, rad/s.
     pub corner: f64,
     /// Correlation of each rotary gust's changes with the angle's, −1 to 1.
     pub correlations: [f64; MOST_GUSTS],
-    /// Outputs, in their units.
+    /// Standard deviation of each output's noise, in the output's unit.
     pub outputs: [f64; OUTPUTS],
 }
 
@@ -65,26 +66,26 @@ pub enum NoiseParameter {
     Output(usize),
 }
 
-/// Prior of a parameter.
+/// Prior distribution of a noise parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Prior {
-    /// Normal, with mean and standard deviation.
+pub enum NoisePrior {
+    /// Normal distribution with this mean and standard deviation of the parameter.
     Normal(f64, f64),
-    /// Prior of a size whose logarithm is the parameter: normal about zero, with this logarithm of
-    /// its standard deviation. It bounds sizes that affect no output.
+    /// Normal distribution of the size about zero; the parameter is the logarithm of the size, and
+    /// the number the logarithm of the standard deviation. It bounds sizes that affect no output.
     Size(f64),
 }
 
-impl Prior {
-    /// Cost at a value, its slope, and its expected curvature.
+impl NoisePrior {
+    /// Cost, its slope and its expected curvature at a value of the parameter.
     #[must_use]
     pub fn cost(self, value: f64) -> [f64; 3] {
         match self {
-            Prior::Normal(mean, deviation) => {
+            NoisePrior::Normal(mean, deviation) => {
                 let z = (value - mean) / deviation;
                 [0.5 * z * z, z / deviation, deviation.powi(-2)]
             }
-            Prior::Size(size) => {
+            NoisePrior::Size(size) => {
                 let square = (2.0 * (value - size)).exp();
                 [0.5 * square, square, 2.0 * square]
             }
@@ -104,7 +105,7 @@ pub struct RotaryCost {
 }
 
 impl NoiseParameter {
-    /// Parameters of an axis in order.
+    /// Noise parameters of an axis with this number of rotary gusts, in order.
     #[must_use]
     pub fn all(gusts: usize) -> Vec<NoiseParameter> {
         let mut all = vec![NoiseParameter::Angle];
@@ -115,14 +116,14 @@ impl NoiseParameter {
         all
     }
 
-    /// Parameter's prior.
+    /// Prior of the parameter; outputs have none.
     #[must_use]
-    pub fn prior(self) -> Option<Prior> {
+    pub fn prior(self) -> Option<NoisePrior> {
         match self {
-            NoiseParameter::Angle => Some(Prior::Size(SEVERE_ANGLE.ln())),
-            NoiseParameter::Gust(_) => Some(Prior::Size(SEVERE_GUST.ln())),
-            NoiseParameter::Corner => Some(Prior::Normal(USUAL_CORNER.ln(), CORNER_SPREAD)),
-            NoiseParameter::Correlation(_) => Some(Prior::Normal(0.0, CORRELATION_SPREAD)),
+            NoiseParameter::Angle => Some(NoisePrior::Size(SEVERE_ANGLE.ln())),
+            NoiseParameter::Gust(_) => Some(NoisePrior::Size(SEVERE_GUST.ln())),
+            NoiseParameter::Corner => Some(NoisePrior::Normal(USUAL_CORNER.ln(), CORNER_SPREAD)),
+            NoiseParameter::Correlation(_) => Some(NoisePrior::Normal(0.0, CORRELATION_SPREAD)),
             NoiseParameter::Output(_) => None,
         }
     }
@@ -172,7 +173,7 @@ impl Noise {
         }
     }
 
-    /// Noise of these parameters, in the order of [`NoiseParameter::all`].
+    /// Noise with these values of the parameters, in the order of [`NoiseParameter::all`].
     #[must_use]
     pub fn of_parameters(parameters: &[f64], gusts: usize) -> Noise {
         // Gusts that the axis does not have are still.
@@ -189,7 +190,7 @@ impl Noise {
         noise
     }
 
-    /// Parameters in the order of [`NoiseParameter::all`].
+    /// Values of the parameters for this noise, in the order of [`NoiseParameter::all`].
     #[must_use]
     pub fn parameters(&self, gusts: usize) -> Vec<f64> {
         let value = |parameter| match parameter {
@@ -218,9 +219,12 @@ impl Noise {
         !self.is_still() && (0..gusts).all(belongs)
     }
 
-    /// Steady gain of a filter for the angle alone, a random walk that the output `vane` measures:
-    /// with q and r the variances of walk and output, p = q/2 + √(q²/4 + q r) and K = p / (p + r).
-    /// Zero in still air.
+    /// Steady gain of a filter for the angle of the air alone, measured by the output `vane`; zero
+    /// in still air.
+    ///
+    /// Let q be the variance of the angle's random walk in a step and r the variance of the vane's
+    /// noise, both rad². The variance of the predicted angle is p = q/2 + √(q²/4 + q r), and the
+    /// gain p / (p + r).
     #[must_use]
     pub fn angle_gain(&self, vane: usize) -> f64 {
         if self.is_still() {
@@ -231,22 +235,23 @@ impl Noise {
         p / (p + r)
     }
 
-    /// Logarithm of a rotary gust over the size that the random walk of the angle implies. The gust
-    /// is the angle's rate, low-passed at the corner ω: white of intensity σ²/Δt becomes σ²ω/(2Δt)
-    /// (MIL-F-8785C).
+    /// Logarithm of a rotary gust's size over the size that the random walk of the angle implies.
+    ///
+    /// Let σ be the walk's standard deviation per sample, rad, Δt the sampling interval, s, and ω
+    /// the corner, rad/s. The rotary gust is the angle's rate, which is white with intensity σ²/Δt,
+    /// low-passed at ω. Its variance is therefore σ² ω/(2 Δt) (MIL-F-8785C).
     fn rotary_excess(&self, gust: usize, step_s: f64) -> f64 {
         let expected = self.angle * (self.corner / (2.0 * step_s)).sqrt();
         (self.gusts[gust] / expected).ln()
     }
 
-    /// Cost of rotary gusts smaller than the random walk of the angle implies, with its slopes and
-    /// expected curvatures along the parameters that act on it: (parameter, slope along the
-    /// excess).
+    /// Cost of a rotary gust that is smaller than the random walk of the angle implies; `None` for
+    /// a larger gust.
     #[must_use]
     pub fn rotary_cost(&self, gust: usize, step_s: f64) -> Option<RotaryCost> {
         let excess = self.rotary_excess(gust, step_s);
         (excess < 0.0).then(|| {
-            let [cost, slope, curvature] = Prior::Normal(0.0, ROTARY_SPREAD).cost(excess);
+            let [cost, slope, curvature] = NoisePrior::Normal(0.0, ROTARY_SPREAD).cost(excess);
             RotaryCost {
                 cost,
                 slope,
@@ -260,7 +265,7 @@ impl Noise {
         })
     }
 
-    /// Share of a rotary gust that is left after a step.
+    /// Share of a rotary gust that remains after a step.
     #[must_use]
     pub fn decay(&self, step_s: f64) -> f64 {
         (-self.corner * step_s).exp()

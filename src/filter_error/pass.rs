@@ -1,9 +1,11 @@
 //! One pass of the filter over a maneuver, in the kernel of output error: the same steps, with a
 //! correction of states and sensitivities between them.
 //!
-//! With s the sensitivities of the predicted state and y those of the predicted outputs,
-//! s̃ = T (s − K y + dK v) + dT x̃, because an innovation falls as its prediction rises. The sums
-//! receive L⁻¹ y and L⁻¹ v: with S = L Lᵀ the innovations are white with unit variance.
+//! Let s and y be the sensitivities of the predicted state and outputs to one parameter, v the
+//! innovations, and d a slope along the parameter. The corrected state x̃ then has, after the decay
+//! T of the rotary gusts, the sensitivity T (s − K y + dK v) + dT x̃. K y has a minus sign because
+//! an innovation falls as its prediction rises.  The sums receive L⁻¹ y and L⁻¹ v. With S = L Lᵀ
+//! the covariance of the innovations, L⁻¹ v is white with unit variance.
 #![expect(
     clippy::inline_always,
     reason = "compiled into one loop for the processor at hand"
@@ -33,15 +35,15 @@ use crate::output_error::kernel::trajectory::{STATE_BOUND, StageHistory, Traject
 /// Gain of a pattern with its slopes in the lanes of the parameters.
 pub(super) struct LaneGain<const NX: usize> {
     gain: Gain<NX>,
-    /// −K, by which a state's sensitivities follow those of the outputs.
+    /// Matrix −K: change of the state's sensitivities with the outputs' sensitivities.
     reaction: Gain<NX>,
     whitening: Outputs,
     /// Slopes of the gain: state by state, output by output.
     slopes: LaneBlocks,
 }
 
-/// Rows of numbers in the lanes of the parameters, so that the rows of a widest vector stand together:
-/// vector by vector, row by row.
+/// Rows of numbers in the lanes of the parameters. They are stored vector by vector, and for each
+/// of the widest vectors row by row.
 pub(super) struct LaneBlocks {
     values: AlignedBuffer,
     rows: usize,
@@ -60,9 +62,9 @@ impl LaneBlocks {
         self.values.slice_mut()[(block + row) * VECTOR + lane % VECTOR] = value;
     }
 
-    /// Rows of the vector at a lane; `rows` is their number, which the compiler knows.
+    /// Rows of the vector at a lane; `rows` is their number, a constant when compiled.
     #[inline(always)]
-    fn at<S: Simd>(&self, rows: usize, lane: usize) -> LaneRows<'_, S> {
+    fn rows_of_lane<S: Simd>(&self, rows: usize, lane: usize) -> LaneRows<'_, S> {
         let first = lane / VECTOR * rows * VECTOR;
         let block = &self.values.slice()[first..first + rows * VECTOR];
         LaneRows {
@@ -115,7 +117,7 @@ pub(super) struct Corrections<'a, const NX: usize> {
     pub biases: [f64; OUTPUTS],
     /// Lanes of the biases: output by output, one where a bias shifts the output.
     pub bias_rows: LaneBlocks,
-    /// Share of a rotary gust that is left after a step, and its slope in each lane.
+    /// Share of a rotary gust that remains after a step, and its slope in each lane.
     pub decay: f64,
     pub decay_row: AlignedBuffer,
 }
@@ -125,7 +127,7 @@ pub(super) struct PassOutputs<'a> {
     /// Predicted outputs.
     pub predicted: &'a mut [[f64; OUTPUTS]],
     pub innovations: &'a mut [[f64; OUTPUTS]],
-    /// Innovations made white.
+    /// Innovations made white with unit variance.
     pub whitened: &'a mut [[f64; OUTPUTS]],
 }
 
@@ -173,7 +175,8 @@ impl RecordedRows {
         }
     }
 
-    /// Σ s u over all samples and outputs, lane by lane.
+    /// Sum Σ s u of the sensitivities s times the values u, over all samples and outputs, lane by
+    /// lane.
     pub fn weighted_sum(&self, values: &[[f64; OUTPUTS]]) -> Vec<f64> {
         Arch::new().dispatch(WeightedSum {
             rows: self,
@@ -247,7 +250,7 @@ pub(super) struct FilterPass<'a, const NX: usize, E: InGusts<NX>, K: RowSink> {
     pub sink: Option<&'a mut K>,
 }
 
-/// Samples of a chunk as the filter meets them.
+/// Corrections at the samples of one chunk.
 struct ChunkCorrections<'a, const NX: usize, E> {
     corrections: &'a Corrections<'a, NX>,
     /// Slots of products of a state: (slot, state).
@@ -278,10 +281,10 @@ impl<const NX: usize, E: InGusts<NX>> Correction<NX> for &ChunkCorrections<'_, N
     ) {
         let corrections = self.corrections;
         let gain = &corrections.gains[usize::from(self.patterns[k])];
-        let mut slopes = [gain.slopes.at::<S>(NX * OUTPUTS, lanes[0]); N];
+        let mut slopes = [gain.slopes.rows_of_lane::<S>(NX * OUTPUTS, lanes[0]); N];
         for n in 0..N {
-            slopes[n] = gain.slopes.at(NX * OUTPUTS, lanes[n]);
-            let biases = corrections.bias_rows.at::<S>(OUTPUTS, lanes[n]);
+            slopes[n] = gain.slopes.rows_of_lane(NX * OUTPUTS, lanes[n]);
+            let biases = corrections.bias_rows.rows_of_lane::<S>(OUTPUTS, lanes[n]);
             for o in 0..OUTPUTS {
                 y[n][o] = simd.add_f64s(y[n][o], biases.row(o));
             }
@@ -383,7 +386,7 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink> WithSimd for FilterPass<'_, NX
         let samples = case.samples();
         let mut rows = AlignedBuffer::zeros(CHUNK * OUTPUTS * layout.width());
         let rows = rows.slice_mut();
-        let mut regressors = AlignedBuffer::zeros(POINTS * layout.row);
+        let mut regressors = AlignedBuffer::zeros(POINTS * layout.row_length);
         let regressors = regressors.slice_mut();
         let mut build_up = ChunkBuildUp::<NX>::ZERO;
         let mut history = StageHistory::<NX>::EMPTY;

@@ -1,8 +1,20 @@
-//! Covariance of the steady filter's prediction: P = A (P − P Cᵀ S⁻¹ C P) Aᵀ + Q with
-//! S = C P Cᵀ + R.
+//! Covariance of the steady filter's prediction error, by the Riccati equation.
 //!
-//! It is solved by doubling: a round goes on by as many steps as all rounds before it. Slopes of P
-//! obey the closed loop's Lyapunov equation, which is doubled likewise.
+//! | symbol | quantity |
+//! |---|---|
+//! | A | change of the predicted state with the corrected state one step before |
+//! | C | change of the outputs with the state |
+//! | Q, R | covariances of the states' noise in a step and of the outputs' noise |
+//! | P, P⁺ | covariances of the predicted state's and of the corrected state's error |
+//! | S = C P Cᵀ + R | covariance of the innovations |
+//! | K = P Cᵀ S⁻¹ | gain |
+//! | Ā = A (1 − K C) | closed loop |
+//!
+//! P is constant from step to step: P = A (P − P Cᵀ S⁻¹ C P) Aᵀ + Q.
+//!
+//! The equation is solved by doubling: each round advances by as many steps as all rounds before
+//! it. The slope dP along a parameter obeys the Lyapunov equation of the closed loop, which is
+//! solved by doubling too.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use nalgebra::SMatrix;
@@ -17,39 +29,39 @@ const SETTLED: f64 = 1e-13;
 
 /// Square matrix of the states.
 pub(super) type States<const NX: usize> = SMatrix<f64, NX, NX>;
-/// Outputs along the states.
-pub(super) type Observation<const NX: usize> = SMatrix<f64, OUTPUTS, NX>;
+/// Slopes of the outputs along the states (C).
+pub(super) type OutputSlopes<const NX: usize> = SMatrix<f64, OUTPUTS, NX>;
 
-/// Linear system with noise.
+/// Linear system with noise: the matrices A, C and Q, and the diagonal of R.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NoisySystem<const NX: usize> {
     pub a: States<NX>,
-    pub c: Observation<NX>,
+    pub c: OutputSlopes<NX>,
     pub q: States<NX>,
-    /// Variances of the outputs.
+    /// Variances of the outputs' noise, the diagonal of R.
     pub r: [f64; OUTPUTS],
 }
 
 /// Change of a system along a parameter.
 pub(super) type SystemSlope<const NX: usize> = NoisySystem<NX>;
 
-/// Covariances of the steady filter.
+/// Steady filter of a system: gain and error covariances.
 #[derive(Clone, Debug)]
 pub(super) struct SteadyFilter<const NX: usize> {
-    /// Covariance of the prediction.
+    /// Covariance P of the predicted state.
     pub prediction: States<NX>,
-    /// Covariance of the corrected state.
+    /// Covariance P⁺ of the corrected state.
     corrected: States<NX>,
     gain: SMatrix<f64, NX, OUTPUTS>,
     pub system: NoisySystem<NX>,
-    /// Closed loop A (1 − K C), and its powers 2, 4, 8, ….
+    /// Closed loop Ā, and its powers 2, 4, 8, ….
     powers: Vec<States<NX>>,
 }
 
 impl<const NX: usize> SteadyFilter<NX> {
     /// Solves the Riccati equation; `None` if it has no finite solution.
     #[inline(always)]
-    pub fn of(system: NoisySystem<NX>) -> Option<Self> {
+    pub fn solve_system(system: NoisySystem<NX>) -> Option<Self> {
         let prediction = solve(&system)?;
         let mut s = sandwich(&system.c, &prediction);
         for o in 0..OUTPUTS {
@@ -72,7 +84,7 @@ impl<const NX: usize> SteadyFilter<NX> {
         Some(filter)
     }
 
-    /// Filter without process noise: it corrects nothing, whether or not the airframe is stable.
+    /// Filter without process noise: its gain is zero, whether or not the airframe is stable.
     pub fn still(system: NoisySystem<NX>) -> Self {
         SteadyFilter {
             prediction: States::zeros(),
@@ -94,10 +106,13 @@ impl<const NX: usize> SteadyFilter<NX> {
         }
     }
 
-    /// Slope of the prediction's covariance along a parameter.
+    /// Slope dP of the prediction's covariance along a parameter, from the slopes of the system.
     ///
-    /// The corrected covariance is stationary in the gain, so only changes of the system count:
+    /// With prefix d for a slope, and the symbols of this file,
+    ///
     /// dP = Ā dP Āᵀ + A [K dR Kᵀ − K dC P⁺ − (K dC P⁺)ᵀ] Aᵀ + dA P⁺ Aᵀ + A P⁺ dAᵀ + dQ.
+    ///
+    /// The slope of the gain does not enter, because the gain minimises P⁺.
     #[inline(always)]
     pub fn slope(&self, change: &SystemSlope<NX>) -> States<NX> {
         if self.powers.is_empty() {
@@ -121,10 +136,11 @@ impl<const NX: usize> SteadyFilter<NX> {
     }
 }
 
-/// Doubles the Riccati recursion until it settles.
+/// Solves for P by doubling the Riccati recursion until it settles; `None` if it does not stay
+/// finite.
 #[inline(always)]
 fn solve<const NX: usize>(system: &NoisySystem<NX>) -> Option<States<NX>> {
-    let mut information = Observation::<NX>::zeros();
+    let mut information = OutputSlopes::<NX>::zeros();
     for o in 0..OUTPUTS {
         information.set_row(o, &(system.c.row(o) / system.r[o]));
     }

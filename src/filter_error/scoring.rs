@@ -1,8 +1,9 @@
 //! Minimisation of the filter's cost: scoring steps, damped where a full step does not lower the
 //! cost.
 //!
-//! A logarithm of a noise that is zero has no minimum. A noise at its floor whose gradient points
-//! below is fixed there; the corner and the correlation of a fixed rotary gust are fixed with it.
+//! If a noise is zero, the cost has no minimum in its logarithm. A noise at its floor whose
+//! gradient points below the floor is therefore fixed there. Corner and correlation of a fixed
+//! rotary gust are fixed with the gust.
 
 use std::cmp::Ordering;
 
@@ -29,19 +30,19 @@ settings! {
 /// First damping after a full step fails, and the one at which no step lowers the cost.
 const FIRST_DAMPING: f64 = 1e-4;
 const MOST_DAMPING: f64 = 1e8;
-/// Largest growth of a noise in a step, a factor of 4.5, and largest fall, of 50, so that a noise
-/// that is absent falls to its floor in few steps.
+/// Largest change of a noise in a step, logarithms: growth by a factor of 4.5, fall by 50. A noise
+/// that is absent thus falls to its floor in few steps.
 const LARGEST_GROWTH: f64 = 1.5;
 const LARGEST_FALL: f64 = 4.0;
-/// Decrease of J that a full step predicts, below which the iteration may end though the noise
-/// still moves: it drifts along valleys in which no estimate changes.
+/// Predicted decrease of J by a full step below which the iteration may end although the noise
+/// still changes. The noise drifts along valleys in which no estimate changes.
 const NOISE_TOLERANCE: f64 = 0.1;
 
-/// Steps in a row that lower J by less than the tolerance after which the iteration ends: it follows
-/// a valley across which the second gradient is not exact.
+/// Number of successive steps that lower J by less than the tolerance, after which the iteration
+/// ends. Such steps follow a valley across which the second gradient is not exact.
 const SLOW_STEPS: usize = 3;
 
-/// End of the iteration.
+/// Result of the iteration.
 #[derive(Clone, Debug)]
 pub struct Scored {
     pub converged: bool,
@@ -101,14 +102,14 @@ pub fn minimise<const NX: usize, E: InGusts<NX>>(
 }
 
 impl Scored {
-    /// Orders two ends by their cost.
+    /// Orders two results by their cost.
     #[must_use]
     pub fn by_cost(&self, other: &Scored) -> Ordering {
         self.response.cost.total_cmp(&other.response.cost)
     }
 
-    /// Fixes the parameters at their floors; returns gradient and information of the free parameters; the
-    /// others have a unit diagonal.
+    /// Fixes the parameters at their floors. Returns gradient and information of the free
+    /// parameters; rows of fixed parameters have a unit diagonal and are zero elsewhere.
     fn free_system<const NX: usize, E: InGusts<NX>>(
         &mut self,
         filter: &JointFilter<NX, E>,
@@ -140,7 +141,8 @@ impl Scored {
         let mut failed = false;
         while *damping < MOST_DAMPING {
             if let Some(step) = step(information, gradient, *damping) {
-                let next = moved(&self.parameters, &step, floors, filter.first_noise());
+                let next =
+                    stepped_parameters(&self.parameters, &step, floors, filter.first_noise());
                 let lowers = |response: &JointResponse| response.cost < self.response.cost;
                 // A step after one that failed may fail as well: its cost alone is cheap.
                 let may_lower = !failed || filter.innovations(&next).is_ok_and(|r| lowers(&r));
@@ -172,14 +174,20 @@ fn next_damping(damping: f64, kept: f64) -> f64 {
     }
 }
 
-/// Half square of the step of the estimates, in units of their bounds at known noise.
+/// Half the squared length of the step of the filter's own parameters, in units of their bounds at
+/// known noise.
 fn own_gain(step: &DVector<f64>, information: &DMatrix<f64>, own: usize) -> f64 {
     let step = step.rows(0, own);
     0.5 * (information.view((0, 0), (own, own)) * step).dot(&step)
 }
 
 /// Parameters after a step; noise changes by a factor at most, and stays above its floor.
-fn moved(values: &[f64], step: &DVector<f64>, floors: &[f64], first_noise: usize) -> Vec<f64> {
+fn stepped_parameters(
+    values: &[f64],
+    step: &DVector<f64>,
+    floors: &[f64],
+    first_noise: usize,
+) -> Vec<f64> {
     let all = values.iter().zip(step.iter()).zip(floors).enumerate();
     all.map(|(j, ((value, step), floor))| {
         let step = if j < first_noise {
@@ -192,7 +200,8 @@ fn moved(values: &[f64], step: &DVector<f64>, floors: &[f64], first_noise: usize
     .collect()
 }
 
-/// Solves (H + damping · diag H) d = g at unit diagonal.
+/// Solves (H + damping · diag H) d = g for the step d, with the information H scaled to unit
+/// diagonal and the gradient g of −J.
 fn step(information: &DMatrix<f64>, gradient: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
     let unit = scale(information);
     let mut h = scaled(information, &unit);

@@ -1,33 +1,43 @@
 //! Slopes of the derivatives over α inside a maneuver, and their effect on the estimates.
 //!
 //! A slope is a derivative's change over α, as a share of the tunnel's change. The slopes have a
-//! normal prior about a common share λ. With information H and gradient g of −J at the fit, f the
-//! filter's own parameters and s the slopes,
+//! normal prior about a common share λ.
+//!
+//! | symbol | quantity |
+//! |---|---|
+//! | f, s | the filter's own parameters, and the slopes |
+//! | s₀ | slopes at which the fit held them |
+//! | H_ff, H_fs, H_ss | blocks of the information at the fit |
+//! | g_s | gradient of −J along s at the fit, plus V s₀ |
+//! | λ, w | common share, and standard deviation of a slope about it over λ |
+//! | m = λ 1, D = λ w 1 | prior mean of the slopes, and diagonal of their prior standard deviations |
+//! | V = H_ss − H_sf H_ff⁻¹ H_fs | information on the slopes with f eliminated |
+//! | G = H_ff⁻¹ H_fs | change of the estimates with the slopes, with reversed sign |
+//!
+//! For one share λ the slopes have the mean ŝ and the covariance P, the estimates of f change by −G
+//! (ŝ − s₀) with the covariance G P G', and the data have the likelihood p:
 //!
 //! ```text
-//! V = H_ss − H_sf H_ff⁻¹ H_fs        m = λ 1        D = λ w 1
-//! slopes   ŝ = m + P (g_s − V m)     P = D (1 + D V D)⁻¹ D
-//! estimates move by −G (ŝ − s₀)      with covariance G P G',  G = H_ff⁻¹ H_fs
+//! P = D (1 + D V D)⁻¹ D        ŝ = m + P (g_s − V m)
 //! p(data | λ) ∝ |1 + D V D|^(−½) exp(g_s' m − ½ m' V m + ½ (g_s − V m)' P (g_s − V m))
 //! ```
 //!
-//! where the fit held the slopes at s₀, and g_s is the gradient there plus V s₀. The result is the
-//! mean over λ. If the data show constant derivatives, the slopes come out near zero and move
-//! nothing.
+//! The result is the mean over the shares λ, weighted by p. If the data show constant derivatives,
+//! the slopes come out near zero and change nothing.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-/// Shares λ: from derivatives that are constant to changes half as large again as the tunnel's.
+/// Shares λ: from 0, constant derivatives, to 1.5, changes half as large again as the tunnel's.
 const SHARES: [f64; 7] = [0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5];
 
-/// Standard deviation w of a slope about the common share. A table with errors of 20 % is not only
-/// scaled; it also has another shape over α.
+/// Standard deviation w of a slope about the common share, over that share. A table with errors of
+/// 20 % is not only scaled; it also has another shape over α.
 const SCATTER: f64 = 0.5;
 
 /// Effect of the slopes on the estimates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SlopeEffect {
-    /// Slopes.
+    /// Mean ŝ of the slopes.
     pub slopes: DVector<f64>,
     /// Change of the filter's own parameters.
     pub change: DVector<f64>,
@@ -36,7 +46,7 @@ pub struct SlopeEffect {
 }
 
 impl SlopeEffect {
-    /// Turns the change of the estimates into an uncertainty.
+    /// Adds the square of the change to the covariance, and leaves the estimates unchanged.
     pub fn become_uncertainty(&mut self) {
         self.covariance += &self.change * self.change.transpose();
         self.change.fill(0.0);
@@ -46,11 +56,11 @@ impl SlopeEffect {
 /// Blocks of the information on own parameters and slopes, with the slopes' gradient.
 #[derive(Clone, Debug)]
 pub struct SlopeInformation {
-    /// H_ff⁻¹.
+    /// Inverse H_ff⁻¹.
     pub inverse: DMatrix<f64>,
-    /// H_fs.
+    /// Block H_fs.
     pub cross: DMatrix<f64>,
-    /// H_ss.
+    /// Block H_ss.
     pub slopes: DMatrix<f64>,
     /// Gradient of −J along the slopes.
     pub gradient: DVector<f64>,
@@ -58,7 +68,7 @@ pub struct SlopeInformation {
     pub held_at: DVector<f64>,
 }
 
-/// Slopes for one share of the tunnel's.
+/// Slopes and their effect for one share λ.
 struct ShareEstimate {
     log_likelihood: f64,
     slopes: DVector<f64>,
@@ -108,7 +118,8 @@ impl SlopeInformation {
     }
 }
 
-/// Mean over the shares, by their likelihoods; the covariance has the scatter between them.
+/// Mean over the shares, weighted by their likelihoods. The covariance includes the scatter between
+/// the shares.
 fn mean(estimates: &[ShareEstimate], own: usize) -> SlopeEffect {
     let largest = estimates
         .iter()
@@ -197,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn slopes_that_the_data_show_tell_of_those_that_they_do_not() {
+    fn well_determined_slopes_determine_the_common_share_of_the_others() {
         // The first slope has a deviation of 0.005; the data have no information on the second.
         let effect = |first: f64| {
             let own = DVector::from_vec(vec![4e4, 1e-12]);

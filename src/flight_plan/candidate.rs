@@ -5,7 +5,8 @@ use crate::lab::campaign::{Cards, FlightCard, TestPoint};
 use crate::lab::simulator::{Card, FlightCondition};
 use crate::numerics::random::derived_seed;
 
-/// Flight of all candidates, by which their seeds differ from those of simulated campaigns.
+/// Name of the flight of all candidates, so that their random numbers differ from those of
+/// simulated campaigns.
 const FLIGHT: &str = "next";
 
 /// A card that the next flight may fly.
@@ -45,7 +46,7 @@ pub fn reach_deg<'a>(candidates: impl Iterator<Item = &'a Candidate>) -> (f64, f
 }
 
 /// Test points with the flight that gives their altitude and mass: the candidates as written, or
-/// those of all flights.
+/// else the points of all flights.
 fn test_points(cards: &Cards) -> Vec<(&FlightCard, &TestPoint)> {
     let first = cards.flights.values().next();
     if cards.next.candidates.is_empty() {

@@ -1,19 +1,20 @@
 //! Choice of the cards of a flight: the information that they bring, against the minutes that they
 //! take.
 //!
-//! The derivatives of each coefficient have a Gaussian distribution. A card observes some of its
-//! rows with noise; the effect on the covariance does not depend on the values observed. An aim may
-//! have a part in several coefficients, which are independent: its variance v is the sum over the
-//! parts. With w the wanted standard deviation, flying a set of cards is worth
+//! The derivatives of each coefficient have a Gaussian distribution. A card observes some of their
+//! linear combinations with noise; the effect on the covariance does not depend on the observed
+//! values. An aim is a quantity whose standard deviation is to be lowered. It may have parts in
+//! several coefficients, which are independent. Let v be its variance, the sum over the parts, and
+//! w its wanted standard deviation. Flying a set of cards is worth
 //!
 //! Σ weight · ½ (ln max(v before, w²) − ln max(v after, w²))
 //!
-//! in nats: a reduction below the wanted deviation is worth nothing.
+//! in nats, summed over the aims. A reduction below the wanted deviation is worth nothing.
 //!
 //! Two greedy sets, by worth and by worth per minute, are each improved by exchange: a card is
-//! taken out and the minutes are filled again, as long as the set gains by it. A greedy set alone
-//! is worse than the best one if cards complement each other, or if the minutes do not divide
-//! evenly.
+//! taken out and the minutes are filled again, as long as this raises the worth of the set. A
+//! greedy set alone is worse than the best one if cards complement each other, or if the minutes do
+//! not divide evenly.
 
 use nalgebra::{Cholesky, DMatrix, Dyn};
 
@@ -38,7 +39,7 @@ pub struct Aim {
     pub weight: f64,
     /// Wanted standard deviation; zero if every reduction counts.
     pub wanted: f64,
-    /// Index of the quantity among all that are asked for.
+    /// Index of the quantity among the requested quantities.
     pub point: usize,
 }
 
@@ -123,14 +124,14 @@ pub struct CardSet<'a> {
 }
 
 impl CardChoice {
-    /// The set that is worth most, as far as exchanges find it.
+    /// Chooses the set that is worth most, as far as exchanges find it.
     #[must_use]
     pub fn choose(&self) -> CardSet<'_> {
         let start = |preference| {
-            let mut set = CardSet::nothing(self);
+            let mut set = CardSet::empty(self);
             set.fill(preference);
             set.exchange();
-            CardSet::times(self, &set.times)
+            CardSet::with_times(self, &set.times)
         };
         let [worth, per_minute] = [Preference::Worth, Preference::WorthPerMinute].map(start);
         if worth.worth() > per_minute.worth() {
@@ -144,7 +145,7 @@ impl CardChoice {
 impl<'a> CardSet<'a> {
     /// Set without cards.
     #[must_use]
-    pub fn nothing(choice: &'a CardChoice) -> CardSet<'a> {
+    pub fn empty(choice: &'a CardChoice) -> CardSet<'a> {
         let coefficients = choice.coefficients.iter();
         CardSet {
             choice,
@@ -155,8 +156,8 @@ impl<'a> CardSet<'a> {
 
     /// Set in which each card is flown this number of times.
     #[must_use]
-    pub fn times(choice: &'a CardChoice, times: &[usize]) -> CardSet<'a> {
-        let mut set = CardSet::nothing(choice);
+    pub fn with_times(choice: &'a CardChoice, times: &[usize]) -> CardSet<'a> {
+        let mut set = CardSet::empty(choice);
         for (card, &times) in times.iter().enumerate() {
             for _ in 0..times {
                 set.fly(card);
@@ -319,7 +320,7 @@ impl<'a> CardSet<'a> {
 }
 
 impl Aim {
-    /// Worth of a reduction of the variance from `before` to `after`, nats.
+    /// Worth of lowering the variance of the aim from `before` to `after`, nats.
     #[must_use]
     pub fn worth(&self, before: f64, after: f64) -> f64 {
         let counted = |variance: f64| variance.max(self.wanted * self.wanted);

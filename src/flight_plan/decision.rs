@@ -21,20 +21,20 @@
 //! # Decision
 //!
 //! x is *decided* if it lies between two neighbouring limits with the probability p or more. After
-//! the flight x is normal with the mean m′ and the variance s² = σ′² + ν², so the interval from l to
-//! u is decided if
+//! the flight x is normal with the mean m′ and the variance s² = σ′² + ν², so the interval from l
+//! to u is decided if
 //!
 //! Φ((u − m′)/s) − Φ((l − m′)/s) ≥ p.
 //!
 //! The left side falls as m′ moves away from the middle of the interval. The condition therefore
-//! holds for every m′ from some a to some b, the *deciding means* of this interval. They do not
-//! overlap with those of another interval, since p is over a half.
+//! holds for every m′ from some a to some b, the *deciding means* of this interval. The deciding
+//! means of two intervals do not overlap, since p is over a half.
 //!
 //! # Probability before the flight
 //!
-//! m′ is not known before the flight. It is normal with the mean m and the variance τ² = σ² − σ′²,
-//! what the flight takes from the variance of g. The probability that the flight decides is the sum
-//! over all intervals of
+//! Before the flight m′ is a random variable. It is normal with the mean m and the variance τ² = σ²
+//! − σ′², by which the flight lowers the variance of g. The probability that the flight decides is
+//! the sum over all intervals of
 //!
 //! Φ((b − m)/τ) − Φ((a − m)/τ).
 //!
@@ -50,12 +50,13 @@ const HALVINGS: usize = 60;
 pub struct Decision {
     /// Mean m in tonight's posterior.
     pub mean: f64,
-    /// Limits in ascending order; below the first and above the last are intervals too.
+    /// Limits in ascending order; the outermost intervals reach below the first and above the last
+    /// limit.
     pub limits: Vec<f64>,
     /// Standard deviation ν of the part n, which no flight lowers.
-    pub rest: f64,
+    pub fixed_deviation: f64,
     /// Probability p from which the quantity counts as decided, over a half.
-    pub share: f64,
+    pub required_probability: f64,
     /// `true` if the limits move with the mean, so that the standard deviation alone decides.
     pub follows_mean: bool,
 }
@@ -64,7 +65,7 @@ impl Decision {
     /// Limits of the most probable interval, and its probability, if g has this standard deviation.
     #[must_use]
     pub fn most_probable(&self, deviation: f64) -> ((f64, f64), f64) {
-        let spread = deviation.hypot(self.rest);
+        let spread = deviation.hypot(self.fixed_deviation);
         let below = |limit: f64| normal::below((limit - self.mean) / spread);
         let all = self.intervals();
         let all = all.map(|(low, high)| ((low, high), below(high) - below(low)));
@@ -76,21 +77,21 @@ impl Decision {
     }
 
     fn is_decided(&self, deviation: f64) -> bool {
-        self.most_probable(deviation).1 >= self.share
+        self.most_probable(deviation).1 >= self.required_probability
     }
 
     /// Probability that a flight decides the quantity if it lowers the standard deviation of g from
     /// `before` to `after`.
     #[must_use]
-    pub fn decided(&self, before: f64, after: f64) -> f64 {
-        let spread = after.hypot(self.rest);
+    pub fn probability_of_decision(&self, before: f64, after: f64) -> f64 {
+        let spread = after.hypot(self.fixed_deviation);
         let moved = (before * before - after * after).max(0.0).sqrt();
         if self.follows_mean || moved <= 0.0 {
             return f64::from(u8::from(self.is_decided(after)));
         }
         let deciding = self
             .intervals()
-            .filter_map(|own| self.deciding(own, spread));
+            .filter_map(|own| self.deciding_means(own, spread));
         let probability = deciding.map(|(low, high)| {
             normal::below((high - self.mean) / moved) - normal::below((low - self.mean) / moved)
         });
@@ -101,14 +102,16 @@ impl Decision {
     /// derivatives might decide it.
     #[must_use]
     pub fn is_open(&self, before: f64) -> bool {
-        !self.is_decided(before) && self.decided(before, 0.0) > 0.0
+        !self.is_decided(before) && self.probability_of_decision(before, 0.0) > 0.0
     }
 
     /// Largest standard deviation of g after a flight that decides the quantity with the probability
     /// p; zero if no flight does.
     #[must_use]
-    pub fn wanted(&self, before: f64) -> f64 {
-        largest_up_to(before, |after| self.decided(before, after) >= self.share)
+    pub fn largest_deciding_deviation(&self, before: f64) -> f64 {
+        largest_up_to(before, |after| {
+            self.probability_of_decision(before, after) >= self.required_probability
+        })
     }
 
     fn intervals(&self) -> impl Iterator<Item = (f64, f64)> {
@@ -119,8 +122,8 @@ impl Decision {
 
     /// Deciding means a and b of the interval from `low` to `high`, for the standard deviation
     /// `spread` of x. `None` if the interval is too narrow to have any.
-    fn deciding(&self, (low, high): (f64, f64), spread: f64) -> Option<(f64, f64)> {
-        let distance = normal::quantile(self.share) * spread;
+    fn deciding_means(&self, (low, high): (f64, f64), spread: f64) -> Option<(f64, f64)> {
+        let distance = normal::quantile(self.required_probability) * spread;
         match (low.is_finite(), high.is_finite()) {
             (false, false) => Some((low, high)),
             (false, true) => Some((low, high - distance)),
@@ -128,8 +131,9 @@ impl Decision {
             (true, true) => {
                 let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
                 let inside = |offset: f64| normal::within(half, offset, spread);
-                (inside(0.0) >= self.share).then(|| {
-                    let offset = largest_up_to(half, |offset| inside(offset) >= self.share);
+                (inside(0.0) >= self.required_probability).then(|| {
+                    let offset =
+                        largest_up_to(half, |offset| inside(offset) >= self.required_probability);
                     (middle - offset, middle + offset)
                 })
             }

@@ -1,5 +1,5 @@
-//! Experience with each class in the campaign: its share of usable maneuvers, their weight in the
-//! posterior, and the noise beyond that of a simulated maneuver.
+//! Experience with each class in the campaign: the share of usable maneuvers, their weight in the
+//! posterior, and how much noisier they are than simulated maneuvers.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,8 @@ use crate::numerics::order_statistics::median;
 use crate::output_error::error_effect::{ErrorEffect, SharedError};
 use crate::tables::{ContributionRow, FitRow, Outcome};
 
-/// Number of maneuvers that the campaign's share counts as, beside those of the class.
+/// Number of maneuvers for which the campaign's share counts in the mean with the class's own
+/// maneuvers.
 const PRIOR_MANEUVERS: f64 = 2.0;
 
 /// Maneuvers of the campaign with their results, in one order.
@@ -29,13 +30,14 @@ pub struct Experience {
     pub usable: f64,
     /// Mean weight of its maneuvers in the posterior.
     pub weight: f64,
-    /// Median of the corrected variance over Cramér and Rao's, both without errors that maneuvers
-    /// share; `None` without a maneuver that converged.
+    /// Colour of the noise: median ratio of the corrected variance to Cramér and Rao's, both
+    /// without errors that maneuvers share; `None` without a converged maneuver.
     pub colour: Option<f64>,
 }
 
 impl CampaignHistory<'_> {
-    /// Experience with a class; where the class has too few maneuvers, that of the whole campaign.
+    /// Experience with a class. The share of usable maneuvers is averaged with the campaign's, as
+    /// if of two maneuvers. Weight and colour are the campaign's if the class has none.
     #[must_use]
     pub fn of(&self, class: &str) -> Experience {
         let (usable, flown) = self.usable(Some(class));
@@ -79,8 +81,8 @@ impl CampaignHistory<'_> {
     }
 }
 
-/// Median over the parameters of the corrected variance over Cramér and Rao's, both without errors
-/// that maneuvers share.
+/// Colour of the noise: median, over the parameters, of the ratio of the corrected variance to
+/// Cramér and Rao's. Both are without errors that maneuvers share.
 #[must_use]
 pub fn colour(covariance: &Covariance) -> Option<f64> {
     let n = covariance.names.len();

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::decision::Decision;
 use super::goals::{Goal, GoalSubject};
 use crate::aero::Condition;
-use crate::model::{Model, Point, PointQuantity};
+use crate::model::{Model, OutlookPoint, PointQuantity};
 use crate::proof_of_match::DecisiveDifference;
 use crate::qualities::{self, FlownConditions, judged_quantity};
 use crate::tables::{Airframe, FlyingQuality, GoalKind, ModelSource};
@@ -13,11 +13,11 @@ use crate::tables::{Airframe, FlyingQuality, GoalKind, ModelSource};
 /// A goal at one angle of attack.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GoalPoint {
-    pub point: Point,
+    pub point: OutlookPoint,
     pub kind: GoalKind,
     /// Derivative, quantity, or class.
     pub name: String,
-    /// Airframe of a level, simulator of a match.
+    /// Airframe of a level, or simulator of a match; empty for a derivative.
     pub of: &'static str,
     /// Maneuver and quantity that decide a match.
     pub decided_by: String,
@@ -42,7 +42,9 @@ impl Target {
     pub fn wanted(&self, before: f64) -> f64 {
         match self {
             Target::Bound(bound) => bound.unwrap_or(0.0),
-            Target::Decision(decision) if decision.is_open(before) => decision.wanted(before),
+            Target::Decision(decision) if decision.is_open(before) => {
+                decision.largest_deciding_deviation(before)
+            }
             Target::Decision(_) => before,
         }
     }
@@ -116,7 +118,7 @@ impl GoalBasis<'_> {
         let alphas = goal.alphas_deg(breakpoints, self.reach_deg);
         let points = alphas.into_iter().filter_map(|alpha_deg| {
             Some(GoalPoint {
-                point: Point {
+                point: OutlookPoint {
                     quantity: PointQuantity::Published(name.to_owned()),
                     condition: condition(alpha_deg)?,
                 },
@@ -143,7 +145,7 @@ impl GoalBasis<'_> {
         let points = inside.filter_map(|alpha_deg| {
             let own = judged_quantity(basis, conditions, airframe, quantity, alpha_deg)?;
             Some(GoalPoint {
-                point: Point {
+                point: OutlookPoint {
                     quantity: PointQuantity::Combination(own.slopes),
                     condition: own.condition,
                 },
@@ -156,8 +158,8 @@ impl GoalBasis<'_> {
                 target: Target::Decision(Decision {
                     mean: own.value,
                     limits: own.limits,
-                    rest: 0.0,
-                    share: goal.deciding_share(),
+                    fixed_deviation: 0.0,
+                    required_probability: goal.deciding_probability(),
                     follows_mean: false,
                 }),
             })
@@ -174,7 +176,7 @@ impl GoalBasis<'_> {
         let inside = differences.iter();
         let inside = inside.filter(|own| (from..=to).contains(&own.condition.alpha_deg));
         let point = |own: &DecisiveDifference| GoalPoint {
-            point: Point {
+            point: OutlookPoint {
                 quantity: PointQuantity::Combination(own.slopes.clone()),
                 condition: own.condition,
             },
@@ -187,8 +189,8 @@ impl GoalBasis<'_> {
             target: Target::Decision(Decision {
                 mean: own.mean,
                 limits: vec![-1.0, 1.0],
-                rest: own.rest,
-                share: goal.deciding_share(),
+                fixed_deviation: own.fixed_deviation,
+                required_probability: goal.deciding_probability(),
                 follows_mean: own.follows_mean,
             }),
         };

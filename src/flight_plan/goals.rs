@@ -103,7 +103,7 @@ impl Goal {
 
     /// Probability from which the goal counts as decided.
     #[must_use]
-    pub fn deciding_share(&self) -> f64 {
+    pub fn deciding_probability(&self) -> f64 {
         self.decided.unwrap_or(DECIDED)
     }
 

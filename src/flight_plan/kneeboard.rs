@@ -51,12 +51,12 @@ struct CardLine {
     scale: f64,
     minutes: String,
     reaches: String,
-    teaches: Vec<Taught>,
+    teaches: Vec<InformedGoal>,
 }
 
-/// Goal that a card helps to reach.
+/// Goal on which a card gives much information.
 #[derive(Debug, Serialize)]
-struct Taught {
+struct InformedGoal {
     symbol: String,
     rest: String,
 }
@@ -142,7 +142,7 @@ fn card_line(config: &Config, row: &NextCardRow, place: usize, at: f64) -> CardL
         |value: Option<f64>, decimals| value.map_or_else(String::new, |v| fixed(v, decimals));
     let teaches = row.teaches.split("; ").filter_map(|part| {
         let (goal, rest) = part.split_once(" at ")?;
-        Some(Taught {
+        Some(InformedGoal {
             symbol: goal_symbol(goal),
             rest: format!("at {rest}"),
         })

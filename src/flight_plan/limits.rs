@@ -1,4 +1,4 @@
-//! Limits of a card: extremes of what it will fly, and the first limit that they break.
+//! Limits of a card: extreme values of its rehearsed flight, and the first limit that is broken.
 
 use crate::flight::{Record, signal};
 use crate::lab::campaign::FlightLimits;
@@ -32,7 +32,7 @@ impl Extremes {
     }
 }
 
-/// First limit that a record breaks, in words; `None` for a card that keeps all.
+/// First limit that a record breaks, in words; `None` if it keeps all limits.
 #[must_use]
 pub fn broken(limits: &FlightLimits, record: &Record, extremes: &Extremes) -> Option<String> {
     let ranges = [

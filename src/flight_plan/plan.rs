@@ -10,7 +10,7 @@ use super::goals::Goal;
 use super::rehearsal::Rehearsed;
 use crate::aero::{Buildup, Condition, WindTunnel};
 use crate::estimate::Covariance;
-use crate::model::{self, Evidence, Model, Outlook, Point};
+use crate::model::{self, Evidence, Model, Outlook, OutlookPoint};
 use crate::qualities::{self, FlownConditions};
 use crate::tables::{NextCardRow, NextGoalRow};
 
@@ -90,7 +90,7 @@ pub fn plan(
         budget,
     };
     let flown = choice.choose();
-    let rows = Rows {
+    let rows = PlanRows {
         state,
         kept: &kept,
         points: &points,
@@ -158,7 +158,7 @@ fn outlooks(state: &CampaignState, kept: &[KeptCard], points: &[GoalPoint]) -> V
             })
         })
         .collect();
-    let asked: Vec<Point> = points.iter().map(|p| p.point.clone()).collect();
+    let asked: Vec<OutlookPoint> = points.iter().map(|p| p.point.clone()).collect();
     state.model.outlook(
         (state.evidence, &planned),
         &asked,
@@ -191,8 +191,9 @@ fn aims(outlooks: &[Outlook], points: &[GoalPoint]) -> Vec<Aim> {
         .collect()
 }
 
-/// Covariance of each coefficient with the observations of the cards. By experience only a share of
-/// a class's maneuvers is usable, so the noise of its rows is divided by this share.
+/// Covariance of each coefficient with the observations of the cards. Only a share of a class's
+/// maneuvers is usable, by experience, so the noise covariance of its rows is divided by this
+/// share.
 fn knowledge(
     state: &CampaignState,
     kept: &[KeptCard],
@@ -234,7 +235,7 @@ fn covariances(state: &CampaignState, kept: &[KeptCard]) -> Vec<Option<Covarianc
 }
 
 /// Choice as rows of the tables.
-struct Rows<'a> {
+struct PlanRows<'a> {
     state: &'a CampaignState<'a>,
     kept: &'a [KeptCard<'a>],
     points: &'a [GoalPoint],
@@ -242,7 +243,7 @@ struct Rows<'a> {
     flown: &'a CardSet<'a>,
 }
 
-impl Rows<'_> {
+impl PlanRows<'_> {
     /// Cards in the order of flying, then the others by information per minute.
     fn cards(&self) -> Vec<NextCardRow> {
         let all = 0..self.kept.len();
@@ -253,7 +254,7 @@ impl Rows<'_> {
             let by_alpha = key(a).alpha_deg.total_cmp(&key(b).alpha_deg);
             by_alpha.then_with(|| key(a).class.cmp(&key(b).class))
         });
-        let nothing = CardSet::nothing(self.choice);
+        let nothing = CardSet::empty(self.choice);
         let per_minute = |card: &usize| nothing.gain(*card) / self.choice.prices[*card].minutes;
         others.sort_by(|a, b| per_minute(b).total_cmp(&per_minute(a)));
         let flown = flown.into_iter().enumerate().map(|(i, card)| NextCardRow {
@@ -281,7 +282,7 @@ impl Rows<'_> {
             lowest_an_g: Some(extremes.an_g.0),
             highest_an_g: Some(extremes.an_g.1),
             highest_qbar_psf: Some(extremes.qbar_psf.1),
-            teaches: self.teaches(card, nothing),
+            teaches: self.most_informed_goals(card, nothing),
             ..self.of_candidate(candidate)
         }
     }
@@ -311,8 +312,8 @@ impl Rows<'_> {
         }
     }
 
-    /// Goals to which a card alone adds most, each derivative once.
-    fn teaches(&self, card: usize, nothing: &CardSet) -> String {
+    /// Goals on which a card by itself gives most information, each derivative once.
+    fn most_informed_goals(&self, card: usize, nothing: &CardSet) -> String {
         let mut after = nothing.clone();
         after.fly(card);
         let mut gains: Vec<(f64, &GoalPoint, f64, f64)> = self
@@ -344,7 +345,7 @@ impl Rows<'_> {
 
     /// Goals in the order of the goals' file, or of the posterior.
     fn goals(&self) -> Vec<NextGoalRow> {
-        let nothing = CardSet::nothing(self.choice);
+        let nothing = CardSet::empty(self.choice);
         let row = |aim: &Aim| {
             let (before, after) = (nothing.deviation(aim), self.flown.deviation(aim));
             goal_row(&self.points[aim.point], aim.wanted, before, after)
@@ -381,6 +382,6 @@ fn goal_row(goal: &GoalPoint, wanted: f64, before: f64, after: f64) -> NextGoalR
         lower_limit: limit(|sides| sides.0),
         upper_limit: limit(|sides| sides.1),
         probability_pct: interval.map(|(_, probability)| 100.0 * probability),
-        decided_pct: decision.map(|own| 100.0 * own.decided(before, after)),
+        decided_pct: decision.map(|own| 100.0 * own.probability_of_decision(before, after)),
     }
 }

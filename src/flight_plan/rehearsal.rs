@@ -69,8 +69,8 @@ impl RehearsalBasis<'_> {
     }
 }
 
-/// Instruments with the noise that the campaign's channels have, and no other errors, since each
-/// estimate contains the uncertainty of calibration. A channel without measured noise has the noise
+/// Instruments with the noise of the campaign's channels and no other errors, since each estimate
+/// already includes the uncertainty of calibration. A channel without measured noise has the noise
 /// of the cards.
 #[must_use]
 pub fn instruments(of_cards: &Instruments, channels: &[ChannelRow]) -> Instruments {

@@ -58,7 +58,7 @@ pub struct VerdictChange {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Learnt {
     pub derivative: String,
-    /// Divergence of its posterior over α from the earlier night's.
+    /// Divergence of the posterior over α from the posterior of the earlier night, nats.
     pub nats: f64,
     /// Angle of attack at which the posterior moved most, with its mean and standard deviation there.
     pub alpha_deg: f64,
@@ -89,7 +89,7 @@ pub struct InstrumentChange {
     pub since: String,
     /// Size of the step, or drift from the first flight to the last.
     pub change: f64,
-    /// Standard deviation of the change.
+    /// Standard deviation of `change`.
     pub bound: f64,
     pub unit: String,
 }

@@ -17,7 +17,7 @@ pub struct Code {
     pub methods: BTreeMap<String, u32>,
 }
 
-/// Everything that decides the results of a night, or of its stages up to one.
+/// Everything that decides the results of a night, or of its stages up to a given stage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Lineage {
     pub code: Code,

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::evidence::Evidence;
 use super::flight_data::{FlightData, Observed};
-use super::held_values::{HeldDifferences, Posterior};
+use super::held_values::{HeldDifferences, TermsPosterior};
 use super::observation::Observation;
 use super::observed_differences::ObservedDifferences;
 use super::open_scales::add_open_scales;
@@ -13,7 +13,7 @@ use super::posterior::{Gaussian, gaussian, information, of_differences, reweight
 use super::scale_prior::Scale;
 use super::scales::{centres, most_probable};
 use super::self_check::{self, Agreement};
-use super::term::{Term, TermSources};
+use super::term::{PosteriorTerm, TermSources};
 use super::unknowns::Unknowns;
 use crate::aero::WindTunnel;
 use crate::numerics::root::EXACT;
@@ -24,14 +24,14 @@ const REWEIGHTINGS: usize = 2;
 /// Share of the largest variance below which the comparison of classes ignores a direction.
 const CHECKED_VARIANCE: f64 = 1e-6;
 
-/// Posterior of one coefficient.
+/// Posterior of one coefficient, with its evidence and its self-check.
 #[derive(Clone, Debug)]
 pub struct CoefficientPosterior {
-    pub terms: Vec<Term>,
+    pub terms: Vec<PosteriorTerm>,
     pub unknowns: Unknowns,
     pub scales: Vec<Scale>,
-    /// Scales before the last step. The noise between the points of the grids was computed with
-    /// them.
+    /// Scales before the last step, with which the noise between the points of the grids was
+    /// computed.
     pub noise_scales: Vec<Scale>,
     /// Posterior, including the spread over the scales that the data leave open.
     pub gaussian: Gaussian,
@@ -51,8 +51,8 @@ pub struct CoefficientPosterior {
 impl CoefficientPosterior {
     /// Posterior of a coefficient from its terms; `None` if the evidence is not finite.
     #[must_use]
-    pub fn of(
-        terms: Vec<Term>,
+    pub fn from_terms(
+        terms: Vec<PosteriorTerm>,
         evidence: &[Evidence],
         basis: &TermSources,
     ) -> Option<CoefficientPosterior> {
@@ -66,7 +66,7 @@ impl CoefficientPosterior {
             noise_scales = scales;
             (observed, scales, found) = data.fit(&terms, &weights, &noise_scales)?;
         }
-        let posterior = Posterior {
+        let posterior = TermsPosterior {
             terms: &terms,
             scales: &scales,
             gaussian: &found,
@@ -98,16 +98,16 @@ pub struct Data {
 impl Data {
     /// Collects the evidence about a coefficient's terms.
     #[must_use]
-    pub fn new(terms: &[Term], evidence: &[Evidence], basis: &TermSources) -> Data {
+    pub fn new(terms: &[PosteriorTerm], evidence: &[Evidence], basis: &TermSources) -> Data {
         Data::with_planned(terms, evidence, &[], basis).0
     }
 
-    /// Evidence as in [`Data::new`], with the observation that each planned maneuver will make. The
-    /// classes of the planned maneuvers, and the delays that they share with the campaign, are
-    /// among the unknowns; the planned maneuvers are no evidence.
+    /// Collects the evidence as [`Data::new`] does, and the observation that each planned maneuver
+    /// will make. The errors of the planned maneuvers' classes, and the delays that they share with
+    /// the campaign, are among the unknowns. The planned maneuvers themselves are not evidence.
     #[must_use]
     pub fn with_planned(
-        terms: &[Term],
+        terms: &[PosteriorTerm],
         evidence: &[Evidence],
         planned: &[Evidence],
         basis: &TermSources,
@@ -150,22 +150,23 @@ impl Data {
         (data, planned)
     }
 
-    /// Sets the noise of each maneuver to its own plus the noise between the points of the grids.
-    pub fn set_between(&mut self, terms: &[Term], scales: &[Scale]) {
+    /// Adds the noise between the points of the grids to each maneuver's own noise, for these
+    /// scales.
+    pub fn add_grid_noise(&mut self, terms: &[PosteriorTerm], scales: &[Scale]) {
         for (flight, own) in self.flights.iter_mut().zip(&self.places) {
-            flight.set_between(&observed(own, &self.observations), terms, scales);
+            flight.add_grid_noise(&observed(own, &self.observations), terms, scales);
         }
     }
 
-    /// Most probable scales, from a start, and the Gaussian for them. Before them, the data with
-    /// the noise for the scales of the start.
+    /// Finds the most probable scales from a start. Returns the observed differences, these scales
+    /// and the Gaussian; the noise between the points of the grids has the scales of the start.
     fn fit(
         &mut self,
-        terms: &[Term],
+        terms: &[PosteriorTerm],
         weights: &[f64],
         start: &[Scale],
     ) -> Option<(ObservedDifferences, Vec<Scale>, Gaussian)> {
-        self.set_between(terms, start);
+        self.add_grid_noise(terms, start);
         let sums = information(&self.flights, weights, self.unknowns.count);
         let own = of_differences(&sums, &self.unknowns)?;
         let observed = ObservedDifferences::new(terms, &self.unknowns, &own);
@@ -178,7 +179,7 @@ impl Data {
     /// other flights.
     fn held(
         &self,
-        posterior: &Posterior,
+        posterior: &TermsPosterior,
         weights: &[f64],
         evidence: &[Evidence],
         tunnel: &WindTunnel,
@@ -200,7 +201,7 @@ impl Data {
 
     fn posterior(
         self,
-        terms: Vec<Term>,
+        terms: Vec<PosteriorTerm>,
         scales: Vec<Scale>,
         weights: &[f64],
         gaussian: Gaussian,

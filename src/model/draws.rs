@@ -10,7 +10,7 @@ use crate::numerics::root::{EXACT, root};
 use crate::tables::PosteriorRow;
 
 /// Correlation below which derivatives count as independent: the sampling error of a few hundred draws.
-const LEAST: f64 = 0.05;
+const LEAST_CORRELATION: f64 = 0.05;
 
 /// Two derivatives whose errors are correlated.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,7 +28,7 @@ pub struct Sampler<'a> {
     coefficients: Vec<CoefficientSampler>,
 }
 
-/// Differences of one coefficient: mean + root · normal deviates.
+/// Sampler of one coefficient: a draw is mean + root · (independent standard normal deviates).
 #[derive(Clone, Debug)]
 struct CoefficientSampler {
     quantities: Vec<PublishedDerivative>,
@@ -96,7 +96,7 @@ impl CoefficientPosterior {
                     continue;
                 }
                 let correlation = self.mean_correlation(first, second);
-                if correlation.abs() >= LEAST {
+                if correlation.abs() >= LEAST_CORRELATION {
                     pairs.push(CorrelatedDerivatives {
                         first: first.name.clone(),
                         second: second.name.clone(),

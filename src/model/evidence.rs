@@ -4,17 +4,17 @@ use crate::estimate::Covariance;
 use crate::maneuver::Maneuver;
 use crate::tables::EstimateRow;
 
-/// Results of one maneuver.
+/// Results of one maneuver: condition, estimates, and their covariance.
 #[derive(Clone, Copy, Debug)]
 pub struct Evidence<'a> {
     pub maneuver: &'a Maneuver,
     pub estimates: &'a [EstimateRow],
-    /// Sums that the tunnel tabulates.
+    /// Estimates of the sums of derivatives that the tunnel tabulates.
     pub combined: &'a [EstimateRow],
     pub covariance: &'a Covariance,
 }
 
-/// Evidence in the order of the maneuvers' ids, which is that of the flights and of the times in them.
+/// Sorts the evidence by the maneuvers' ids, and thus by flight and time.
 #[must_use]
 pub fn in_order<'a>(evidence: &[Evidence<'a>]) -> Vec<Evidence<'a>> {
     let mut evidence = evidence.to_vec();

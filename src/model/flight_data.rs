@@ -7,27 +7,32 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::observation::Observation;
 use super::scale_prior::Scale;
-use super::term::{Term, between_points};
+use super::term::{PosteriorTerm, between_points};
 use super::unknowns::{SparseRow, Unknowns, is_of_campaign};
 use crate::output_error::error_effect::SharedError;
 
-/// Evidence of a flight: y = A z + K u + e.
+/// Evidence of a flight, y = A z + K u + e.
+///
+/// z are the unknowns of the coefficient and A the rows of the estimates over z. u are the
+/// calibration errors of the flight, each with unit variance, and K their effects. e are the
+/// remaining errors.
 #[derive(Clone, Debug)]
 pub struct FlightData {
     /// Index of each maneuver in the evidence, and its rows.
     pub maneuvers: Vec<(usize, Range<usize>)>,
-    /// y.
+    /// Differences y of the estimates from the tunnel.
     pub differences: DVector<f64>,
-    /// A.
+    /// Rows A, one per estimate.
     pub rows: Vec<SparseRow>,
     /// Covariance of e, maneuver by maneuver. Once set, it includes the noise between the points of
     /// the grids.
     noise: Vec<DMatrix<f64>>,
-    /// K Kᵀ.
+    /// Covariance K Kᵀ from the calibration errors.
     calibration: DMatrix<f64>,
 }
 
-/// Sums of the normal equations: Λ = Σ Aᵀ Σ⁻¹ A and η = Σ Aᵀ Σ⁻¹ y.
+/// Normal equations of the unknowns, summed over the flights: Λ = Σ_flights Aᵀ Σ⁻¹ A and η =
+/// Σ_flights Aᵀ Σ⁻¹ y, with Σ the covariance of K u + e ([`FlightData::covariance`]).
 #[derive(Clone, Debug)]
 pub struct Information {
     pub matrix: DMatrix<f64>,
@@ -50,7 +55,7 @@ pub type Observed<'a> = (usize, usize, &'a Observation);
 impl FlightData {
     /// Evidence of one flight's maneuvers.
     #[must_use]
-    pub fn new(observed: &[Observed], terms: &[Term], unknowns: &Unknowns) -> FlightData {
+    pub fn new(observed: &[Observed], terms: &[PosteriorTerm], unknowns: &Unknowns) -> FlightData {
         let count = observed.iter().map(|(_, _, o)| o.terms.len()).sum();
         let mut data = FlightData {
             maneuvers: vec![],
@@ -82,8 +87,13 @@ impl FlightData {
         data
     }
 
-    /// Sets each maneuver's noise to its own plus the noise between the points of the grids.
-    pub fn set_between(&mut self, observed: &[Observed], terms: &[Term], scales: &[Scale]) {
+    /// Sets each maneuver's noise to its own noise plus the noise between the points of the grids.
+    pub fn add_grid_noise(
+        &mut self,
+        observed: &[Observed],
+        terms: &[PosteriorTerm],
+        scales: &[Scale],
+    ) {
         for (noise, (_, _, observation)) in self.noise.iter_mut().zip(observed) {
             let Observation {
                 design, condition, ..
@@ -121,14 +131,14 @@ impl FlightData {
         }
     }
 
-    /// Covariance of the errors that no other maneuver shares, of the maneuver at an index in this
-    /// flight.
+    /// Covariance of the errors that a maneuver shares with no other; `maneuver` is its index in
+    /// this flight.
     #[must_use]
     pub fn noise(&self, maneuver: usize) -> &DMatrix<f64> {
         &self.noise[maneuver]
     }
 
-    /// Covariance Σ of K u + e; the noise of a maneuver of weight w is 1/w times its own.
+    /// Covariance Σ of the errors K u + e. A maneuver of weight w has 1/w times its own noise.
     #[must_use]
     pub fn covariance(&self, weights: &[f64]) -> DMatrix<f64> {
         let mut covariance = self.calibration.clone();
@@ -184,7 +194,7 @@ impl FlightData {
         dense
     }
 
-    /// Aᵀ over all unknowns.
+    /// Transposed rows Aᵀ, over all unknowns.
     #[must_use]
     pub fn columns(&self, unknowns: usize) -> DMatrix<f64> {
         let mut columns = DMatrix::zeros(unknowns, self.rows.len());
@@ -196,7 +206,7 @@ impl FlightData {
         columns
     }
 
-    /// A m and A P Aᵀ of a mean m and a covariance P of the unknowns.
+    /// Mean A m and covariance A P Aᵀ of the rows, from mean m and covariance P of the unknowns.
     #[must_use]
     pub fn image(
         &self,

@@ -87,7 +87,7 @@ impl Grid {
     }
 }
 
-/// Points on either side of a value, with their weights.
+/// Neighbouring points of a value, with their weights in the linear interpolation.
 fn either_side(points: &[f64], value: f64) -> Vec<(usize, f64)> {
     let last = points.len().saturating_sub(1);
     let above = points.partition_point(|p| *p < value);
@@ -102,7 +102,7 @@ fn either_side(points: &[f64], value: f64) -> Vec<(usize, f64)> {
     vec![(above - 1, 1.0 - share), (above, share)]
 }
 
-/// Ascending points, each once, with added ones so that no gap exceeds `widest`.
+/// Sorts the points, keeps each once, and adds points so that no gap exceeds `widest`.
 #[must_use]
 pub fn refined(points: impl IntoIterator<Item = f64>, widest: f64) -> Vec<f64> {
     let mut points: Vec<f64> = points.into_iter().collect();

@@ -7,12 +7,13 @@ use super::evidence::Evidence;
 use super::other_flights::OtherFlights;
 use super::posterior::Gaussian;
 use super::scale_prior::Scale;
-use super::term::{Term, between_points};
+use super::term::{PosteriorTerm, between_points};
 use super::unknowns::Unknowns;
 use crate::aero::WindTunnel;
 use crate::output_error::error_effect::{ErrorEffect, SharedError};
 
-/// Differences from the tunnel of derivatives of one coefficient that a maneuver holds.
+/// Differences from the tunnel of the derivatives of one coefficient that a maneuver holds, with
+/// their covariance.
 #[derive(Clone, Debug)]
 pub struct HeldDifferences {
     pub derivatives: Vec<String>,
@@ -20,10 +21,10 @@ pub struct HeldDifferences {
     pub covariance: DMatrix<f64>,
 }
 
-/// Posterior of a coefficient's terms.
+/// Terms of a coefficient with their scales and their posterior.
 #[derive(Clone, Copy, Debug)]
-pub struct Posterior<'a> {
-    pub terms: &'a [Term],
+pub struct TermsPosterior<'a> {
+    pub terms: &'a [PosteriorTerm],
     pub scales: &'a [Scale],
     pub gaussian: &'a Gaussian,
 }
@@ -43,12 +44,12 @@ impl Evidence<'_> {
     #[must_use]
     pub fn held_differences(
         &self,
-        posterior: &Posterior,
+        posterior: &TermsPosterior,
         unknowns: &Unknowns,
         others: &OtherFlights,
         tunnel: &WindTunnel,
     ) -> Option<HeldDifferences> {
-        let Posterior { terms, scales, .. } = *posterior;
+        let TermsPosterior { terms, scales, .. } = *posterior;
         let effects = self.held_effects().map(|(name, _)| name);
         let names: Vec<&str> = effects
             .filter(|name| terms.iter().any(|t| t.derivative == *name))
@@ -59,7 +60,7 @@ impl Evidence<'_> {
         let condition = self.maneuver.condition(tunnel);
         let design = self.design_of(terms, &names);
         let rows = unknowns.difference_rows(terms, &design, &condition);
-        let (values, covariance) = others.of(&rows);
+        let (values, covariance) = others.means_and_covariance(&rows);
         let between = between_points(terms, scales, &design, &condition);
         Some(HeldDifferences {
             derivatives: names.into_iter().map(str::to_owned).collect(),
@@ -68,8 +69,8 @@ impl Evidence<'_> {
         })
     }
 
-    /// Weights of the terms in the differences of derivatives: one row each.
-    fn design_of(&self, terms: &[Term], names: &[&str]) -> DMatrix<f64> {
+    /// Weights of the terms in the differences of derivatives, one row per derivative.
+    fn design_of(&self, terms: &[PosteriorTerm], names: &[&str]) -> DMatrix<f64> {
         let mut design = DMatrix::zeros(names.len(), terms.len());
         for (i, name) in names.iter().enumerate() {
             self.add_derivative(terms, name, 1.0, i, &mut design);

@@ -4,17 +4,19 @@
 //! C_L = C_N cos α − C_A sin α        C_D = C_N sin α + C_A cos α
 //! ```
 //!
-//! at the maneuver's mean flight condition, and their slopes along each regressor. Along α the axes
-//! turn as well: ∂C_L/∂α has −C_D, ∂C_D/∂α has C_L, per rad. All are weighted sums of the
-//! derivatives. Let p be the estimated derivatives, with covariance Σ, and h the held ones. The
-//! held values have the error f of covariance C. The errors of p and h are G f + e and −f, so a sum
-//! has the variance
+//! Coefficients and their slopes along each regressor are given at the maneuver's mean flight
+//! condition. The axes turn with α, so ∂C_L/∂α also contains −C_D, and ∂C_D/∂α contains C_L, per
+//! rad. All are weighted sums of the derivatives, with weights w_p of the estimated derivatives and
+//! w_h of the held ones.
+//!
+//! Let Σ be the covariance of the estimates. Let C be the covariance of the held values: the
+//! tunnel's uncertainty, or the covariance of the other flights' posterior. If the held values have
+//! the error −f, the estimates have the error G f beside their own. A sum therefore has the
+//! variance
 //!
 //! ```text
 //! w_p' Σ w_p − 2 w_p' G C w_h + w_h' C w_h
 //! ```
-//!
-//! Held values have the tunnel's uncertainty, or that of the posterior of the other flights.
 
 use nalgebra::{DMatrix, DVector, Matrix2, RowDVector};
 
@@ -27,7 +29,7 @@ use crate::maneuver::{Maneuver, Means, Status};
 use crate::tables::{EstimateRow, LiftAndDragRow};
 use crate::units::RAD;
 
-/// Regressor of the row with the coefficients themselves.
+/// Name of the regressor in the row that has the coefficients themselves instead of a slope.
 const TOTAL: &str = "total";
 
 /// Maneuver as it was flown, with its build-up.
@@ -51,11 +53,11 @@ struct Weights {
 /// Errors of the derivatives that a maneuver holds.
 struct HeldErrors {
     names: Vec<String>,
-    /// G.
+    /// Change G of the estimates with the errors of the held values.
     gains: DMatrix<f64>,
     /// Covariance of held values that the maneuver's corrected covariance contains.
     assumed: DMatrix<f64>,
-    /// C.
+    /// Covariance C of the held values.
     covariance: DMatrix<f64>,
 }
 
@@ -77,13 +79,13 @@ impl Model {
         if !is_estimated(Coefficient::CN) || !is_estimated(Coefficient::CA) {
             return vec![];
         }
-        let mut held = HeldErrors::of(flown.evidence);
+        let mut held = HeldErrors::with_tunnel_uncertainty(flown.evidence);
         if held_by_posterior {
             held.take_posterior(self, &flown.evidence.maneuver.maneuver_id);
         }
         let total = flown.total(&derivatives);
         let mut rows = vec![flown.row(TOTAL, DerivativeUnit::Number, &derivatives, &total, &held)];
-        for regressor in leaves(&derivatives) {
+        for regressor in simple_regressors(&derivatives) {
             let slope = flown.slope(&derivatives, regressor, &total);
             let has_estimate = derivatives.iter().enumerate().any(|(i, d)| {
                 let weight = slope.lift[i].abs() + slope.drag[i].abs();
@@ -116,14 +118,15 @@ impl PublishedManeuver<'_> {
         row.is_some_and(|row| row.status == Status::Estimated && row.value.is_some())
     }
 
-    /// Value of a derivative; an inactive one has the tunnel's value.
+    /// Value of a derivative: as estimated or held; the tunnel's for an inactive derivative.
     fn value(&self, derivative: &Derivative) -> f64 {
         let row = self.estimate(derivative);
         row.and_then(|row| row.value.or(row.wind_tunnel))
             .unwrap_or(0.0)
     }
 
-    /// Part of a regressor in the mean flight condition. The mean rates of a maneuver are small.
+    /// Mean of a regressor without products over the maneuver. Rates and sideslip count as zero,
+    /// since their means are small.
     fn mean(&self, part: &Regressor) -> f64 {
         let maneuver = self.evidence.maneuver;
         match part {
@@ -139,7 +142,11 @@ impl PublishedManeuver<'_> {
     }
 
     /// Weights of the derivatives in lift and drag, from each one's regressor or its slope.
-    fn turned(&self, derivatives: &[&Derivative], own: impl Fn(&Derivative) -> f64) -> Weights {
+    fn weights_from_regressors(
+        &self,
+        derivatives: &[&Derivative],
+        own: impl Fn(&Derivative) -> f64,
+    ) -> Weights {
         let Maneuver {
             alpha_deg,
             qbar_psf,
@@ -161,11 +168,11 @@ impl PublishedManeuver<'_> {
     }
 
     fn total(&self, derivatives: &[&Derivative]) -> Weights {
-        self.turned(derivatives, |d| d.regressor.value(&|part| self.mean(part)))
+        self.weights_from_regressors(derivatives, |d| d.regressor.value(&|part| self.mean(part)))
     }
 
     fn slope(&self, derivatives: &[&Derivative], along: &Regressor, total: &Weights) -> Weights {
-        let mut slope = self.turned(derivatives, |d| {
+        let mut slope = self.weights_from_regressors(derivatives, |d| {
             d.regressor.slope(along, &|part| self.mean(part))
         });
         if *along == Regressor::Alpha {
@@ -232,8 +239,8 @@ impl PublishedManeuver<'_> {
 }
 
 impl HeldErrors {
-    /// Errors with the tunnel's uncertainty.
-    fn of(evidence: &Evidence) -> HeldErrors {
+    /// Errors of the held values with the tunnel's uncertainty.
+    fn with_tunnel_uncertainty(evidence: &Evidence) -> HeldErrors {
         let effects: Vec<_> = evidence.held_effects().collect();
         let deviations = effects.iter().map(|(_, effect)| effect.deviation.powi(2));
         let variances = DVector::from_iterator(effects.len(), deviations);
@@ -267,8 +274,9 @@ impl HeldErrors {
     }
 }
 
-/// Regressors, each once, that are neither constant nor composed of others.
-fn leaves<'a>(derivatives: &[&'a Derivative]) -> Vec<&'a Regressor> {
+/// Distinct regressors of the derivatives that are neither constant nor composed of other
+/// regressors.
+fn simple_regressors<'a>(derivatives: &[&'a Derivative]) -> Vec<&'a Regressor> {
     let mut leaves: Vec<&Regressor> = Vec::new();
     for leaf in derivatives.iter().flat_map(|d| d.regressor.leaves()) {
         if *leaf != Regressor::Constant && !leaves.contains(&leaf) {

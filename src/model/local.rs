@@ -5,8 +5,8 @@ use nalgebra::{DMatrix, DVector};
 use super::campaign_model::Model;
 use super::coefficient::CoefficientPosterior;
 use super::posterior::Gaussian;
-use super::term::Term;
-use super::unknowns::{SparseRow, between, sum};
+use super::term::PosteriorTerm;
+use super::unknowns::{SparseRow, covariance_between, weighted_sum};
 use crate::aero::{Axis, Coefficient, Condition};
 
 /// Half of the step in Mach number over which slopes are taken. Tables are linear between their points.
@@ -17,7 +17,7 @@ const MACH_STEP: f64 = 0.005;
 pub enum LocalKind {
     /// A derivative.
     Derivative,
-    /// A sum of a constant and its slope times α, in place of the constant.
+    /// A sum of a constant and its slope times α, published in place of the constant.
     Sum,
 }
 
@@ -45,10 +45,12 @@ impl Model {
     /// Posterior of an axis's derivatives at a flight condition, and of their slopes along Mach number
     /// where the tunnel's tables depend on it. Coefficients are independent of each other.
     #[must_use]
-    pub fn at(&self, axis: Axis, condition: &Condition) -> LocalPosterior {
+    pub fn posterior_at_condition(&self, axis: Axis, condition: &Condition) -> LocalPosterior {
         let of_axis = self.coefficients.iter().filter(|(c, _)| c.axis() == axis);
         let parts: Vec<_> = of_axis
-            .map(|(coefficient, posterior)| posterior.at(*coefficient, condition))
+            .map(|(coefficient, posterior)| {
+                posterior.coefficient_at_condition(*coefficient, condition)
+            })
             .collect();
         let count = parts.iter().map(|part| part.values.len()).sum();
         let mut whole = LocalPosterior {
@@ -71,7 +73,11 @@ impl Model {
 }
 
 impl CoefficientPosterior {
-    fn at(&self, coefficient: Coefficient, condition: &Condition) -> LocalPosterior {
+    fn coefficient_at_condition(
+        &self,
+        coefficient: Coefficient,
+        condition: &Condition,
+    ) -> LocalPosterior {
         let mut values = Vec::new();
         let mut tunnel = Vec::new();
         let mut rows: Vec<SparseRow> = Vec::new();
@@ -99,9 +105,12 @@ impl CoefficientPosterior {
         let Gaussian { mean, covariance } = &self.gaussian;
         let both = tunnel.iter().zip(&rows);
         LocalPosterior {
-            mean: DVector::from_iterator(rows.len(), both.map(|(t, row)| t + sum(row, mean))),
+            mean: DVector::from_iterator(
+                rows.len(),
+                both.map(|(t, row)| t + weighted_sum(row, mean)),
+            ),
             covariance: DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
-                between(&rows[i], &rows[j], covariance)
+                covariance_between(&rows[i], &rows[j], covariance)
             }),
             values,
         }
@@ -110,7 +119,11 @@ impl CoefficientPosterior {
 
 /// Weights of the grid's points in the value of a term, or in its slope along Mach number; `None`
 /// for the slope of a table without Mach.
-pub fn local_shares(term: &Term, condition: &Condition, is_mach_slope: bool) -> Option<SparseRow> {
+pub fn local_shares(
+    term: &PosteriorTerm,
+    condition: &Condition,
+    is_mach_slope: bool,
+) -> Option<SparseRow> {
     let grid = &term.prior.grid;
     if !is_mach_slope {
         return Some(grid.shares(condition));

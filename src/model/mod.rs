@@ -49,7 +49,7 @@ pub use draws::CorrelatedDerivatives;
 pub use evidence::Evidence;
 pub use lift_and_drag::PublishedManeuver;
 pub use local::{LocalKind, LocalPosterior, LocalValue};
-pub use outlook::{Outlook, PlannedRows, Point, PointQuantity};
+pub use outlook::{Outlook, OutlookPoint, PlannedRows, PointQuantity};
 pub use settings::Settings;
 
 /// Computes the posterior of every derivative. The order of the evidence within a flight, and of the
@@ -71,13 +71,14 @@ pub fn model(
     let all = [Axis::Longitudinal, Axis::Lateral].map(Axis::coefficients);
     let all: Vec<Coefficient> = all.into_iter().flatten().collect();
     let of = |coefficient: Coefficient| {
-        let points = basis.points(coefficient, &evidence);
+        let points = basis.count_points(coefficient, &evidence);
         if points > MOST_POINTS {
             return Some((coefficient, Err(Failure::TooManyPoints(points))));
         }
         let terms = basis.terms(coefficient, &evidence);
         let has_terms = !terms.is_empty();
-        let found = has_terms.then(|| CoefficientPosterior::of(terms, &evidence, &basis))?;
+        let found =
+            has_terms.then(|| CoefficientPosterior::from_terms(terms, &evidence, &basis))?;
         let rows = found.as_ref().map(|p| p.rows(coefficient, &evidence));
         Some((coefficient, found.zip(rows).ok_or(Failure::NotFinite)))
     };

@@ -1,25 +1,27 @@
-//! Evidence of a maneuver about a coefficient: differences of its estimates from the tunnel, as
-//! linear functions of the coefficient's unknown differences and of errors that maneuvers share.
+//! Evidence of a maneuver about a coefficient: differences of the maneuver's estimates from the
+//! tunnel. They are linear functions of the coefficient's unknown differences and of errors that
+//! maneuvers share.
 //!
-//! With f the differences at the maneuver's condition, an estimate differs from the tunnel by
+//! Let f be the differences of the derivatives at the maneuver's condition, and u the calibration
+//! errors, each with unit variance. The estimates differ from the tunnel by
 //!
-//! y = (S + G) f + K u + e,
+//! y = (S + G) f + K u + e.
 //!
-//! where S selects the estimated derivatives, G is the change of the estimates with the held
-//! values, K u the effect of calibration errors, and e has the rest of the corrected covariance.
-//! Nuisance parameters of the maneuver are marginalised: only the rows and columns of its estimates
-//! of this coefficient are used.
+//! S selects the estimated derivatives. G is the change of the estimates with the held values, and
+//! K with the calibration errors. e has the rest of the corrected covariance. Nuisance parameters
+//! of the maneuver are marginalised: only the rows and columns of its estimates of this coefficient
+//! are used.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::evidence::Evidence;
-use super::term::Term;
+use super::term::PosteriorTerm;
 use crate::aero::{Condition, WindTunnel};
 use crate::maneuver::Status;
 use crate::numerics::symmetric::{scale, scaled};
 use crate::output_error::error_effect::{ErrorEffect, SharedError};
 
-/// Least eigenvalue of a noise covariance at unit diagonal.
+/// Least eigenvalue of a noise covariance scaled to unit diagonal, so that it stays invertible.
 const LEAST_EIGENVALUE: f64 = 1e-6;
 
 /// Evidence of a maneuver about one coefficient.
@@ -39,7 +41,7 @@ pub struct Observation {
 }
 
 /// One row of an observation: an estimate, or the sum that replaces a constant.
-struct Row {
+struct ObservationRow {
     term: usize,
     /// Weights of the maneuver's parameters in the row.
     of_parameters: Vec<(usize, f64)>,
@@ -50,9 +52,9 @@ struct Row {
 impl Evidence<'_> {
     /// Evidence about a coefficient's terms; `None` if the maneuver estimates none of them.
     #[must_use]
-    pub fn about(&self, terms: &[Term], tunnel: &WindTunnel) -> Option<Observation> {
+    pub fn about(&self, terms: &[PosteriorTerm], tunnel: &WindTunnel) -> Option<Observation> {
         let condition = self.maneuver.condition(tunnel);
-        let rows: Vec<Row> = (0..terms.len())
+        let rows: Vec<ObservationRow> = (0..terms.len())
             .filter_map(|i| self.row(terms, i, tunnel, &condition))
             .collect();
         if rows.is_empty() {
@@ -86,7 +88,13 @@ impl Evidence<'_> {
         })
     }
 
-    fn row(&self, terms: &[Term], i: usize, tunnel: &WindTunnel, at: &Condition) -> Option<Row> {
+    fn row(
+        &self,
+        terms: &[PosteriorTerm],
+        i: usize,
+        tunnel: &WindTunnel,
+        at: &Condition,
+    ) -> Option<ObservationRow> {
         let term = &terms[i];
         let (own, mut value) = self.estimated(&term.derivative)?;
         let mut of_parameters = vec![(own, 1.0)];
@@ -100,14 +108,15 @@ impl Evidence<'_> {
             }
         }
         let known = tunnel.at(&term.prior.name, at).map_or(0.0, |t| t.value);
-        Some(Row {
+        Some(ObservationRow {
             term: i,
             of_parameters,
             difference: value - known,
         })
     }
 
-    /// Index among the parameters, and value, of an estimated derivative.
+    /// Index among the parameters and value of an estimated derivative; `None` if it is not
+    /// estimated.
     fn estimated(&self, name: &str) -> Option<(usize, f64)> {
         let place = self.covariance.names.iter().position(|n| n == name)?;
         let row = self.estimates.iter().find(|e| e.derivative == name)?;
@@ -121,7 +130,7 @@ impl Evidence<'_> {
         row.wind_tunnel
     }
 
-    fn matrix_of(&self, rows: &[Row]) -> DMatrix<f64> {
+    fn matrix_of(&self, rows: &[ObservationRow]) -> DMatrix<f64> {
         let mut matrix = DMatrix::zeros(rows.len(), self.covariance.names.len());
         for (i, row) in rows.iter().enumerate() {
             for &(parameter, weight) in &row.of_parameters {
@@ -131,7 +140,12 @@ impl Evidence<'_> {
         matrix
     }
 
-    fn design(&self, terms: &[Term], rows: &[Row], of_rows: &DMatrix<f64>) -> DMatrix<f64> {
+    fn design(
+        &self,
+        terms: &[PosteriorTerm],
+        rows: &[ObservationRow],
+        of_rows: &DMatrix<f64>,
+    ) -> DMatrix<f64> {
         let mut design = DMatrix::zeros(rows.len(), terms.len());
         for (i, row) in rows.iter().enumerate() {
             let term = &terms[row.term];
@@ -159,7 +173,7 @@ impl Evidence<'_> {
     /// its sum less that of the slope times α.
     pub fn add_derivative(
         &self,
-        terms: &[Term],
+        terms: &[PosteriorTerm],
         name: &str,
         effect: f64,
         row: usize,
@@ -197,8 +211,8 @@ fn is_held(effect: &ErrorEffect) -> bool {
     matches!(effect.error, SharedError::Held(_))
 }
 
-/// Covariance with the eigenvalues raised that are negative or tiny beside the variances of `whole`;
-/// `None` unless both are finite and these variances positive.
+/// Raises eigenvalues of a covariance that are negative, or tiny beside the variances of `whole`.
+/// `None` unless both matrices are finite and the variances of `whole` positive.
 fn floored(covariance: &DMatrix<f64>, whole: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let is_sound = covariance.iter().chain(whole.iter()).all(|v| v.is_finite())
         && whole.diagonal().iter().all(|v| *v > 0.0);

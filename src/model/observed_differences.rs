@@ -1,7 +1,4 @@
-//! Differences, at points of the grids, on which the data depend.
-//!
-//! The likelihood of the scales depends on these alone, and the mean at all other points follows
-//! from them.
+//! Differences at the points of the grids on which the data depend.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -9,7 +6,7 @@ use super::flight_data::Information;
 use super::posterior::inner_root;
 use super::prior_covariance::PriorCovariance;
 use super::scale_prior::{Scale, ScalePrior};
-use super::term::Term;
+use super::term::PosteriorTerm;
 use super::unknowns::Unknowns;
 use crate::numerics::root::{BlockRoot, root, root_of_some};
 use crate::numerics::symmetric::square;
@@ -25,11 +22,11 @@ pub struct ObservedDifferences {
 /// Differences of one term on which the data depend.
 #[derive(Clone, Debug)]
 pub struct ObservedTerm {
-    /// Index of the first of them among those of all terms.
+    /// Index of the term's first observed difference among the observed differences of all terms.
     pub start: usize,
-    /// Prior covariance between them.
+    /// Prior covariance between the observed differences.
     pub covariance: PriorCovariance,
-    /// Prior covariance between all of the term's differences and them.
+    /// Prior covariance between all differences of the term and the observed ones.
     with_all: PriorCovariance,
     /// Points of the term's grid.
     points: Vec<usize>,
@@ -37,7 +34,7 @@ pub struct ObservedTerm {
 }
 
 impl ObservedTerm {
-    /// Number of differences that the data touch.
+    /// Number of differences on which the data depend.
     #[must_use]
     pub fn len(&self) -> usize {
         self.points.len()
@@ -48,7 +45,7 @@ impl ObservedDifferences {
     /// Selects the differences about which there is information.
     #[must_use]
     pub fn new(
-        terms: &[Term],
+        terms: &[PosteriorTerm],
         unknowns: &Unknowns,
         information: &Information,
     ) -> ObservedDifferences {
@@ -84,18 +81,18 @@ impl ObservedDifferences {
     pub fn root(&self, scales: &[Scale], least: f64) -> BlockRoot {
         let mut whole = BlockRoot::default();
         for (term, scale) in self.terms.iter().zip(scales) {
-            whole.push(root(&term.covariance.at(scale), least));
+            whole.push(root(&term.covariance.for_scale(scale), least));
         }
         whole
     }
 
-    /// Mean of all differences for some scales.
+    /// Posterior mean of all differences for some scales.
     #[must_use]
     pub fn mean(&self, scales: &[Scale], least: f64) -> Option<DVector<f64>> {
         let Information { matrix, vector } = &self.information;
         let (mut root, mut of_all) = (BlockRoot::default(), BlockRoot::default());
         for (term, scale) in self.terms.iter().zip(scales) {
-            let with_all = root_of_some(&term.with_all.at(scale), &term.points, least);
+            let with_all = root_of_some(&term.with_all.for_scale(scale), &term.points, least);
             root.push(with_all.select_rows(&term.points));
             of_all.push(with_all);
         }
@@ -129,10 +126,10 @@ impl ObservedDifferences {
 /// Likelihood of scales, and the vectors and matrices from which its derivatives follow.
 #[derive(Clone, Debug)]
 pub struct Fit {
-    /// −log of the marginal likelihood, but for a constant.
+    /// Minus the log of the marginal likelihood, without constants.
     pub value: f64,
-    /// a = η − Λ P η.
+    /// Innovation a = η − Λ P η, in the symbols of [`scales`](super::scales).
     pub innovation: DVector<f64>,
-    /// M = Λ − Λ P Λ, the information of the innovations.
+    /// Information of the innovation, M = Λ − Λ P Λ.
     pub information: DMatrix<f64>,
 }

@@ -23,8 +23,8 @@ use super::posterior::Gaussian;
 use super::scale_prior::Scale;
 use super::scales::{LEAST_VARIANCE, logarithms_of, negative_log_posterior, scales_of};
 
-/// Least eigenvalue of H that is used, so that points stay where the prior allows scales: a little
-/// below 1/0.8² = 1.56, that of the widest prior of a scale.
+/// Least eigenvalue of H that is used, so that points stay where the prior allows scales. It is a
+/// little below 1/0.8² = 1.56, the second derivative of the widest prior of a scale.
 const LEAST_CURVATURE: f64 = 1.5;
 
 /// Weight of each outer point of the Gauss-Hermite rule.

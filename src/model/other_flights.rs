@@ -1,21 +1,24 @@
 //! Posterior of all flights but one.
 //!
-//! With K = Σ − A P Aᵀ of the flight's own rows, the posterior (m, P) of all flights becomes that of the
-//! others: m − P Aᵀ K⁻¹ (y − A m), P + P Aᵀ K⁻¹ A P.
+//! Let (m, P) be mean and covariance of the posterior from all flights, and y, A and Σ the
+//! differences, rows and error covariance of the flight to be left out ([`FlightData`]). With K = Σ
+//! − A P Aᵀ, the posterior of the other flights has
+//!
+//! mean m − P Aᵀ K⁻¹ (y − A m), covariance P + P Aᵀ K⁻¹ A P.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::flight_data::FlightData;
 use super::posterior::Gaussian;
-use super::unknowns::{SparseRow, between, sum};
+use super::unknowns::{SparseRow, covariance_between, weighted_sum};
 
-/// Posterior of the other flights, from the point of view of one flight.
+/// Posterior of all flights other than one.
 pub struct OtherFlights<'a> {
     whole: &'a Gaussian,
     own: Option<OwnRows<'a>>,
 }
 
-/// Rows of the flight itself: K and K⁻¹ (y − A m).
+/// Rows of the flight that is left out: factor of K, and K⁻¹ (y − A m).
 struct OwnRows<'a> {
     flight: &'a FlightData,
     root: Cholesky<f64, Dyn>,
@@ -23,7 +26,8 @@ struct OwnRows<'a> {
 }
 
 impl<'a> OtherFlights<'a> {
-    /// Posterior of all flights but one. `None` if a covariance is not positive definite.
+    /// Leaves out `flight`; without a flight the posterior stays whole. `None` if a covariance is
+    /// not positive definite.
     #[must_use]
     pub fn new(
         whole: &'a Gaussian,
@@ -44,19 +48,19 @@ impl<'a> OtherFlights<'a> {
         Some(OtherFlights { whole, own })
     }
 
-    /// Means and covariance of weighted sums of the unknowns.
+    /// Means and covariance of weighted sums of the unknowns, one sum per row.
     #[must_use]
-    pub fn of(&self, rows: &[SparseRow]) -> (DVector<f64>, DMatrix<f64>) {
+    pub fn means_and_covariance(&self, rows: &[SparseRow]) -> (DVector<f64>, DMatrix<f64>) {
         let Gaussian { mean, covariance } = self.whole;
-        let sums = rows.iter().map(|row| sum(row, mean));
+        let sums = rows.iter().map(|row| weighted_sum(row, mean));
         let mut values = DVector::from_iterator(rows.len(), sums);
         let mut spread = DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
-            between(&rows[i], &rows[j], covariance)
+            covariance_between(&rows[i], &rows[j], covariance)
         });
         if let Some(own) = &self.own {
             let own_rows = &own.flight.rows;
             let cross = DMatrix::from_fn(rows.len(), own_rows.len(), |i, j| {
-                between(&rows[i], &own_rows[j], covariance)
+                covariance_between(&rows[i], &own_rows[j], covariance)
             });
             values -= &cross * &own.weighted;
             spread += &cross * own.root.solve(&cross.transpose());

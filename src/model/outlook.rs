@@ -1,12 +1,13 @@
 //! Outlook: covariance of the posterior after planned maneuvers.
 //!
 //! The covariance of a Gaussian posterior follows from the design and the noise of its data, not
-//! from their values. With A the rows of the planned estimates over the unknowns, K the effects of
-//! the calibration errors of their common flight, B the rows of the quantities of interest, and P
-//! the posterior's covariance, an [`Outlook`] holds the covariance of (A z + K u, B z). A maneuver
-//! then observes its rows of A z + K u with its own noise.
+//! from their values. Let z be the unknowns, with the posterior's covariance P, and u the
+//! calibration errors of the common flight of the planned maneuvers. A are the rows of the planned
+//! estimates over z, K the effects of u on them, and B the rows of the quantities of interest. An
+//! [`Outlook`] holds the covariance of (A z + K u, B z). A maneuver then observes its rows of A z +
+//! K u with its own noise.
 //!
-//! Scales and weights remain those of the posterior; its spread over uncertain scales is in P. The
+//! Scales and weights are taken from the posterior; P includes the uncertainty of the scales. The
 //! values of the evidence have no effect, so it may have been computed with other held values.
 
 use std::collections::BTreeMap;
@@ -21,15 +22,15 @@ use super::local::{LocalValue, local_shares};
 use super::observation::Observation;
 use super::posterior::{gaussian, information};
 use super::settings::Settings;
-use super::term::{Term, TermSources, between_points};
-use super::unknowns::{SparseRow, Unknowns, between, is_of_campaign};
+use super::term::{PosteriorTerm, TermSources, between_points};
+use super::unknowns::{SparseRow, Unknowns, covariance_between, is_of_campaign};
 use crate::aero::{Buildup, Condition, WindTunnel};
 use crate::numerics::root::EXACT;
 use crate::output_error::error_effect::SharedError;
 
 /// Quantity at a flight condition.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Point {
+pub struct OutlookPoint {
     pub quantity: PointQuantity,
     pub condition: Condition,
 }
@@ -39,8 +40,8 @@ pub struct Point {
 pub enum PointQuantity {
     /// A derivative, or sum of derivatives, as published.
     Published(String),
-    /// Linear combination of the values of [`Model::at`]. Its variance is the sum of its variances in
-    /// each coefficient.
+    /// Linear combination of the values of [`Model::posterior_at_condition`]. Its variance is the
+    /// sum of its variances in each coefficient.
     Combination(Vec<(LocalValue, f64)>),
 }
 
@@ -66,13 +67,13 @@ pub struct Outlook {
 
 impl Model {
     /// Outlook of each coefficient on planned maneuvers of one flight and on points. `evidence`,
-    /// `buildup`, `tunnel` and `settings` are those of the posterior. A coefficient whose covariance
-    /// is not finite is left out.
+    /// `buildup`, `tunnel` and `settings` must be the ones from which the posterior was made. A
+    /// coefficient whose covariance is not finite is left out.
     #[must_use]
     pub fn outlook(
         &self,
         (evidence, planned): (&[Evidence], &[Evidence]),
-        points: &[Point],
+        points: &[OutlookPoint],
         (buildup, tunnel): (&Buildup, &WindTunnel),
         settings: &Settings,
     ) -> Vec<Outlook> {
@@ -90,13 +91,12 @@ impl Model {
 }
 
 impl Model {
-    /// Unit of a derivative or sum of the posterior, and the angles of attack at which the tunnel
-    /// tabulates it.
+    /// Unit and breakpoints in α of a derivative or sum; `None` if the posterior does not have it.
     #[must_use]
     pub fn breakpoints_deg(&self, derivative: &str) -> Option<(&'static str, &[f64])> {
         let all = self.coefficients.iter();
         let mut terms = all.flat_map(|(_, posterior)| &posterior.terms);
-        let own = |t: &&Term| t.prior.name == derivative || t.derivative == derivative;
+        let own = |t: &&PosteriorTerm| t.prior.name == derivative || t.derivative == derivative;
         let term = terms.find(own)?;
         Some((term.unit, &term.breakpoints_deg))
     }
@@ -113,11 +113,11 @@ impl CoefficientPosterior {
     fn outlook(
         &self,
         (evidence, planned): (&[Evidence], &[Evidence]),
-        points: &[Point],
+        points: &[OutlookPoint],
         basis: &TermSources,
     ) -> Option<Outlook> {
         let (mut data, observed) = Data::with_planned(&self.terms, evidence, planned, basis);
-        data.set_between(&self.terms, &self.noise_scales);
+        data.add_grid_noise(&self.terms, &self.noise_scales);
         let covariance = self.covariance(&data, evidence.len())?;
         let unknowns = &data.unknowns;
         let mut rows: Vec<SparseRow> = vec![];
@@ -140,7 +140,7 @@ impl CoefficientPosterior {
             .collect();
         rows.extend(asked.iter().map(|(_, row)| row.clone()));
         let mut joint = DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
-            between(&rows[i], &rows[j], &covariance)
+            covariance_between(&rows[i], &rows[j], &covariance)
         });
         let mut calibrated = joint.view_mut((0, 0), (of_planned, of_planned));
         calibrated += calibration(&observed, &own, of_planned);
@@ -152,8 +152,8 @@ impl CoefficientPosterior {
         })
     }
 
-    /// Covariance of the unknowns of the data, planned maneuvers included. For the differences the
-    /// spread of the posterior over uncertain scales is added.
+    /// Covariance of all unknowns, including the errors that planned maneuvers share. The
+    /// covariance of the differences includes the uncertainty of the scales.
     fn covariance(&self, data: &Data, maneuvers: usize) -> Option<DMatrix<f64>> {
         let mut weights = vec![1.0; maneuvers];
         for (place, weight) in &self.weights {
@@ -182,7 +182,7 @@ impl CoefficientPosterior {
 
     /// Row of a point over the unknowns; `None` for a point that does not depend on the
     /// coefficient.
-    fn row(&self, point: &Point, unknowns: &Unknowns) -> Option<SparseRow> {
+    fn row(&self, point: &OutlookPoint, unknowns: &Unknowns) -> Option<SparseRow> {
         match &point.quantity {
             PointQuantity::Published(name) => self.published_row(name, &point.condition, unknowns),
             PointQuantity::Combination(values) => {
@@ -204,7 +204,7 @@ impl CoefficientPosterior {
             let weighted = shares.into_iter();
             weighted.map(move |(node, share)| (start + node, weight * share))
         };
-        let place = |is: &dyn Fn(&Term) -> bool| self.terms.iter().position(is);
+        let place = |is: &dyn Fn(&PosteriorTerm) -> bool| self.terms.iter().position(is);
         if let Some(term) = place(&|t| t.prior.name == name) {
             return Some(of_term(term, 1.0).collect());
         }
@@ -235,14 +235,15 @@ impl CoefficientPosterior {
     }
 }
 
-/// Positive part of a symmetric matrix: rounding leaves tiny negative eigenvalues.
+/// Positive semidefinite part of a symmetric matrix, since rounding leaves tiny negative
+/// eigenvalues.
 fn positive(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let mut eigen = matrix.clone().symmetric_eigen();
     eigen.eigenvalues.apply(|value| *value = value.max(0.0));
     eigen.recompose()
 }
 
-/// K Kᵀ of the calibration errors that the planned maneuvers share with their flight.
+/// Covariance K Kᵀ from the calibration errors that the planned maneuvers share with their flight.
 fn calibration(
     observed: &[Option<(usize, Observation)>],
     placed: &[Option<PlannedRows>],

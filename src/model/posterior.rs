@@ -6,7 +6,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::flight_data::{FlightData, Information};
 use super::scale_prior::Scale;
-use super::term::Term;
+use super::term::PosteriorTerm;
 use super::unknowns::Unknowns;
 use crate::numerics::root::{BlockRoot, EXACT};
 use crate::numerics::symmetric::square;
@@ -33,33 +33,37 @@ pub fn information(flights: &[FlightData], weights: &[f64], unknowns: usize) -> 
     sums
 }
 
-/// Posterior of the unknowns with a prior covariance R Rᵀ: P = R (I + Rᵀ Λ R)⁻¹ Rᵀ, mean P η.
-pub struct Solved<'a> {
+/// Posterior of the unknowns for a prior covariance given by its root R.
+///
+/// With the information matrix Λ and vector η of the data ([`Information`]), the prior covariance R
+/// Rᵀ gives the posterior covariance P = R (I + Rᵀ Λ R)⁻¹ Rᵀ and the mean P η.
+pub struct SolvedPosterior<'a> {
     root: &'a BlockRoot,
-    /// L with L Lᵀ = I + Rᵀ Λ R.
+    /// Cholesky factor L of I + Rᵀ Λ R = L Lᵀ.
     lower: DMatrix<f64>,
 }
 
-impl<'a> Solved<'a> {
+impl<'a> SolvedPosterior<'a> {
     /// Posterior; `None` if the data are not finite.
     #[must_use]
-    pub fn new(root: &'a BlockRoot, information: &Information) -> Option<Solved<'a>> {
+    pub fn new(root: &'a BlockRoot, information: &Information) -> Option<SolvedPosterior<'a>> {
         let lower = inner_root(root.right(&root.left(&information.matrix)))?;
-        Some(Solved { root, lower })
+        Some(SolvedPosterior { root, lower })
     }
 
-    /// L⁻¹ Rᵀ A of some columns A over the unknowns.
-    fn halves(&self, mut columns: DMatrix<f64>) -> DMatrix<f64> {
+    /// Product L⁻¹ Rᵀ A for some columns A over the unknowns, from which Aᵀ P A follows as its
+    /// square.
+    fn whitened_columns(&self, mut columns: DMatrix<f64>) -> DMatrix<f64> {
         solve_lower(self.lower.as_view(), columns.as_view_mut());
         columns
     }
 
-    /// P.
+    /// Covariance P of the unknowns.
     fn covariance(&self) -> DMatrix<f64> {
-        square(&self.halves(self.root.transposed()))
+        square(&self.whitened_columns(self.root.transposed()))
     }
 
-    /// Means and covariance of a flight's rows.
+    /// Means and covariance that the posterior gives for a flight's rows.
     #[must_use]
     pub fn image(
         &self,
@@ -67,14 +71,14 @@ impl<'a> Solved<'a> {
         information: &Information,
     ) -> (DVector<f64>, DMatrix<f64>) {
         let columns = flight.columns(information.vector.len());
-        let halves = self.halves(self.root.left(&columns));
+        let halves = self.whitened_columns(self.root.left(&columns));
         let mut seen = self.root.left_of(&information.vector);
         self.lower.solve_lower_triangular_mut(&mut seen);
         (halves.tr_mul(&seen), square(&halves))
     }
 }
 
-/// L with L Lᵀ = I + Rᵀ Λ R, from Rᵀ Λ R.
+/// Cholesky factor L of I + Rᵀ Λ R = L Lᵀ, from `inner` = Rᵀ Λ R.
 #[must_use]
 pub fn inner_root(mut inner: DMatrix<f64>) -> Option<DMatrix<f64>> {
     for j in 0..inner.nrows() {
@@ -86,7 +90,7 @@ pub fn inner_root(mut inner: DMatrix<f64>) -> Option<DMatrix<f64>> {
 /// Gaussian with a prior covariance R Rᵀ. `None` if the data are not finite.
 #[must_use]
 pub fn gaussian(root: &BlockRoot, information: &Information) -> Option<Gaussian> {
-    let covariance = Solved::new(root, information)?.covariance();
+    let covariance = SolvedPosterior::new(root, information)?.covariance();
     let mean = &covariance * &information.vector;
     mean.iter()
         .all(|v| v.is_finite())
@@ -110,29 +114,38 @@ pub fn of_differences(information: &Information, unknowns: &Unknowns) -> Option<
     })
 }
 
-/// Prediction of rows that were left out: the observed value less the prediction from the others,
-/// with the covariance of that difference.
+/// Differences of rows that were left out from their prediction by the other rows, with the
+/// covariance of these differences.
 #[derive(Clone, Debug)]
 pub struct LeftOut {
     pub differences: DVector<f64>,
     pub covariance: DMatrix<f64>,
 }
 
-/// Predictions of a flight's rows without these rows, in closed form.
+/// Predictions of a flight's rows from all other data, in closed form.
 ///
-/// With F = A P Aᵀ of the whole posterior and r = y − A m, the rows left out have the precision V⁻¹
-/// = Σ⁻¹ − Σ⁻¹ F Σ⁻¹ and the difference V Σ⁻¹ r. For some of the flight's rows the same holds with
-/// their part of V⁻¹.
+/// | symbol | quantity |
+/// |---|---|
+/// | y, A | differences of the flight's estimates from the tunnel, and their rows over the unknowns |
+/// | m, P | mean and covariance of the posterior from all data |
+/// | r = y − A m | residual of the rows |
+/// | Σ | covariance of the errors of y |
+/// | F = A P Aᵀ | covariance of the fitted values A m |
+/// | V | covariance of y less its prediction from the other data |
+///
+/// If the flight is left out, y less its prediction has the precision V⁻¹ = Σ⁻¹ − Σ⁻¹ F Σ⁻¹ and the
+/// value V Σ⁻¹ r. If only some of its rows are left out, their blocks of V⁻¹ and Σ⁻¹ r replace the
+/// whole ones.
 #[derive(Clone, Debug)]
 pub struct LeavingOut {
-    /// V⁻¹.
+    /// Precision V⁻¹.
     precision: DMatrix<f64>,
-    /// Σ⁻¹ r.
+    /// Weighted residual Σ⁻¹ r.
     weighted: DVector<f64>,
 }
 
 impl LeavingOut {
-    /// Predictions of a flight's rows; `None` unless their covariance is positive definite.
+    /// Prepares the predictions for a flight; `None` unless its covariances are positive definite.
     #[must_use]
     pub fn new(flight: &FlightData, weights: &[f64], whole: &Gaussian) -> Option<LeavingOut> {
         let (predicted, spread) = flight.image(&whole.mean, &whole.covariance);
@@ -143,13 +156,13 @@ impl LeavingOut {
         })
     }
 
-    /// The flight, predicted from the other flights.
+    /// Difference of all rows of the flight from their prediction by the other flights.
     #[must_use]
     pub fn flight(&self) -> Option<LeftOut> {
         self.rows(&(0..self.weighted.len()))
     }
 
-    /// Some rows, predicted from all others.
+    /// Difference of some rows from their prediction by all other rows.
     #[must_use]
     pub fn rows(&self, rows: &Range<usize>) -> Option<LeftOut> {
         let own = (rows.start, rows.start);
@@ -165,8 +178,9 @@ impl LeavingOut {
 /// Weights of the maneuvers by Student's t: a maneuver far from its prediction by all others has a
 /// lower weight.
 ///
-/// Each is compared at its full weight: with V of the prediction less the noise that its weight
-/// added.
+/// A weight w below one has added 1/w − 1 times the maneuver's noise to the covariance of its
+/// difference. This part is subtracted before the comparison, so each maneuver is compared at full
+/// weight.
 #[must_use]
 pub fn reweighted(
     flights: &[FlightData],
@@ -196,10 +210,10 @@ pub fn reweighted(
 
 /// Prior covariance of the differences.
 #[must_use]
-pub fn prior(unknowns: &Unknowns, terms: &[Term], scales: &[Scale]) -> DMatrix<f64> {
+pub fn prior(unknowns: &Unknowns, terms: &[PosteriorTerm], scales: &[Scale]) -> DMatrix<f64> {
     let mut whole = DMatrix::zeros(unknowns.differences, unknowns.differences);
     for ((term, scale), &start) in terms.iter().zip(scales).zip(&unknowns.starts) {
-        let own = term.prior.covariance.at(scale);
+        let own = term.prior.covariance.for_scale(scale);
         whole.view_mut((start, start), own.shape()).copy_from(&own);
     }
     whole

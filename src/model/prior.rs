@@ -1,13 +1,21 @@
 //! Prior of one derivative's difference from the tunnel: a Gaussian process over the flight
 //! condition (Kennedy and O'Hagan 2001).
 //!
-//! With f the difference, t the tunnel's table over its root mean square ρ, s the relative size and ℓ
-//! the length of the difference,
+//! | symbol | quantity |
+//! |---|---|
+//! | f(α) | difference at the angle of attack α, in the derivative's unit |
+//! | ρ | root mean square of the tunnel's table, in the derivative's unit |
+//! | t | tunnel's value over ρ, at α; t′ at α′ |
+//! | s | relative size of the difference |
+//! | ℓ | length of the difference, deg |
+//! | M(d) | Matérn correlation of order 3/2 at the distance d in lengths |
 //!
-//! cov f(α), f(α′) = s² ρ² (½ + ½ t t′) · ⅘ (M(|α − α′|/ℓ) + ¼),  M(d) = (1 + √3 d) exp(−√3 d).
+//! With M(d) = (1 + √3 d) exp(−√3 d), the covariance is
 //!
-//! Half of the difference scales with the table, half does not. The quarter is an offset common to all
-//! angles of attack. Where the table states its uncertainty u, u u′ stands for ρ² (½ + ½ t t′).
+//! cov f(α), f(α′) = s² ρ² (½ + ½ t t′) · ⅘ (M(|α − α′|/ℓ) + ¼).
+//!
+//! Half of the difference scales with the table, half does not. The quarter is an offset common to
+//! all angles of attack. Where the table states its uncertainty u, u u′ stands for ρ² (½ + ½ t t′).
 //! Across Mach number and third variable M falls over the range of the table.
 
 use nalgebra::DMatrix;
@@ -20,7 +28,7 @@ use crate::tables::Knowledge;
 
 /// Prior of one derivative, or sum of derivatives.
 #[derive(Clone, Debug)]
-pub struct Prior {
+pub struct DerivativePrior {
     pub name: String,
     pub known: Knowledge,
     pub grid: Grid,
@@ -34,7 +42,7 @@ pub struct Prior {
 
 /// Tunnel's table of a derivative, read at the points of a grid.
 #[derive(Clone, Debug)]
-pub struct Table {
+pub struct TableOnGrid {
     pub known: Knowledge,
     pub mean: Vec<f64>,
     /// Stated uncertainty at each point.
@@ -43,9 +51,9 @@ pub struct Table {
     pub size: f64,
 }
 
-impl Prior {
+impl DerivativePrior {
     #[must_use]
-    pub fn new(name: String, grid: Grid, table: Table, centre: Scale) -> Prior {
+    pub fn new(name: String, grid: Grid, table: TableOnGrid, centre: Scale) -> DerivativePrior {
         let nodes = grid.nodes();
         let n = nodes.len();
         let shape = |i: usize, j: usize| match table.known {
@@ -64,7 +72,7 @@ impl Prior {
             }),
             across: DMatrix::from_fn(n, n, |i, j| across(&nodes[i], &nodes[j])),
         };
-        Prior {
+        DerivativePrior {
             covariance,
             scale: ScalePrior::new(centre, table.known),
             name,
@@ -77,7 +85,7 @@ impl Prior {
     /// Variance of the difference at a condition about the straight line between the neighbouring
     /// points of the grid.
     #[must_use]
-    pub fn between(&self, scale: &Scale, at: &Condition) -> f64 {
+    pub fn variance_between_points(&self, scale: &Scale, at: &Condition) -> f64 {
         let shares = self.grid.shares(at);
         let nodes = self.grid.nodes();
         let PriorCovariance {

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 
 use super::scale_prior::Scale;
 
-/// Share of the offset, relative to the part that fades over α.
+/// Variance of the offset over the variance of the part that fades over α.
 const OFFSET: f64 = 0.25;
 
 /// Covariance between two lists of points.
@@ -19,10 +19,10 @@ pub struct PriorCovariance {
     pub across: DMatrix<f64>,
 }
 
-/// Covariance of a scale with its derivatives by the logarithm of the length. The derivatives by
-/// the logarithm of the size are twice the same matrices.
+/// Covariance for a scale, with its first and second derivative by the logarithm of the length. The
+/// derivative of each by the logarithm of the size is twice the matrix itself.
 #[derive(Clone, Debug)]
-pub struct Slopes {
+pub struct CovarianceSlopes {
     pub value: DMatrix<f64>,
     pub by_length: DMatrix<f64>,
     pub by_length_twice: DMatrix<f64>,
@@ -46,7 +46,7 @@ impl PriorCovariance {
 
     /// Covariance for a scale.
     #[must_use]
-    pub fn at(&self, scale: &Scale) -> DMatrix<f64> {
+    pub fn for_scale(&self, scale: &Scale) -> DMatrix<f64> {
         let factor = variance_factor(scale);
         self.for_each_pair(|at| {
             let fading = fading(self.distance[at] / scale.length_deg) * self.across[at];
@@ -57,13 +57,13 @@ impl PriorCovariance {
     /// Covariance for a scale with its derivatives. With r = √3 d/ℓ, dM/d ln ℓ = −r dM/dr = r² exp(−r), and
     /// d²M/(d ln ℓ)² = (r³ − 2 r²) exp(−r).
     #[must_use]
-    pub fn slopes(&self, scale: &Scale) -> Slopes {
+    pub fn slopes(&self, scale: &Scale) -> CovarianceSlopes {
         let factor = variance_factor(scale);
         let r = self.distance.map(|d| 3f64.sqrt() * d / scale.length_deg);
         let faded = r.map(|r| (-r).exp());
         let fading = |at| factor * self.shape[at] * self.across[at] * faded[at];
         let offset = |at| factor * self.shape[at] * OFFSET;
-        Slopes {
+        CovarianceSlopes {
             value: self.for_each_pair(|at| fading(at) * (1.0 + r[at]) + offset(at)),
             by_length: self.for_each_pair(|at| fading(at) * r[at] * r[at]),
             by_length_twice: self.for_each_pair(|at| fading(at) * r[at] * r[at] * (r[at] - 2.0)),
@@ -76,7 +76,8 @@ impl PriorCovariance {
     }
 }
 
-/// Variance over that of unit size, so that the variance at a point is s² times its shape.
+/// Factor of `shape` for a size s: s² over the correlation 1 + `OFFSET` at distance zero, so that
+/// the variance at a point is s² times its shape.
 #[must_use]
 pub fn variance_factor(scale: &Scale) -> f64 {
     scale.size * scale.size / (1.0 + OFFSET)

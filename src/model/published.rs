@@ -4,8 +4,8 @@ use nalgebra::DVector;
 
 use super::coefficient::CoefficientPosterior;
 use super::grid::Node;
-use super::term::Term;
-use super::unknowns::{SparseRow, between, sum};
+use super::term::PosteriorTerm;
+use super::unknowns::{SparseRow, covariance_between, weighted_sum};
 use crate::tables::Knowledge;
 
 /// A published derivative or sum over the points of its grid: tunnel + rows · differences.
@@ -14,12 +14,12 @@ pub struct PublishedDerivative {
     pub name: String,
     pub unit: &'static str,
     pub nodes: Vec<Node>,
-    /// Index of the term whose grid it has.
+    /// Index of the term that has the same grid.
     pub term: usize,
     /// Tunnel's values; zero at points without one.
     pub tunnel: Vec<f64>,
     pub has_tunnel: bool,
-    /// Weights of the differences, point by point.
+    /// Weights of the differences in the value, point by point.
     pub rows: Vec<SparseRow>,
 }
 
@@ -35,7 +35,7 @@ impl CoefficientPosterior {
         quantities
     }
 
-    fn of_term(&self, i: usize, term: &Term) -> PublishedDerivative {
+    fn of_term(&self, i: usize, term: &PosteriorTerm) -> PublishedDerivative {
         let start = self.unknowns.starts[i];
         PublishedDerivative {
             name: term.prior.name.clone(),
@@ -51,7 +51,7 @@ impl CoefficientPosterior {
     }
 
     /// Constant of a sum: the sum less the slope times α.
-    fn constant(&self, i: usize, term: &Term) -> Option<PublishedDerivative> {
+    fn constant(&self, i: usize, term: &PosteriorTerm) -> Option<PublishedDerivative> {
         let slope = term.slope.as_ref()?;
         let j = self.terms.iter().position(|t| t.derivative == *slope)?;
         let slope = &self.terms[j].prior;
@@ -83,9 +83,10 @@ impl CoefficientPosterior {
     ) -> f64 {
         let covariance = &self.gaussian.covariance;
         let correlation = |(a, b): (&SparseRow, &SparseRow)| {
-            let variances = between(a, a, covariance) * between(b, b, covariance);
+            let variances =
+                covariance_between(a, a, covariance) * covariance_between(b, b, covariance);
             if variances > 0.0 {
-                between(a, b, covariance) / variances.sqrt()
+                covariance_between(a, b, covariance) / variances.sqrt()
             } else {
                 0.0
             }
@@ -106,12 +107,12 @@ impl CoefficientPosterior {
 }
 
 impl PublishedDerivative {
-    /// Value at each point, of given differences from the tunnel.
+    /// Value at each point for given differences from the tunnel.
     #[must_use]
     pub fn values(&self, differences: &DVector<f64>) -> Vec<f64> {
         let points = self.rows.iter().zip(&self.tunnel);
         points
-            .map(|(row, tunnel)| tunnel + sum(row, differences))
+            .map(|(row, tunnel)| tunnel + weighted_sum(row, differences))
             .collect()
     }
 }

@@ -7,16 +7,16 @@ use super::evidence::Evidence;
 use super::posterior::prior;
 use super::published::PublishedDerivative;
 use super::self_check::Agreement;
-use super::unknowns::between;
+use super::unknowns::covariance_between;
 use crate::aero::Coefficient;
 use crate::numerics::student::NORMAL_95;
 use crate::tables::{
     ContributionRow, CovarianceRow, LeftOutKind, PosteriorRow, ScaleRow, SelfCheckRow,
 };
 
-/// Tables of one coefficient.
+/// Rows of one coefficient in each of the posterior's tables.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Rows {
+pub struct CoefficientTables {
     pub posterior: Vec<PosteriorRow>,
     pub covariance: Vec<CovarianceRow>,
     pub scales: Vec<ScaleRow>,
@@ -24,9 +24,9 @@ pub struct Rows {
     pub self_check: Vec<SelfCheckRow>,
 }
 
-impl Rows {
+impl CoefficientTables {
     /// Appends the rows of another coefficient.
-    pub fn append(&mut self, other: Rows) {
+    pub fn append(&mut self, other: CoefficientTables) {
         self.posterior.extend(other.posterior);
         self.covariance.extend(other.covariance);
         self.scales.extend(other.scales);
@@ -38,14 +38,14 @@ impl Rows {
 impl CoefficientPosterior {
     /// Rows of all tables.
     #[must_use]
-    pub fn rows(&self, coefficient: Coefficient, evidence: &[Evidence]) -> Rows {
+    pub fn rows(&self, coefficient: Coefficient, evidence: &[Evidence]) -> CoefficientTables {
         let alphas: Vec<f64> = evidence.iter().map(|e| e.maneuver.alpha_deg).collect();
         let quantities = self.quantities();
         let before = prior(&self.unknowns, &self.terms, &self.scales);
         let posterior = quantities
             .iter()
             .flat_map(|q| self.posterior(q, &before, &alphas));
-        Rows {
+        CoefficientTables {
             posterior: posterior.collect(),
             covariance: self.covariance_rows(),
             scales: self.scale_rows(),
@@ -63,9 +63,9 @@ impl CoefficientPosterior {
         let values = self.values(quantity);
         let row = |i: usize| {
             let (node, own) = (&quantity.nodes[i], &quantity.rows[i]);
-            let variance = between(own, own, &self.gaussian.covariance).max(0.0);
+            let variance = covariance_between(own, own, &self.gaussian.covariance).max(0.0);
             let deviation = variance.sqrt();
-            let known = between(own, own, before);
+            let known = covariance_between(own, own, before);
             PosteriorRow {
                 derivative: quantity.name.clone(),
                 unit: quantity.unit.to_owned(),

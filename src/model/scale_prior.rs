@@ -14,7 +14,7 @@ const SPREAD_OF_LENGTH: f64 = 0.5;
 /// Size and length of a difference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
-    /// Size over that of the table, or over its stated uncertainty.
+    /// Size of the difference over the size of the table, or over the stated uncertainty.
     pub size: f64,
     pub length_deg: f64,
 }
@@ -27,8 +27,8 @@ pub struct ScalePrior {
     spreads: [f64; 2],
 }
 
-/// −log of the prior of a scale, with its first and second derivatives by the logarithms of size and
-/// length. The mixed ones are zero.
+/// Minus the log of the prior of a scale, with its first and second derivatives by the logarithms
+/// of size and length. The mixed derivatives are zero.
 #[derive(Clone, Copy, Debug)]
 pub struct Penalty {
     pub value: f64,

@@ -1,9 +1,9 @@
 //! Most probable scales of the differences between flight and tunnel.
 //!
-//! The difference of a derivative from the tunnel is a random function of the flight condition, with
-//! two *scales*: its size, as a multiple of the table's size or of its stated uncertainty, and the
-//! length in deg of α over which it changes. The most probable scales have the largest product of
-//! prior and marginal likelihood of all estimates.
+//! The difference of a derivative from the tunnel is a random function of the flight condition with
+//! two *scales*. The size is a multiple of the table's size, or of the table's stated uncertainty.
+//! The length is the change of α, in deg, over which the difference changes. The most probable
+//! scales have the largest product of prior and marginal likelihood of all estimates.
 //!
 //! | symbol | quantity |
 //! |---|---|
@@ -27,19 +27,19 @@
 //!
 //! f_ij = −½ tr(M C_i M C_j) + aᵀ C_i M C_j a + ½ tr(M C_ij) − ½ aᵀ C_ij a.
 //!
-//! The expectation of f_ij over data that the scales predict is ½ tr(M C_i M C_j), since that of
-//! a aᵀ is M. This expectation is never negative; it replaces f_ij where f_ij is not positive
+//! The expectation of f_ij over data that the scales predict is ½ tr(M C_i M C_j), since that of a
+//! aᵀ is M. This expectation is never negative; it replaces f_ij where f_ij is not positive
 //! definite.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::observed_differences::{Fit, ObservedDifferences, ObservedTerm};
 use super::scale_prior::Scale;
-use super::term::Term;
+use super::term::PosteriorTerm;
 use crate::numerics::minimise::{LocalExpansion, minimum};
 
-/// Share of a term's largest prior variance below which a direction of its differences is ignored:
-/// it changes a difference by at most a thousandth of its standard deviation.
+/// Share of a term's largest prior variance below which a direction of its differences is ignored.
+/// Such a direction changes a difference by at most a thousandth of its standard deviation.
 pub const LEAST_VARIANCE: f64 = 1e-6;
 
 /// Largest number of Newton steps of the search for the scales.
@@ -50,7 +50,7 @@ const TOLERANCE: f64 = 0.01;
 
 /// Medians of the priors of all scales, from which the search starts.
 #[must_use]
-pub fn centres(terms: &[Term]) -> Vec<Scale> {
+pub fn centres(terms: &[PosteriorTerm]) -> Vec<Scale> {
     terms.iter().map(|t| t.prior.scale.centre).collect()
 }
 
@@ -93,7 +93,9 @@ pub fn negative_log_posterior(
 ) -> Option<LocalExpansion> {
     let fit = observed.fit(scales, least)?;
     let both = observed.terms.iter().zip(scales);
-    let changes: Vec<Changes> = both.map(|(t, s)| Changes::new(t, s, &fit)).collect();
+    let changes: Vec<TermDerivatives> = both
+        .map(|(t, s)| TermDerivatives::new(t, s, &fit))
+        .collect();
     let n = 2 * changes.len();
     let mut local = LocalExpansion {
         value: fit.value,
@@ -115,19 +117,18 @@ pub fn negative_log_posterior(
 
 /// Products of one term's C_i from which the derivatives of f along its size and length follow. C is
 /// proportional to the square of the size, so its derivative along log size is 2 C.
-struct Changes<'a> {
+struct TermDerivatives<'a> {
     term: &'a ObservedTerm,
-    /// Columns of M C_i at the term's differences, along log size and log length.
-    images: [DMatrix<f64>; 2],
-    /// C_i a, along log size and log length.
-    moved: [DVector<f64>; 2],
-    /// ½ tr(M X) − ½ aᵀ X a, with X the covariance C, its first and its second derivative along log
-    /// length.
-    halves: [f64; 3],
+    /// M C_i for log size and log length, at the columns of the term's differences.
+    information_changes: [DMatrix<f64>; 2],
+    /// C_i a for log size and log length.
+    innovation_changes: [DVector<f64>; 2],
+    /// ½ tr(M X) − ½ aᵀ X a, where X is C, its first and its second derivative along log length.
+    cost_slopes: [f64; 3],
 }
 
-impl<'a> Changes<'a> {
-    fn new(term: &'a ObservedTerm, scale: &Scale, fit: &Fit) -> Changes<'a> {
+impl<'a> TermDerivatives<'a> {
+    fn new(term: &'a ObservedTerm, scale: &Scale, fit: &Fit) -> TermDerivatives<'a> {
         let slopes = term.covariance.slopes(scale);
         let (start, n) = (term.start, term.len());
         let columns = fit.information.columns(start, n);
@@ -135,19 +136,19 @@ impl<'a> Changes<'a> {
         let a = fit.innovation.rows(start, n);
         let half = |c: &DMatrix<f64>| 0.5 * own.dot(c) - 0.5 * a.dot(&(c * a));
         let halves = [&slopes.value, &slopes.by_length, &slopes.by_length_twice].map(half);
-        Changes {
-            images: [2.0 * columns * &slopes.value, columns * &slopes.by_length],
-            moved: [2.0 * &slopes.value * a, &slopes.by_length * a],
-            halves,
+        TermDerivatives {
+            information_changes: [2.0 * columns * &slopes.value, columns * &slopes.by_length],
+            innovation_changes: [2.0 * &slopes.value * a, &slopes.by_length * a],
+            cost_slopes: halves,
             term,
         }
     }
 
-    /// Adds to the second derivatives of f the terms with M C_i M C_j, for i of this term and j of an
-    /// earlier term or the same one.
+    /// Adds the parts with M C_i M C_j to the second derivatives of f. i is a scale of this term, j
+    /// a scale of an earlier term or of the same one.
     fn add_pair(
         &self,
-        other: &Changes,
+        other: &TermDerivatives,
         fit: &Fit,
         (i, j): (usize, usize),
         local: &mut LocalExpansion,
@@ -156,10 +157,10 @@ impl<'a> Changes<'a> {
         let at = (own.start, before.start);
         let between = fit.information.view(at, (own.len(), before.len()));
         for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            let image = other.images[b].rows(own.start, own.len());
-            let back = self.images[a].rows(before.start, before.len());
+            let image = other.information_changes[b].rows(own.start, own.len());
+            let back = self.information_changes[a].rows(before.start, before.len());
             let trace = 0.5 * image.dot(&back.transpose());
-            let square = self.moved[a].dot(&(between * &other.moved[b]));
+            let square = self.innovation_changes[a].dot(&(between * &other.innovation_changes[b]));
             for place in [(i + a, j + b), (j + b, i + a)] {
                 local.expected[place] = trace;
                 local.curvature[place] = square - trace;
@@ -170,7 +171,7 @@ impl<'a> Changes<'a> {
     /// Adds the first derivatives of f, the terms of f_ij with C_ij, and the prior of this term's
     /// scales.
     fn add_single(&self, scale: &Scale, i: usize, local: &mut LocalExpansion) {
-        let [value, by_length, by_length_twice] = self.halves;
+        let [value, by_length, by_length_twice] = self.cost_slopes;
         let penalty = self.term.scale.penalty(scale);
         local.value += penalty.value;
         local.gradient[i] = 2.0 * value + penalty.gradient[0];

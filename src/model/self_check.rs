@@ -1,10 +1,10 @@
 //! Self-check of the model, without a truth: each flight is predicted from the others, and each
-//! class from the other classes. Scales and weights are those of all data.
+//! class from the other classes. Scales and weights are taken from all data.
 
 use nalgebra::{Cholesky, DVector};
 
 use super::flight_data::FlightData;
-use super::posterior::{Gaussian, LeavingOut, LeftOut, Solved, information};
+use super::posterior::{Gaussian, LeavingOut, LeftOut, SolvedPosterior, information};
 use crate::numerics::root::BlockRoot;
 use crate::numerics::student::NORMAL_95;
 
@@ -13,7 +13,7 @@ use crate::numerics::student::NORMAL_95;
 pub struct Agreement {
     /// Number of estimates.
     pub estimates: usize,
-    /// Number of them inside their 95 % interval.
+    /// Number of estimates inside the 95 % interval of their prediction.
     pub inside: usize,
     /// Log density of the estimates, each in its own unit.
     pub log_density: f64,
@@ -68,7 +68,7 @@ pub fn maneuvers(
     let others = flights.iter().map(|f| f.of_maneuvers(|m| !is_left_out(m)));
     let others: Vec<FlightData> = others.filter(|f| !f.rows.is_empty()).collect();
     let sums = information(&others, weights, unknowns);
-    let rest = Solved::new(root, &sums)?;
+    let rest = SolvedPosterior::new(root, &sums)?;
     let mut sum = Agreement::default();
     for flight in flights {
         let own = flight.of_maneuvers(&is_left_out);

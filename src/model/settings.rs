@@ -14,8 +14,8 @@ settings! {
         /// Angle of attack over which a derivative's difference from the tunnel changes, deg: centre
         /// of its prior. Flight decides for each derivative.
         pub length_deg: f64 = 15.0,
-        /// Error that all maneuvers of a class share beyond those that are known, in bounds of one
-        /// maneuver. Larger: repeats of a class teach less.
+        /// Error that all maneuvers of a class share beyond the errors that are modelled, in bounds
+        /// of one maneuver. Larger: repeats of a class weigh less.
         pub class_error: f64 = 0.5,
         /// Degrees of freedom of the distribution of a maneuver's errors. Smaller: a maneuver that
         /// the others contradict weighs less.

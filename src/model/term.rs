@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::evidence::Evidence;
 use super::grid::{Grid, refined};
-use super::prior::{Prior, Table};
+use super::prior::{DerivativePrior, TableOnGrid};
 use super::scale_prior::Scale;
 use super::settings::Settings;
 use crate::aero::{Buildup, Coefficient, Condition, Derivative, Regressor, WindTunnel};
@@ -16,15 +16,15 @@ use crate::maneuver::Status;
 use crate::numerics::order_statistics::median;
 use crate::tables::Knowledge;
 
-/// One unknown of a coefficient.
+/// Derivative or sum of one coefficient, whose difference from the tunnel is unknown over its grid.
 #[derive(Clone, Debug)]
-pub struct Term {
+pub struct PosteriorTerm {
     /// Derivative of the model that the term is or replaces.
     pub derivative: String,
     /// Slope of the sum that replaces its constant; `None` for a derivative itself.
     pub slope: Option<String>,
     pub unit: &'static str,
-    pub prior: Prior,
+    pub prior: DerivativePrior,
     /// Tunnel's breakpoints; without a table, all points of the grid.
     pub breakpoints_deg: Vec<f64>,
 }
@@ -33,13 +33,13 @@ pub struct Term {
 /// of their grids; one sum per row of `design`.
 #[must_use]
 pub fn between_points(
-    terms: &[Term],
+    terms: &[PosteriorTerm],
     scales: &[Scale],
     design: &DMatrix<f64>,
     condition: &Condition,
 ) -> DMatrix<f64> {
     let both = terms.iter().zip(scales);
-    let variances = both.map(|(t, s)| t.prior.between(s, condition));
+    let variances = both.map(|(t, s)| t.prior.variance_between_points(s, condition));
     let variances = DVector::from_iterator(terms.len(), variances);
     design * DMatrix::from_diagonal(&variances) * design.transpose()
 }
@@ -56,7 +56,7 @@ pub struct TermSources<'a> {
 impl TermSources<'_> {
     /// Terms of a coefficient, in the order of the model.
     #[must_use]
-    pub fn terms(&self, coefficient: Coefficient, evidence: &[Evidence]) -> Vec<Term> {
+    pub fn terms(&self, coefficient: Coefficient, evidence: &[Evidence]) -> Vec<PosteriorTerm> {
         let of_coefficient = |d: &&Derivative| d.coefficient == coefficient;
         let derivatives = self.buildup.derivatives.iter().filter(of_coefficient);
         let alphas = self.alphas_deg(coefficient, evidence);
@@ -65,9 +65,10 @@ impl TermSources<'_> {
             .collect()
     }
 
-    /// Number of points of a coefficient's grids: an upper limit, found without making them.
+    /// Upper limit of the number of points of a coefficient's grids, found without making the
+    /// grids.
     #[must_use]
-    pub fn points(&self, coefficient: Coefficient, evidence: &[Evidence]) -> usize {
+    pub fn count_points(&self, coefficient: Coefficient, evidence: &[Evidence]) -> usize {
         let derivatives = self.buildup.derivatives.iter();
         let alphas = self.alphas_deg(coefficient, evidence).len();
         derivatives
@@ -114,7 +115,12 @@ impl TermSources<'_> {
         refined(tabulated.into_iter().chain(below).chain(above), step)
     }
 
-    fn term(&self, derivative: &Derivative, alphas: &[f64], evidence: &[Evidence]) -> Option<Term> {
+    fn term(
+        &self,
+        derivative: &Derivative,
+        alphas: &[f64],
+        evidence: &[Evidence],
+    ) -> Option<PosteriorTerm> {
         let is_constant = derivative.regressor == Regressor::Constant;
         let sum = self.buildup.combined.iter();
         let mut sum = sum.clone().find(|c| c.constant == derivative.name);
@@ -137,8 +143,8 @@ impl TermSources<'_> {
         if breakpoints_deg.is_empty() {
             breakpoints_deg = alphas.to_vec();
         }
-        let prior = Prior::new(name.clone(), grid, table, Scale { size, length_deg });
-        Some(Term {
+        let prior = DerivativePrior::new(name.clone(), grid, table, Scale { size, length_deg });
+        Some(PosteriorTerm {
             derivative: derivative.name.clone(),
             slope: sum.map(|s| s.slope.clone()),
             unit: self.buildup.unit_of(name)?.name(),
@@ -149,7 +155,7 @@ impl TermSources<'_> {
 
     /// Tunnel's table over a grid, and the centre of the difference's relative size. A derivative
     /// without table gets the order of magnitude of its estimates; `None` without estimates.
-    fn table(&self, name: &str, grid: &Grid, evidence: &[Evidence]) -> Option<(Table, f64)> {
+    fn table(&self, name: &str, grid: &Grid, evidence: &[Evidence]) -> Option<(TableOnGrid, f64)> {
         let read = |node: super::grid::Node| self.tunnel.at(name, &node.condition());
         let values: Option<Vec<_>> = grid.nodes().into_iter().map(read).collect();
         let size = self.tunnel.root_mean_square(name);
@@ -165,7 +171,7 @@ impl TermSources<'_> {
             };
             let uncertainty = stated.unwrap_or_default();
             return Some((
-                Table {
+                TableOnGrid {
                     known,
                     mean,
                     uncertainty,
@@ -179,7 +185,7 @@ impl TermSources<'_> {
             .flat_map(|e| e.estimates.iter().chain(e.combined));
         let own = rows.filter(|row| row.derivative == name && row.status == Status::Estimated);
         let size = median(own.filter_map(|row| row.value).map(f64::abs))?;
-        let table = Table {
+        let table = TableOnGrid {
             known: Knowledge::Magnitude,
             mean: vec![0.0; grid.len()],
             uncertainty: vec![],

@@ -1,5 +1,5 @@
-//! Unknowns of a coefficient in one vector: differences from the tunnel at the points of the grids,
-//! then errors that all maneuvers of a class, or of the campaign, share.
+//! Unknowns of a coefficient in one vector. Differences from the tunnel at the points of the grids
+//! come first, then errors that all maneuvers of a class, or of the campaign, share.
 //!
 //! The systematic error of a class is, for each derivative that it estimates, a function of α in
 //! units of the bounds of a maneuver. Its variance is ω², and its correlation fades over 10°.
@@ -12,7 +12,7 @@ use super::grid::Grid;
 use super::observation::Observation;
 use super::prior_covariance::fading;
 use super::scale_prior::Scale;
-use super::term::Term;
+use super::term::PosteriorTerm;
 use crate::aero::Condition;
 use crate::numerics::root::{BlockRoot, root};
 use crate::output_error::error_effect::SharedError;
@@ -20,7 +20,7 @@ use crate::output_error::error_effect::SharedError;
 /// Distance over which a class's errors fade, deg; also the spacing of their grid.
 const CLASS_LENGTH_DEG: f64 = 10.0;
 
-/// Row of a sparse matrix over the unknowns.
+/// Row of a sparse matrix over the unknowns: index of an unknown and its factor.
 pub type SparseRow = Vec<(usize, f64)>;
 
 /// Order of the unknowns.
@@ -48,7 +48,7 @@ impl Unknowns {
     /// Unknowns of a coefficient's terms and of observations by class.
     #[must_use]
     pub fn new<'o>(
-        terms: &[Term],
+        terms: &[PosteriorTerm],
         observations: impl Iterator<Item = &'o (usize, Observation)>,
         class_error: f64,
     ) -> Unknowns {
@@ -95,7 +95,12 @@ impl Unknowns {
 
     /// Rows of an observation over the unknowns.
     #[must_use]
-    pub fn rows(&self, terms: &[Term], class: usize, observation: &Observation) -> Vec<SparseRow> {
+    pub fn rows(
+        &self,
+        terms: &[PosteriorTerm],
+        class: usize,
+        observation: &Observation,
+    ) -> Vec<SparseRow> {
         let mut rows = self.difference_rows(terms, &observation.design, &observation.condition);
         for (i, (row, &term)) in rows.iter_mut().zip(&observation.terms).enumerate() {
             let bound = observation.noise[(i, i)].sqrt();
@@ -116,7 +121,7 @@ impl Unknowns {
     #[must_use]
     pub fn difference_rows(
         &self,
-        terms: &[Term],
+        terms: &[PosteriorTerm],
         design: &DMatrix<f64>,
         condition: &Condition,
     ) -> Vec<SparseRow> {
@@ -136,8 +141,8 @@ impl Unknowns {
         (0..design.nrows()).map(row).collect()
     }
 
-    /// Root of the prior covariance of all unknowns but the differences. Directions below `least`
-    /// of the largest variance of their kind are ignored.
+    /// Root of the prior covariance of all unknowns except the differences. Directions whose
+    /// variance is below the share `least` of the largest of their kind are ignored.
     #[must_use]
     pub fn root_of_others(&self, least: f64) -> BlockRoot {
         let mut whole = BlockRoot::default();
@@ -147,7 +152,7 @@ impl Unknowns {
 
     /// Root of the prior covariance of all unknowns; `least` as in [`Unknowns::root_of_others`].
     #[must_use]
-    pub fn root(&self, terms: &[Term], scales: &[Scale], least: f64) -> BlockRoot {
+    pub fn root(&self, terms: &[PosteriorTerm], scales: &[Scale], least: f64) -> BlockRoot {
         let mut whole = root_of_differences(terms, scales, least);
         self.push_others(least, &mut whole);
         whole
@@ -170,16 +175,15 @@ impl Unknowns {
 /// Root of the prior covariance of the differences. Directions below `least` of a term's largest
 /// variance are ignored.
 #[must_use]
-pub fn root_of_differences(terms: &[Term], scales: &[Scale], least: f64) -> BlockRoot {
+pub fn root_of_differences(terms: &[PosteriorTerm], scales: &[Scale], least: f64) -> BlockRoot {
     let mut whole = BlockRoot::default();
     for (term, scale) in terms.iter().zip(scales) {
-        whole.push(root(&term.prior.covariance.at(scale), least));
+        whole.push(root(&term.prior.covariance.for_scale(scale), least));
     }
     whole
 }
 
-/// True for an error that is common to all flights, such as the delay with which a recorder records
-/// the surfaces.
+/// `true` for an error that is common to all flights, such as a recorder's delay of a surface.
 #[must_use]
 pub fn is_of_campaign(error: &SharedError) -> bool {
     matches!(error, SharedError::Delay(_))
@@ -197,7 +201,7 @@ fn class_grid((lowest, highest): (f64, f64)) -> Grid {
 
 /// Weighted sum of the unknowns.
 #[must_use]
-pub fn sum(row: &SparseRow, unknowns: &DVector<f64>) -> f64 {
+pub fn weighted_sum(row: &SparseRow, unknowns: &DVector<f64>) -> f64 {
     row.iter()
         .map(|(place, weight)| weight * unknowns[*place])
         .sum()
@@ -205,7 +209,7 @@ pub fn sum(row: &SparseRow, unknowns: &DVector<f64>) -> f64 {
 
 /// Covariance of two weighted sums of the unknowns.
 #[must_use]
-pub fn between(first: &SparseRow, second: &SparseRow, covariance: &DMatrix<f64>) -> f64 {
+pub fn covariance_between(first: &SparseRow, second: &SparseRow, covariance: &DMatrix<f64>) -> f64 {
     let pairs = first
         .iter()
         .flat_map(|a| second.iter().map(move |b| (a, b)));

@@ -1,9 +1,9 @@
 //! Estimates of a maneuver with the values that it holds taken from the posterior of the other
 //! flights.
 //!
-//! With G the change of the estimates with the held derivatives, and f and C the means and
-//! covariance of these by the other flights, the estimates move by −G f, and in their covariance G
-//! C Gᵀ replaces the tunnel's part.
+//! Let G be the change of the estimates with the held derivatives. Let f and C be mean and
+//! covariance of the held derivatives' differences from the tunnel, by the other flights. The
+//! estimates move by −G f, and in their covariance G C Gᵀ replaces the tunnel's part.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use super::campaign_model::Model;
 use super::evidence::Evidence;
 use super::held_values::HeldDifferences;
-use super::unknowns::{SparseRow, between, sum};
+use super::unknowns::{SparseRow, covariance_between, weighted_sum};
 use crate::aero::Combined;
 use crate::maneuver::Status;
 use crate::output_error::error_effect::ErrorEffect;
@@ -85,8 +85,8 @@ impl<'a> WithHeld<'a> {
             }
             Status::Estimated => {
                 if let Some(weights) = self.weights(&row.derivative, sums) {
-                    let change = sum(&weights, &self.change);
-                    let variance = between(&weights, &weights, &self.covariance);
+                    let change = weighted_sum(&weights, &self.change);
+                    let variance = covariance_between(&weights, &weights, &self.covariance);
                     let bound = |b: Option<f64>| b.map(|b| (b * b + variance).max(0.0).sqrt());
                     new.value = row.value.map(|v| v + change);
                     new.bound = bound(row.bound);

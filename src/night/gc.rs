@@ -11,7 +11,7 @@ use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::store::{ArtefactName, Night, Nights, Store, files};
 
-/// Artefacts and nights that nothing published needs.
+/// Artefacts and nights that no published night needs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Unneeded {
     /// Artefacts with their sizes, bytes.
@@ -96,7 +96,8 @@ fn served_reports(
     folders.into_iter().map(open).collect()
 }
 
-/// Error for reports that cannot be found: a disk that is not mounted today still has its nights.
+/// Error for reports that cannot be found. They may be on a disk that is not mounted, and their
+/// nights may need artefacts.
 fn lost_reports(config: &Config, folder: &Path) -> Error {
     let what = format!(
         "the reports in {} are made of this store and cannot be found, so what they need is unknown: nothing is \

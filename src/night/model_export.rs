@@ -35,9 +35,9 @@ pub struct Draws {
     pub seed: u64,
 }
 
-/// Brings the campaign up to date, waiting up to `wait` for another run to leave the store, and
-/// writes `flight_updated` as CSV, Parquet, DAVE-ML (`.dml`) and as a JSBSim section
-/// (`_jsbsim.xml`) into a folder. The published night stays as it is.
+/// Brings the campaign up to date, waiting up to `wait` for another run to leave the store. Writes
+/// `flight_updated` into a folder: as CSV, Parquet, DAVE-ML (`.dml`), and as a JSBSim section
+/// (`_jsbsim.xml`). The published night stays as it is.
 ///
 /// # Errors
 /// A fault that stops the run.

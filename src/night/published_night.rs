@@ -37,7 +37,7 @@ pub struct NightTables<'a> {
     pub instrument_trends: &'a [InstrumentTrendRow],
 }
 
-/// Tables of a published night that are compared with those of another.
+/// Tables of a published night that are compared with another night's.
 #[derive(Clone, Debug, Default)]
 pub struct PublishedNight {
     lineage: Lineage,

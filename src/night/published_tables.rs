@@ -58,7 +58,7 @@ fn publish_segment(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
     table::publish(shelf, &campaign.events)
 }
 
-/// Publishes the rows of the maneuvers, then those of joint estimates.
+/// Publishes the rows of the maneuvers, then the rows of joint estimates.
 fn publish_estimate(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
     let joined = || campaign.joined.iter().map(|j| &j.estimated);
     let joint_fits = joined().map(|e| &e.fit);

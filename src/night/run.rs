@@ -20,7 +20,7 @@ use crate::store::nights::{Night, Nights, Summary};
 use crate::store::{Fingerprint, atomic};
 use crate::tables::{PublishedTrend, PublishedVerdict};
 
-/// Published file of the changes since the night before, for machines to read.
+/// Name of the published file with the changes since the night before, for machines to read.
 pub const ALERT: &str = "alert.json";
 
 /// End of a run.
@@ -80,7 +80,7 @@ pub fn run(
     }
     let outcome = run.publish();
     if outcome.is_err() {
-        // Its files may fill the disk that stopped the run.
+        // The unfinished night's files may fill the disk that stopped the run.
         run.nights.remove_tonight();
     }
     outcome
@@ -146,7 +146,7 @@ impl NightRun<'_> {
         store.send_unsent()?;
         store.register_reports(&self.config().reports)?;
         self.conductor.remember_contents()?;
-        self.place(&self.manifest(&campaign, &changes))
+        self.publish_files(&self.manifest(&campaign, &changes))
     }
 
     /// Places changes and report in tonight's folder. A report that cannot be printed is a problem
@@ -233,7 +233,7 @@ impl NightRun<'_> {
 
     /// Publishes tonight's files: as a new night, or in place of files that the current night of
     /// the same lineage has lost. A current night that reaches further stays.
-    fn place(&self, tonight: &Night) -> Result<RunOutcome> {
+    fn publish_files(&self, tonight: &Night) -> Result<RunOutcome> {
         let current = self.nights.current();
         match current.filter(|night| self.has_same_lineage(night)) {
             Some(night) if night.until > self.until => {

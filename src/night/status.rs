@@ -70,7 +70,7 @@ impl NightStatus {
 pub fn status(config: &Config, progress: &dyn Progress) -> Result<NightStatus> {
     let conductor = Conductor::read_only(config, progress)?;
     let mut campaign = conductor.campaign(Stage::Estimate)?;
-    let comparison = Comparison {
+    let comparison = LineageComparison {
         lineage: campaign_lineage(&conductor),
         current: Nights::read_only(&config.reports).current(),
     };
@@ -107,12 +107,12 @@ pub fn status(config: &Config, progress: &dyn Progress) -> Result<NightStatus> {
 }
 
 /// Comparison of today's lineage with the current night.
-struct Comparison {
+struct LineageComparison {
     lineage: Lineage,
     current: Option<Night>,
 }
 
-impl Comparison {
+impl LineageComparison {
     /// Status of a stage whose artefacts the store keeps.
     fn step_stage(&self, stage: Stage, campaign: &mut Campaign) -> StageStatus {
         let state = std::mem::take(campaign.state(stage));

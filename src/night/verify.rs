@@ -15,7 +15,7 @@ use crate::store::{ArtefactName, Digest, Night, Nights, files};
 
 /// Finding about one published file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Finding {
+pub struct FileFinding {
     pub file: String,
     /// Reasons that the file is not valid; empty for a valid one.
     pub reasons: Vec<String>,
@@ -25,7 +25,7 @@ pub struct Finding {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Verified {
     pub night: String,
-    pub files: Vec<Finding>,
+    pub files: Vec<FileFinding>,
     /// Artefacts that are damaged or lost. The tables made of them are still valid; the next run
     /// makes them again.
     pub artefacts: Vec<ArtefactName>,
@@ -38,10 +38,10 @@ impl Verified {
     }
 }
 
-/// Digests all input anew, and compares input, configuration and code with the lineage that the
-/// files of a night state. If they agree, the tables are made again from the artefacts and
-/// compared. The night is the one named, by default the current one; with `tables` only files of
-/// these names are compared.
+/// Digests all input anew. Compares input, configuration and code with the lineage stored in the
+/// files of a night. If they agree, the tables are made again from the artefacts and compared. The
+/// night is the one named, by default the current one; with `tables` only files of these names are
+/// compared.
 ///
 /// # Errors
 /// No night, no archive, or a table that the night does not have.
@@ -70,7 +70,7 @@ pub fn verify(
     } else {
         BTreeSet::new()
     };
-    let comparison = Comparison {
+    let comparison = FileComparison {
         lineage,
         damaged: nights.damaged(&night),
         other_rows,
@@ -139,7 +139,7 @@ fn is_of(file: &str, table: &str) -> bool {
 }
 
 /// Comparison of a night's files with today's lineage.
-struct Comparison<'a> {
+struct FileComparison<'a> {
     lineage: Lineage,
     /// Files whose bytes changed since they were published.
     damaged: Vec<String>,
@@ -149,8 +149,8 @@ struct Comparison<'a> {
     night: &'a Night,
 }
 
-impl Comparison<'_> {
-    fn finding(&self, file: &str) -> Finding {
+impl FileComparison<'_> {
+    fn finding(&self, file: &str) -> FileFinding {
         let reasons = if self.damaged.iter().any(|damaged| damaged == file) {
             vec!["its bytes are not those that were published".to_owned()]
         } else if self.other_rows.contains(file) {
@@ -158,14 +158,14 @@ impl Comparison<'_> {
         } else {
             self.differences(file)
         };
-        Finding {
+        FileFinding {
             file: file.to_owned(),
             reasons,
         }
     }
 
-    /// Differences from the lineage of a file. A CSV has that of the Parquet table beside it, the
-    /// report that of the night.
+    /// Differences from the lineage of a file. A CSV has the lineage of the Parquet table beside
+    /// it, the report the lineage of the night.
     fn differences(&self, file: &str) -> Vec<String> {
         let path = self.nights.folder(&self.night.name).join(file);
         let table = path.with_extension("parquet");

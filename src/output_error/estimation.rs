@@ -16,7 +16,8 @@ const WEIGHTS_SETTLED: f64 = 1e-3;
 
 /// Estimates the free parameters of a maneuver, or of several joined, with their bounds.
 ///
-/// Costs are those with the weights of the `table`. `resolution` is the least standard deviation of each output from which weights are estimated.
+/// The published costs use the weights of the `table`. `resolution` is the least standard deviation
+/// of each output from which weights are estimated.
 #[must_use]
 pub fn estimate<D: Bounded>(
     data: &D,
@@ -93,7 +94,7 @@ fn identify<D: Bounded>(data: &D, fit: &mut Fit<D::Response>, settings: &Setting
         return;
     }
     let sums = data.sums(&fit.response, &fit.weights);
-    match Identification::of(&sums.information, settings.max_condition_number) {
+    match Identification::identify(&sums.information, settings.max_condition_number) {
         Identification::Determined {
             condition_number, ..
         } => fit.condition_number = Some(condition_number),
@@ -117,7 +118,7 @@ pub fn add_bounds<D: Bounded>(data: &D, fit: &mut Fit<D::Response>, settings: &S
         return;
     }
     let sums = data.sums(&fit.response, &fit.weights);
-    let identification = Identification::of(&sums.information, settings.max_condition_number);
+    let identification = Identification::identify(&sums.information, settings.max_condition_number);
     if let Identification::Determined { inverse, .. } = identification {
         let bounds = cramer_rao::bounds(&inverse, data, fit);
         fit.covariance = Some(bounds.covariance);

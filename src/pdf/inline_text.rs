@@ -44,7 +44,7 @@ pub struct Word {
     width: f32,
     /// Space before the word, unless it begins a line.
     space: f32,
-    /// Begins a line.
+    /// `true` if the word begins a line.
     breaks: bool,
 }
 

@@ -99,13 +99,13 @@ pub enum Mark {
 pub struct Item {
     pub height: f32,
     pub marks: Vec<Mark>,
-    /// Stays on the page of the next item.
+    /// `true` if the item stays on the page of the next item.
     pub keep: bool,
     /// Repeated at the top of a page that this item begins.
     pub head: Option<Arc<Item>>,
     /// Empty space, which no page begins with.
     pub is_room: bool,
-    /// Begins a page.
+    /// `true` if the item begins a page.
     pub breaks: bool,
 }
 
@@ -130,13 +130,13 @@ impl Item {
     /// Adds the marks of another item, moved.
     pub fn absorb(&mut self, other: &Item, dx: f32, dy: f32) {
         self.marks
-            .extend(other.marks.iter().map(|mark| mark.moved(dx, dy)));
+            .extend(other.marks.iter().map(|mark| mark.shifted_by(dx, dy)));
     }
 }
 
 impl Mark {
     /// The mark moved by a distance.
-    pub fn moved(&self, dx: f32, dy: f32) -> Mark {
+    pub fn shifted_by(&self, dx: f32, dy: f32) -> Mark {
         let mut mark = self.clone();
         match &mut mark {
             Mark::Text { x, y, .. }
@@ -167,7 +167,11 @@ pub fn joined(items: &[Item]) -> Item {
 /// Moves items to the right.
 pub fn indented(mut items: Vec<Item>, indent: f32) -> Vec<Item> {
     for item in &mut items {
-        item.marks = item.marks.iter().map(|m| m.moved(indent, 0.0)).collect();
+        item.marks = item
+            .marks
+            .iter()
+            .map(|m| m.shifted_by(indent, 0.0))
+            .collect();
     }
     items
 }

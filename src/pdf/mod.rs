@@ -1,8 +1,8 @@
 //! Typesetting of a well-formed XHTML page on A4 as a PDF, with page numbers, table of contents,
 //! outline and embedded fonts.
 //!
-//! The setter needs no browser and reads no clock: the same page gives the same bytes. It knows XML
-//! and the following subset of HTML and SVG, and reads no CSS.
+//! The setter needs no browser and reads no clock, so the same page gives the same bytes. It
+//! supports XML with the following subset of HTML and SVG, and no CSS.
 //!
 //! | elements | set as |
 //! |---|---|
@@ -27,15 +27,15 @@
 //! | `weak` `fair` `strong` `flagged` (`td`) | four shades |
 //! | `inline` (`svg`) | a drawing within a line |
 //!
-//! An `svg` may contain `g` (`clip-path` of one rectangle), `rect`, `line`, `path` (M L H V Z, and A for half
-//! circles; both with `transform="translate(…)"` or `scale(…)`) and `text` (`rotate(-90 …)`), with the
-//! attributes `fill`, `stroke`, `stroke-width`, `stroke-dasharray`, `opacity`, `fill-opacity`,
-//! `font-size`, `font-weight` and `text-anchor`.
+//! An `svg` may contain `g` (`clip-path` of one rectangle), `rect`, `line`, `path` (M L H V Z, and
+//! A for half circles; both with `transform="translate(…)"` or `scale(…)`) and `text` (`rotate(-90
+//! …)`), with the attributes `fill`, `stroke`, `stroke-width`, `stroke-dasharray`, `opacity`,
+//! `fill-opacity`, `font-size`, `font-weight` and `text-anchor`.
 //!
-//! In the order of use: `fonts`, `svg` and `svg_path` (drawings as operators), `item` (what
-//! pages are filled with), `elements` (questions about an element), `inline_text` and `table`,
-//! `blocks` (elements as items), `pagination` (items on pages), `page_content` (a page as
-//! operators), `writer` (the objects of the file).
+//! In the order of use: `fonts`, `svg` and `svg_path` (drawings as operators), `item` (what pages
+//! are filled with), `elements` (questions about an element), `inline_text` and `table`, `blocks`
+//! (elements as items), `pagination` (items on pages), `page_content` (a page as operators),
+//! `writer` (the objects of the file).
 
 mod blocks;
 mod elements;

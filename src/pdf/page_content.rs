@@ -96,7 +96,7 @@ impl<'a> PageContent<'a> {
     fn text(&mut self, x: f32, y: f32, style: Style, text: &str) {
         let slant = if style.slanted { "0.2" } else { "0" };
         let [x, y, size] = [x, HEIGHT - y, style.size].map(number);
-        let encoded = self.fonts.encoded(style.weight, text);
+        let encoded = self.fonts.glyph_numbers(style.weight, text);
         let (colour, font) = (rgb(style.colour), style.weight.resource());
         let _ = writeln!(
             self.operators,

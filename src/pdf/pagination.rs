@@ -37,9 +37,10 @@ pub struct PagedDocument {
     pub anchors: BTreeMap<String, (usize, f32)>,
 }
 
-/// With more headings, the contents list chapters only.
+/// Number of headings above which the contents list chapters only.
 const MOST_ENTRIES: usize = 400;
-/// Higher items need not stay with what follows: they would leave a page almost empty.
+/// Height above which an item need not stay with the next one, since it would leave a page almost
+/// empty.
 const HIGHEST_KEPT: f32 = 0.8 * (HEIGHT - TOP - BOTTOM);
 
 /// Divides items into pages.
@@ -102,7 +103,7 @@ impl PagedDocument {
                 }
                 other => {
                     if let Some(last) = self.pages.last_mut() {
-                        last.marks.push(other.moved(MARGIN, y));
+                        last.marks.push(other.shifted_by(MARGIN, y));
                     }
                 }
             }

@@ -1,6 +1,6 @@
 //! An SVG drawing as PDF operators.
 //!
-//! y points down, as in the SVG; the page that places the drawing inverts it.
+//! y points down, as in the SVG; the page that places the drawing inverts y.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -328,7 +328,7 @@ impl SvgReader<'_> {
             ..style.clone()
         });
         let (font, size) = (style.weight.resource(), number(style.size));
-        let encoded = self.fonts.encoded(style.weight, &text);
+        let encoded = self.fonts.glyph_numbers(style.weight, &text);
         let _ = writeln!(
             self.out,
             "BT /{font} {size} Tf {place} Tm <{encoded}> Tj ET"

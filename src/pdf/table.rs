@@ -1,7 +1,7 @@
 //! A table as items, one per row.
 //!
-//! Columns are as wide as their text where the page has the room, else narrower, and at last in
-//! smaller type.
+//! Columns are as wide as their text if the page is wide enough. Otherwise they are narrower, and
+//! finally set in smaller type.
 
 use std::sync::Arc;
 
@@ -164,8 +164,8 @@ fn column_widths(grid: &[Row]) -> (Vec<f32>, Vec<f32>) {
     (least, most)
 }
 
-/// Divides a width among columns: the most they can use, or the least and a proportional share of
-/// the rest.
+/// Divides a width among columns. Each gets the most it can use, or else its least width and a
+/// proportional share of the remaining room.
 fn share_width(least: &[f32], most: &[f32], room: f32) -> Vec<f32> {
     let (least_sum, most_sum) = (least.iter().sum::<f32>(), most.iter().sum::<f32>());
     if most_sum <= room {

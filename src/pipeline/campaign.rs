@@ -95,8 +95,8 @@ pub struct Campaign {
     /// Joint estimates. Their rows are published, but enter no trend, which would count the same
     /// data twice.
     pub joined: Vec<Joined>,
-    /// Prediction of each maneuver from others, in the order of the maneuvers; empty if switched
-    /// off.
+    /// Prediction of each maneuver from other maneuvers, in the order of the maneuvers; empty if
+    /// switched off.
     pub predicted: Vec<Predicted>,
     /// Covariance of each maneuver's parameters, in the order of the maneuvers.
     pub covariances: Vec<Option<Covariance>>,

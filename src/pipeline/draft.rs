@@ -14,14 +14,14 @@ const MOST_ROWS: usize = 360_000;
 /// Largest number of files that are read: one maneuver a file, or a day's flights.
 const MOST_FILES: usize = 24;
 
-/// Draft that was written.
+/// Files of a draft, and what was read for it.
 #[derive(Debug)]
 pub struct Drafted {
     pub folder: PathBuf,
     /// Page with the strip charts.
     pub page: PathBuf,
     pub inspection: Inspection,
-    /// Number of files read, and of those found.
+    /// Number of files read, and number of files found.
     pub files: (usize, usize),
 }
 

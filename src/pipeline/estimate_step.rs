@@ -69,7 +69,7 @@ impl<'a> LazyRecord<'a> {
     ///
     /// # Errors
     /// [`crate::error::Error::Io`] or [`crate::error::Error::Store`] naming the record.
-    pub fn part(&self, maneuver: &Maneuver) -> Result<Record> {
+    pub fn read_maneuver(&self, maneuver: &Maneuver) -> Result<Record> {
         self.open()?.part(None, maneuver.start_s, maneuver.end_s)
     }
 
@@ -120,7 +120,7 @@ impl<'a> Step for EstimateStep<'a> {
     }
 
     fn make(&self, name: &ArtefactName) -> Result<ComputedArtefact<Estimated>> {
-        let record = self.record.part(self.maneuver)?;
+        let record = self.record.read_maneuver(self.maneuver)?;
         let mut estimated =
             estimate_maneuver(self.config, &record, self.maneuver, self.record.delays);
         let history = estimated.history.take().map(|h| report::thinned(&h));
@@ -137,7 +137,7 @@ impl<'a> Step for EstimateStep<'a> {
     }
 }
 
-/// Corrections of the surfaces of an axis; those of other surfaces have no effect.
+/// Corrections of the surfaces that act in an axis; other surfaces have no effect on its estimates.
 fn delays_of_axis<'a>(
     config: &'a Config,
     delays: &'a [DelayCorrection],

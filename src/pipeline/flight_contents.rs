@@ -56,8 +56,8 @@ impl FlightContents {
         gathered
     }
 
-    /// Adds the files of a flight to the sources and returns the fingerprint of its content, or the
-    /// reason to leave it out.
+    /// Adds the files of a flight to the sources. Returns the fingerprint of the flight's content,
+    /// or the reason to leave the flight out.
     fn add(
         &mut self,
         flight: &FlightFiles,

@@ -48,7 +48,7 @@ impl<'a> Member<'a> {
     }
 
     fn record(&self, store: &Store) -> Result<Record> {
-        LazyRecord::new(self.flight, store, self.delays).part(self.maneuver)
+        LazyRecord::new(self.flight, store, self.delays).read_maneuver(self.maneuver)
     }
 }
 

@@ -23,8 +23,8 @@ use crate::store::{ArtefactName, Kind, object};
 
 /// Everything that decides the records of a flight.
 ///
-/// The flight id comes from the file's name and is part of the records and of every id in the
-/// tables, so a renamed file is ingested again.
+/// The flight id comes from the file's name, and is part of the records and of every id in the
+/// tables. A renamed file is therefore ingested again.
 #[derive(Serialize)]
 pub struct IngestKey<'a> {
     flight_id: &'a str,
@@ -94,7 +94,7 @@ impl<'a> Step for IngestStep<'a> {
 
 impl IngestStep<'_> {
     /// Fault of the network, or of a file that changed while it was read. The bytes that were read
-    /// may then differ from those of the key.
+    /// may then differ from the bytes to which the key belongs.
     fn passing_fault(&self) -> Option<Problem> {
         let fault = |place: &std::path::Path, reason: &str| {
             let place = place.display().to_string();

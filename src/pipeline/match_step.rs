@@ -85,9 +85,11 @@ impl<'a> Step for MatchStep<'a> {
             let matched = proof_of_match::not_flown(self.basis, self.maneuver, &reason);
             return Ok(ComputedArtefact::Settled(matched));
         }
-        let record = self.record.part(self.maneuver)?;
+        let record = self.record.read_maneuver(self.maneuver)?;
         let condition = self.maneuver.condition(self.basis.tunnel);
-        let local = self.posterior.at(self.maneuver.axis, &condition);
+        let local = self
+            .posterior
+            .posterior_at_condition(self.maneuver.axis, &condition);
         let flown = RecordedManeuver {
             record: &record,
             maneuver: self.maneuver,
@@ -143,8 +145,8 @@ pub fn fly_again(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
     Ok(())
 }
 
-/// Finds the differences that decide the proof of match, predicted by a model, of the flown
-/// maneuvers of a class: one for each that can be flown again, in the order of the flights.
+/// Finds the differences that decide the proof of match of a class, predicted by a model. Each
+/// maneuver that can be flown again has one, in the order of the flights.
 ///
 /// # Errors
 /// A record that cannot be read.
@@ -166,11 +168,11 @@ pub fn decisive_differences(
             all.filter(|(_, m)| m.flight_id == flight.id() && m.class == class && !m.is_rejected());
         let mut found = Vec::new();
         for (place, maneuver) in own {
-            let record = record.part(maneuver)?;
+            let record = record.read_maneuver(maneuver)?;
             let own = own_estimates(campaign, &estimates, place);
             let local = campaign
                 .model
-                .at(maneuver.axis, &maneuver.condition(basis.tunnel));
+                .posterior_at_condition(maneuver.axis, &maneuver.condition(basis.tunnel));
             let flown = RecordedManeuver {
                 record: &record,
                 maneuver,

@@ -9,7 +9,7 @@ use crate::store::record_file::GROUP;
 /// Longest piece of a channel, samples: it stays in the processor's cache.
 const LONGEST_PIECE: usize = 1 << 16;
 
-/// Shortest piece of a channel, samples: shorter ones cost more calls than they save memory.
+/// Shortest piece of a channel, samples: shorter pieces save little memory and cost many calls.
 const SHORTEST_PIECE: usize = 1 << 14;
 
 /// Memory of a channel per sample of its piece, from the file's numbers to the repaired ones,

@@ -16,7 +16,7 @@ use crate::tables::EventRow;
 /// Samples of a window: an hour at 36 Hz. A record up to half as long again is one window.
 const WINDOW: usize = 1 << 17;
 
-/// Time beyond its own samples, on either side, that a window searches, s: longer than any maneuver
+/// Time that a window searches beyond its own samples on either side, s: longer than any maneuver
 /// with its lead-in and decay.
 const SURROUNDINGS_S: f64 = 180.0;
 
@@ -120,7 +120,7 @@ fn find_in_window(
     })
 }
 
-/// Number of samples beyond its own, on either side, that a window searches.
+/// Number of samples that a window searches beyond its own on either side.
 fn surroundings(header: &RecordHeader) -> usize {
     samples(SURROUNDINGS_S, header.step_s)
 }

@@ -59,7 +59,7 @@ pub enum ComputedArtefact<A> {
 #[derive(Clone, Debug)]
 pub struct Companion {
     pub name: ArtefactName,
-    /// Digest of a file that has no seal.
+    /// Digest of a file that has no checksum of its own.
     pub digest: Option<Digest>,
 }
 

@@ -63,7 +63,7 @@ impl<'a> Step for SurfacesStep<'a> {
 
     fn make(&self, _: &ArtefactName) -> Result<ComputedArtefact<FlightEvidence>> {
         let file = LazyRecord::new(self.flight, self.store, &[]);
-        let part = |maneuver: &&'a Maneuver| Ok((file.part(maneuver)?, *maneuver));
+        let part = |maneuver: &&'a Maneuver| Ok((file.read_maneuver(maneuver)?, *maneuver));
         let parts: Result<Vec<(Record, &Maneuver)>> = self.maneuvers.iter().map(part).collect();
         let basis = AircraftModel {
             aircraft: &self.config.aircraft,
@@ -131,8 +131,8 @@ fn combine(config: &Config, campaign: &mut Campaign, flights: &[FlightEvidence])
     campaign.problems.extend(found.problems);
 }
 
-/// Compares the errors of the instruments over the flights. Flights that hardly determine an error
-/// are corrected by the others.
+/// Compares the errors of the instruments over the flights. A flight that hardly determines an
+/// error is corrected by the errors of the other flights.
 fn compare_flights(config: &Config, campaign: &mut Campaign, of_surfaces: Vec<ErrorSeries>) {
     let evidence = |flight: &Flight| flight.ingested.assessment.error_evidence.clone();
     let flights: Vec<(String, Vec<ErrorEvidence>)> = campaign

@@ -1,9 +1,11 @@
 //! Aerodynamic coefficients of a simulation: the values at trim, and their change with the motion
 //! and the surfaces.
 //!
-//! C = C_trim + ∫ C_α dα + Σ C_x(α) (x − x_trim), with the derivatives at the present angle of
-//! attack. A derivative is the local slope, as it is estimated. The level of a coefficient is
-//! matched at the trim, so constants of the database do not enter.
+//! A coefficient is C = C_trim + ∫ C_α dα + Σ C_x(α) (x − x_trim). C_trim is its value at trim, and
+//! the integral of its derivative C_α is taken from the trim to the present angle of attack. The
+//! sum is over all other regressors x, with the derivatives C_x at the present angle of attack. A
+//! derivative is a local slope, as estimated. Constants of the database do not enter, because
+//! C_trim is matched to the flight.
 
 use nalgebra::Vector3;
 
@@ -66,7 +68,7 @@ impl Flow {
         }
     }
 
-    /// Indices of its quantities among the slopes.
+    /// Indices of the flow's quantities among the slopes.
     pub const ALPHA: usize = 0;
     pub const BETA: usize = 1;
     pub const VELOCITY: usize = 2;
@@ -90,18 +92,19 @@ enum Factor {
     Beta,
     Velocity,
     Mach,
-    /// Rate of an axis times half this length over the airspeed.
+    /// Angular rate about an axis, times half a reference length over the airspeed.
     Rate {
         axis: usize,
         half_length: f64,
     },
-    /// Rate of the angle of attack times half this length over the airspeed.
+    /// Rate of the angle of attack, times half a reference length over the airspeed.
     AlphaRate {
         half_length: f64,
     },
     /// Recorded signal with this index.
     Recorded(usize),
-    /// Recorded deflection over dynamic pressure times this area or volume.
+    /// Recorded deflection of a vane, over dynamic pressure times an area (force) or a volume
+    /// (moment).
     Vane {
         place: usize,
         size: f64,
@@ -120,9 +123,9 @@ pub struct Aerodynamics<'a> {
     pub table: DerivativeTable,
 }
 
-/// Balance from which a simulation starts.
+/// Trim from which a simulation starts: coefficients, and factors of the derivatives.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Trim {
+pub struct SimulationTrim {
     pub coefficients: [f64; COEFFICIENTS],
     /// Factors of the derivatives at the trim.
     pub factors: Vec<f64>,
@@ -144,7 +147,7 @@ impl<'a> Aerodynamics<'a> {
                 recorded: &recorded,
                 coefficient: d.coefficient,
             };
-            (index(d.coefficient), factors.of(&d.regressor))
+            (index(d.coefficient), factors.factor_of(&d.regressor))
         };
         Aerodynamics {
             aircraft,
@@ -231,9 +234,9 @@ struct TrimmedTerm {
 
 impl<'a> AboutTrim<'a> {
     #[must_use]
-    pub fn new(aerodynamics: &'a Aerodynamics, trim: &Trim) -> AboutTrim<'a> {
+    pub fn new(aerodynamics: &'a Aerodynamics, trim: &SimulationTrim) -> AboutTrim<'a> {
         let table = &aerodynamics.table;
-        let place = table.place(trim.alpha_deg);
+        let place = table.position_of(trim.alpha_deg);
         let mut terms = [const { Vec::new() }; COEFFICIENTS];
         let mut factors: Vec<&Factor> = Vec::new();
         let own = aerodynamics.terms.iter().zip(&trim.factors).enumerate();
@@ -279,7 +282,7 @@ impl<'a> AboutTrim<'a> {
         for (value, factor) in self.values.iter_mut().zip(&self.factors) {
             *value = factor.value(flow, recorded);
         }
-        let entries = self.table.entries(self.table.place(flow.alpha_deg));
+        let entries = self.table.entries(self.table.position_of(flow.alpha_deg));
         let mut change = [0.0; COEFFICIENTS];
         for (sum, terms) in change.iter_mut().zip(&self.terms) {
             for term in terms {
@@ -298,7 +301,7 @@ impl<'a> AboutTrim<'a> {
     #[must_use]
     pub fn change_with_slopes(&mut self, flow: &Flow, recorded: &[f64]) -> CoefficientSlopes {
         let change = self.change(flow, recorded);
-        let entries = self.table.entries(self.table.place(flow.alpha_deg));
+        let entries = self.table.entries(self.table.position_of(flow.alpha_deg));
         let along = self.factors.iter().map(|f| f.slopes(flow, recorded));
         let along: Vec<FlowSlopes> = along.collect();
         let mut by_flow = [[0.0; FLOW]; COEFFICIENTS];
@@ -332,11 +335,11 @@ impl<'a> AboutTrim<'a> {
 pub struct CoefficientSlopes {
     pub change: [f64; COEFFICIENTS],
     pub by_flow: [FlowSlopes; COEFFICIENTS],
-    /// Slope of each derivative's own coefficient along it.
+    /// Slope of each derivative's coefficient along the derivative.
     pub by_derivative: Vec<f64>,
 }
 
-/// Index of a coefficient among those of both axes.
+/// Index of a coefficient among the coefficients of both axes.
 fn index(coefficient: Coefficient) -> usize {
     let first = match coefficient.axis() {
         Axis::Longitudinal => 0,
@@ -353,7 +356,7 @@ struct Factors<'a> {
 }
 
 impl Factors<'_> {
-    fn of(&self, regressor: &Regressor) -> Factor {
+    fn factor_of(&self, regressor: &Regressor) -> Factor {
         let rate = |axis: usize, length: f64| Factor::Rate {
             axis,
             half_length: 0.5 * length,
@@ -370,20 +373,21 @@ impl Factors<'_> {
             },
             Regressor::Surface(name) if name == signal::VELOCITY => Factor::Velocity,
             Regressor::Surface(name) if name == signal::MACH => Factor::Mach,
-            Regressor::Surface(name) => Factor::Recorded(self.place(name)),
+            Regressor::Surface(name) => Factor::Recorded(self.signal_index(name)),
             Regressor::Vane(name) => Factor::Vane {
-                place: self.place(name),
+                place: self.signal_index(name),
                 size: self.aircraft.wing_area_ft2
                     * self.coefficient.reference_length(self.aircraft),
             },
-            Regressor::Magnitude(of) => Factor::Magnitude(Box::new(self.of(of))),
-            Regressor::Product(both) => {
-                Factor::Product(Box::new([self.of(&both[0]), self.of(&both[1])]))
-            }
+            Regressor::Magnitude(of) => Factor::Magnitude(Box::new(self.factor_of(of))),
+            Regressor::Product(both) => Factor::Product(Box::new([
+                self.factor_of(&both[0]),
+                self.factor_of(&both[1]),
+            ])),
         }
     }
 
-    fn place(&self, name: &str) -> usize {
+    fn signal_index(&self, name: &str) -> usize {
         let place = self.recorded.iter().position(|own| *own == name);
         place.unwrap_or(usize::MAX)
     }

@@ -1,12 +1,13 @@
 //! Difference that decides whether a repeat flight passes, as a linear function of the derivatives.
 //!
 //! To first order the outputs of a repeat flight differ from a model's by four parts: the mean
-//! difference, the effects of the derivatives' deviations, those of the start's errors, and the
-//! sensors' noise. At one sample the difference is therefore normal, and its nearest limit is a
-//! number of standard deviations away. For an alternative, the sample with the smallest distance
-//! counts; for a requirement, the alternative with the largest; among the requirements, the one
-//! with the smallest. A requirement on the Dutch roll is on one value, whose noise is the error of
-//! the repeat flight's estimates.
+//! difference, the effects of the derivatives' deviations, the effects of the start's errors, and
+//! the sensors' noise. At one sample the difference is therefore normal, and its nearest limit is a
+//! number of standard deviations away. The decisive difference is found in three steps:  1. of an
+//! alternative: at the sample with the smallest distance; 2. of a requirement: that of the
+//! alternative with the largest distance; 3. of the maneuver: that of the requirement with the
+//! smallest distance.  A requirement on the Dutch roll has one value only, whose noise is the error
+//! of the repeat flight's estimates.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -15,9 +16,9 @@ use super::dutch_roll::{DutchRoll, LateralModes};
 use super::free_run::FreeRun;
 use super::judgement::Judged;
 use super::linear_run::Histories;
-use super::mean_run::{MeanRun, moving};
-use super::outputs::place;
-use super::recording::Recording;
+use super::mean_run::{MeanRun, acting_derivatives};
+use super::outputs::output_index;
+use super::recording::ManeuverRecording;
 use super::specification::Tolerance;
 use crate::aero::{Buildup, Condition};
 use crate::model::{LocalPosterior, LocalValue};
@@ -34,7 +35,7 @@ pub struct DecisiveDifference {
     /// Slopes along the values of the posterior.
     pub slopes: Vec<(LocalValue, f64)>,
     /// Standard deviation from the start and the noise.
-    pub rest: f64,
+    pub fixed_deviation: f64,
     /// `true` if the model is the posterior, so that it moves with the posterior's mean.
     pub follows_mean: bool,
 }
@@ -56,7 +57,7 @@ impl PredictedDutchRoll<'_> {
         buildup: &Buildup,
         tolerance: &Tolerance,
     ) -> Option<LinearDifference> {
-        let moving = moving(posterior, buildup);
+        let moving = acting_derivatives(posterior, buildup);
         let deviation = |(value, derivative): &(usize, usize)| {
             (*derivative, posterior.covariance[(*value, *value)].sqrt())
         };
@@ -72,7 +73,7 @@ impl PredictedDutchRoll<'_> {
             slopes: slopes
                 .map(|((value, _), slope)| (*value, per_width * slope))
                 .collect(),
-            rest: per_width * repeats.error,
+            fixed_deviation: per_width * repeats.error,
         })
     }
 }
@@ -83,7 +84,7 @@ impl MeanRun {
     #[must_use]
     pub fn decisive(
         &self,
-        flown: (&Recording, &FreeRun),
+        flown: (&ManeuverRecording, &FreeRun),
         dutch_roll: Option<PredictedDutchRoll>,
         (posterior, buildup): (&LocalPosterior, &Buildup),
         judged: &[Judged],
@@ -107,11 +108,11 @@ impl MeanRun {
         decisive.map(|(_, difference)| difference)
     }
 
-    /// Difference at the sample with the smallest distance inside a tolerance's limit, preceded by
-    /// that distance.
+    /// Smallest distance inside a tolerance's limit over the samples, and the difference at that
+    /// sample.
     fn worst(
         &self,
-        flown: (&Recording, &FreeRun),
+        flown: (&ManeuverRecording, &FreeRun),
         posterior: &LocalPosterior,
         judged: &Judged,
     ) -> Option<(f64, LinearDifference)> {
@@ -126,12 +127,12 @@ impl MeanRun {
     /// Difference at a sample; `None` for one that ingest has repaired, or a tolerance of no output.
     fn difference(
         &self,
-        (recording, run): (&Recording, &FreeRun),
+        (recording, run): (&ManeuverRecording, &FreeRun),
         sample: usize,
         judged: &Judged,
     ) -> Option<LinearDifference> {
         let tolerance = &judged.tolerance;
-        let output = place(tolerance.quantity)?;
+        let output = output_index(tolerance.quantity)?;
         let recorded = sample * self.stride;
         if *recording.repaired.get(recorded)?.get(output)? {
             return None;
@@ -147,7 +148,7 @@ impl MeanRun {
             quantity: tolerance.quantity,
             mean: per_width * (self.run.outputs[sample][output] - run.outputs.get(sample)?[output]),
             slopes: slopes.collect(),
-            rest: per_width * by_start.hypot(recording.noise[output]),
+            fixed_deviation: per_width * by_start.hypot(recording.noise[output]),
         })
     }
 }
@@ -160,13 +161,13 @@ pub struct LinearDifference {
     /// Slopes by index among the values of the posterior.
     pub slopes: Vec<(usize, f64)>,
     /// Standard deviation from the start and the noise.
-    pub rest: f64,
+    pub fixed_deviation: f64,
 }
 
 impl LinearDifference {
     /// Distance inside the nearest limit, standard deviations.
     fn distance(&self, covariance: &DMatrix<f64>) -> f64 {
-        (1.0 - self.mean.abs()) / self.deviation(covariance).hypot(self.rest)
+        (1.0 - self.mean.abs()) / self.deviation(covariance).hypot(self.fixed_deviation)
     }
 
     /// Standard deviation from the derivatives.

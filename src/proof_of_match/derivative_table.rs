@@ -4,7 +4,7 @@
 use crate::aero::{Buildup, Condition, Regressor, WindTunnel};
 use crate::numerics::trapezoid::running_integral;
 
-/// Spacing of the table, deg. It is linear between, as most databases are.
+/// Spacing of the table, deg. Between its points the table is linear, as most databases are.
 const STEP_DEG: f64 = 1.0;
 
 /// Reach of the table on either side of the maneuver's mean, deg. Beyond it, derivatives are
@@ -93,7 +93,7 @@ impl DerivativeTable {
 
     #[inline]
     #[must_use]
-    pub fn place(&self, alpha_deg: f64) -> TablePosition {
+    pub fn position_of(&self, alpha_deg: f64) -> TablePosition {
         let steps = (alpha_deg - self.first_deg) / STEP_DEG;
         #[expect(
             clippy::cast_possible_truncation,

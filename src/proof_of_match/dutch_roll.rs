@@ -1,5 +1,5 @@
-//! Dutch roll of a maneuver: that of the flight by its own estimates, that of a simulator by its
-//! model.
+//! Dutch roll of a maneuver: of the aircraft by the maneuver's own estimates, and of a simulator by
+//! its model.
 //!
 //! Period, time to half and damping ratio follow from the same linear equations at the maneuver's
 //! condition ([`crate::qualities`]), so that only the derivatives differ. A maneuver contains no
@@ -16,7 +16,7 @@ use crate::maneuver::{Maneuver, Means};
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
 use crate::numerics::random::RandomStream;
 use crate::numerics::root::continuous_root;
-use crate::qualities::{Controls, Differentiation, Flight, FlownConditions, LinearModel};
+use crate::qualities::{Controls, Differentiation, FlownConditions, LinearModel, SteadyFlight};
 use crate::tables::{FlyingQuality, MatchedQuantity};
 
 /// Estimates of a maneuver.
@@ -67,9 +67,9 @@ pub struct LateralModes {
     linear: LinearModel,
     /// Derivatives of the equations, by their index in the build-up.
     derivatives: Vec<usize>,
-    /// The maneuver's own values.
+    /// Values of the derivatives by the maneuver's own estimates.
     own: DVector<f64>,
-    /// Derivatives that the maneuver estimates; it holds the others.
+    /// Mask of the derivatives that the maneuver estimates; the others are held.
     estimated: Vec<bool>,
     /// Root of the covariance of the estimates' errors.
     errors: DMatrix<f64>,
@@ -88,7 +88,7 @@ impl LateralModes {
         let conditions = FlownConditions::new(&[(maneuver, means)], tunnel);
         let trim = conditions.trim(maneuver.alpha_deg, aircraft)?;
         let nothing = BTreeMap::new();
-        let flight = Flight {
+        let flight = SteadyFlight {
             aircraft,
             buildup,
             trim: &trim,
@@ -120,7 +120,7 @@ impl LateralModes {
             flight: dutch_roll(&linear, &own)?,
             estimated: names
                 .iter()
-                .map(|name| estimates.place(name).is_some())
+                .map(|name| estimates.index_of(name).is_some())
                 .collect(),
             errors: continuous_root(&estimates.covariance_of(&names)),
             alpha_deg: maneuver.alpha_deg,
@@ -137,7 +137,7 @@ impl LateralModes {
     }
 
     fn values(&self, table: &DerivativeTable) -> DVector<f64> {
-        let place = table.place(self.alpha_deg);
+        let place = table.position_of(self.alpha_deg);
         let values = self.derivatives.iter().map(|i| table.value(place, *i));
         DVector::from_iterator(self.own.len(), values)
     }
@@ -177,8 +177,8 @@ impl LateralModes {
         })
     }
 
-    /// Dutch roll according to a repeat flight's estimates: those of an aircraft that deviates from
-    /// a model, with errors of their own.
+    /// Dutch roll by the estimates from a repeat flight. The estimates are the derivatives of an
+    /// aircraft that deviates from a model, plus errors of estimation.
     #[must_use]
     pub fn of_repeat(
         &self,
@@ -211,13 +211,13 @@ impl OwnEstimates {
         own.map(|(_, value)| *value)
     }
 
-    fn place(&self, name: &str) -> Option<usize> {
+    fn index_of(&self, name: &str) -> Option<usize> {
         self.estimated.iter().position(|own| own == name)
     }
 
     /// Covariance of some derivatives; zero for those that are held.
     fn covariance_of(&self, names: &[&str]) -> DMatrix<f64> {
-        let places: Vec<Option<usize>> = names.iter().map(|name| self.place(name)).collect();
+        let places: Vec<Option<usize>> = names.iter().map(|name| self.index_of(name)).collect();
         let count = self.estimated.len();
         let entry = |i: usize, j: usize| {
             let at = places[i]? * count + places[j]?;

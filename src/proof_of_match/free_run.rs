@@ -1,11 +1,11 @@
-//! Free run: the rigid body flies from a start, with nothing of the record but the surfaces, thrust
-//! and mass.
+//! Free run: the rigid body flies from a start. Of the record only surfaces, thrust and mass are
+//! used.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
-use super::aerodynamics::{AboutTrim, Aerodynamics, COEFFICIENTS, Flow, Trim};
+use super::aerodynamics::{AboutTrim, Aerodynamics, COEFFICIENTS, Flow, SimulationTrim};
 use super::load_changes::LoadSlopes;
 use super::outputs::{Outputs, outputs};
-use super::recording::Recording;
+use super::recording::ManeuverRecording;
 use crate::aircraft::Aircraft;
 use crate::numerics::runge_kutta::{self, POINT};
 use crate::rigid_body::{AirData, BodyState, CHANGING, Euler, Instant, Loads, Readings, body};
@@ -32,14 +32,13 @@ pub struct Start {
     /// Ratio of the measured dynamic pressure to that in the standard atmosphere: the density of
     /// the day.
     pub density_ratio: f64,
-    pub trim: Trim,
+    pub trim: SimulationTrim,
 }
 
 impl Start {
-    /// The start with one parameter changed: a state, or one of the trim coefficients, which follow
-    /// the states.
+    /// Start with one parameter changed. Parameters are the states, then the trim coefficients.
     #[must_use]
-    pub fn moved(&self, parameter: usize, by: f64) -> Start {
+    pub fn with_change(&self, parameter: usize, by: f64) -> Start {
         let mut start = self.clone();
         match start.state.get_mut(parameter) {
             Some(state) => *state += by,
@@ -52,7 +51,7 @@ impl Start {
         start
     }
 
-    /// Slopes of the body's changing states along one of the start's.
+    /// Slopes of the body's state along one state of the start.
     #[must_use]
     pub fn slopes(&self, parameter: usize) -> [f64; CHANGING] {
         let [alpha, beta, velocity, ..] = self.state;
@@ -69,7 +68,8 @@ impl Start {
                 -velocity * sa * sb,
             ]),
             2 => body[..3].copy_from_slice(&[ca * cb, sb, sa * cb]),
-            // Pitch turns about the axis across, as the heading is zero; bank about the body's own.
+            // Pitch attitude turns about the horizontal lateral axis, since the heading is zero;
+            // bank turns about the body's longitudinal axis.
             6 => turn[..4].copy_from_slice(
                 (Quaternion::new(0.0, 0.0, 0.5, 0.0) * attitude)
                     .coords
@@ -113,7 +113,7 @@ pub struct FreeRun {
 #[derive(Clone, Debug)]
 pub struct Simulation<'a> {
     pub aircraft: &'a Aircraft,
-    pub recording: &'a Recording,
+    pub recording: &'a ManeuverRecording,
     pub aerodynamics: Aerodynamics<'a>,
 }
 
@@ -236,7 +236,8 @@ impl RunEquations<'_> {
         self.instant_at(alpha_rate, state, point)
     }
 
-    /// Slopes of the loads at an instant, and those of each derivative's coefficient along it.
+    /// Slopes of the loads at an instant, and slope of each derivative's coefficient along the
+    /// derivative.
     pub fn load_slopes(&mut self, instant: &Instant, point: usize) -> (LoadSlopes, Vec<f64>) {
         let has_lag = self.aerodynamics.have_lag();
         let state = &instant.state;

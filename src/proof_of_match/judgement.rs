@@ -2,20 +2,20 @@
 
 use super::dutch_roll::DutchRoll;
 use super::free_run::FreeRun;
-use super::outputs::place;
-use super::recording::Recording;
+use super::outputs::output_index;
+use super::recording::ManeuverRecording;
 use super::specification::{Test, Tolerance};
 use crate::tables::MatchVerdict;
 
 /// Finding about one tolerance.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Finding {
+pub struct ToleranceFinding {
     pub test: String,
     pub subject: String,
     /// Number of the requirement within its test, from one.
     pub requirement: usize,
     pub tolerance: Tolerance,
-    /// Values of the Dutch roll.
+    /// Value of the Dutch roll's quantity in flight and by the model; `None` for a time history.
     pub flight_value: Option<f64>,
     pub model_value: Option<f64>,
     pub samples: usize,
@@ -23,11 +23,11 @@ pub struct Finding {
     /// Largest distance beyond the tolerance, with its time; `None` if the simulated aircraft
     /// departs.
     pub largest_excess: Option<(f64, f64)>,
-    /// Minus infinity if the simulated aircraft departs.
+    /// Margin to the tolerance; minus infinity if the simulated aircraft departs.
     pub margin: f64,
 }
 
-impl Finding {
+impl ToleranceFinding {
     #[must_use]
     pub fn verdict(&self) -> MatchVerdict {
         verdict(self.margin)
@@ -61,7 +61,8 @@ impl Judged<'_> {
     }
 }
 
-/// Tolerances of some tests that can be judged; those of the Dutch roll only if it is available.
+/// Tolerances of some tests that can be judged. Tolerances of the Dutch roll are left out if it is
+/// not available.
 #[must_use]
 pub fn judged<'a>(tests: &[&'a Test], has_dutch_roll: bool) -> Vec<Judged<'a>> {
     let of_test = |test: &&'a Test| {
@@ -91,11 +92,11 @@ pub struct Simulated {
 /// Judges a simulation. `required_pct` of the samples must be inside.
 #[must_use]
 pub fn judge(
-    recording: &Recording,
+    recording: &ManeuverRecording,
     simulated: &Simulated,
     judged: &[Judged],
     required_pct: f64,
-) -> Vec<Finding> {
+) -> Vec<ToleranceFinding> {
     let finding = |own: &Judged| {
         let tolerance = &own.tolerance;
         let differences = if tolerance.quantity.is_of_dutch_roll() {
@@ -103,7 +104,7 @@ pub fn judge(
         } else {
             differences(recording, &simulated.run, tolerance)
         };
-        Finding {
+        ToleranceFinding {
             test: own.test.test.clone(),
             subject: own.test.subject.clone(),
             requirement: own.requirement,
@@ -132,9 +133,9 @@ impl Simulated {
     }
 }
 
-/// The requirement with the smallest margin, as its best alternative; `None` without findings.
+/// Best alternative of the requirement with the smallest margin; `None` without findings.
 #[must_use]
-pub fn decisive(findings: &[Finding]) -> Option<&Finding> {
+pub fn decisive(findings: &[ToleranceFinding]) -> Option<&ToleranceFinding> {
     let requirements = findings.chunk_by(|a, b| a.test == b.test && a.requirement == b.requirement);
     let best =
         requirements.filter_map(|own| own.iter().max_by(|a, b| a.margin.total_cmp(&b.margin)));
@@ -151,14 +152,18 @@ struct Difference {
 }
 
 impl Difference {
-    /// Size over width.
+    /// Size of the difference over the width of the tolerance.
     fn ratio(&self) -> f64 {
         self.size / self.width
     }
 }
 
-fn differences(recording: &Recording, run: &FreeRun, tolerance: &Tolerance) -> Vec<Difference> {
-    let Some(output) = place(tolerance.quantity) else {
+fn differences(
+    recording: &ManeuverRecording,
+    run: &FreeRun,
+    tolerance: &Tolerance,
+) -> Vec<Difference> {
+    let Some(output) = output_index(tolerance.quantity) else {
         return vec![];
     };
     let counts = |sample: &usize| !recording.repaired[*sample][output];
@@ -199,7 +204,7 @@ pub fn allowed_outside(samples: usize, required_pct: f64) -> usize {
     samples.saturating_sub(required)
 }
 
-/// One less the smallest ratio that is not exceeded by the required share of samples.
+/// One minus the smallest ratio that the required share of the samples does not exceed.
 fn margin(differences: &[Difference], required_pct: f64) -> f64 {
     let mut ratios: Vec<f64> = differences.iter().map(Difference::ratio).collect();
     ratios.sort_by(f64::total_cmp);

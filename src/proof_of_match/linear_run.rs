@@ -1,7 +1,8 @@
 //! A free run with the slopes of its outputs along its start and the derivatives of its model.
 //!
-//! The slopes are those of the discrete run: each stage of a step is differentiated at the state where its
-//! rate was taken. All parameters advance together, side by side in the lanes of vectors, along one run.
+//! The slopes are exact for the discrete run: each stage of a step is differentiated at the state
+//! at which its rate was computed. All parameters advance together, side by side in the lanes of
+//! vectors, along one run.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use std::array::from_fn;
@@ -36,7 +37,7 @@ pub type Histories = [Vec<f64>; COUNT];
 #[derive(Clone, Debug)]
 pub struct LinearRun {
     pub run: FreeRun,
-    /// In the order of the parameters, up to a departure.
+    /// Histories of the slopes, in the order of the parameters, up to a departure.
     pub slopes: Vec<Histories>,
 }
 

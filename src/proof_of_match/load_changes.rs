@@ -25,16 +25,16 @@ pub struct LoadsChange<S: Simd> {
 pub struct LoadSlopes {
     /// Slopes of the coefficients, along angles in rad and relative changes of dynamic pressure.
     coefficients: [FlowSlopes; COEFFICIENTS],
-    /// Aerodynamic force and moment, to which dynamic pressure is a factor.
+    /// Aerodynamic force and moment, which are proportional to dynamic pressure.
     force: [f64; 3],
     moment: [f64; 3],
-    /// Slopes of force and moment along their own coefficients.
+    /// Slope of each component of force and moment along its coefficient.
     force_by_own: [f64; 3],
     moment_by_own: [f64; 3],
     lag: Option<Lag>,
 }
 
-/// Slopes of α̇ for loads that depend on it, so that α̇ depends on itself.
+/// Slopes of α̇ where the loads depend on α̇, so that its equation is implicit.
 #[derive(Clone, Copy, Debug)]
 struct Lag {
     by_velocity: [f64; 3],
@@ -75,7 +75,8 @@ impl LoadSlopes {
         slopes
     }
 
-    /// α̇ = (u ẇ − w u̇)/(u² + w²), where ẇ and u̇ are linear in α̇.
+    /// Slopes of α̇ = (u ẇ − w u̇)/(u² + w²), with u and w the velocities along body x and z. u̇
+    /// and ẇ are linear in α̇.
     fn lag(&self, instant: &Instant) -> Lag {
         let along = |i: usize| self.coefficients[i][Flow::ALPHA_RATE];
         let force: [f64; 3] = from_fn(|i| self.force_by_own[i] * along(FORCE[i].0));

@@ -7,10 +7,10 @@ use super::decisive_difference::{DecisiveDifference, PredictedDutchRoll};
 use super::derivative_table::DerivativeTable;
 use super::dutch_roll::{LateralModes, OwnEstimates};
 use super::free_run::{FreeRun, Simulation};
-use super::judgement::{self, Finding, Simulated};
+use super::judgement::{self, Simulated, ToleranceFinding};
 use super::mean_run::MeanRun;
-use super::outputs::place;
-use super::recording::Recording;
+use super::outputs::output_index;
+use super::recording::ManeuverRecording;
 use super::repeat_flight::{self, Probabilities, Repeats};
 use super::specification::{Specification, Test};
 use super::start::{self, MatchedStart};
@@ -41,14 +41,15 @@ pub struct ProofInputs<'a> {
     pub specification: &'a Specification,
 }
 
-/// A maneuver as found.
+/// A maneuver as recorded, with the posterior and the estimates that belong to it.
 #[derive(Clone, Copy, Debug)]
 pub struct RecordedManeuver<'a> {
     pub record: &'a Record,
     pub maneuver: &'a Maneuver,
     /// Posterior of the maneuver's axis at its condition; without one there are no probabilities.
     pub local: Option<&'a LocalPosterior>,
-    /// Means of its record and its own estimates, from which its Dutch roll follows.
+    /// Means of the record and the maneuver's own estimates, from which the Dutch roll of the
+    /// flight follows.
     pub own: Option<(&'a Means, &'a OwnEstimates)>,
 }
 
@@ -79,7 +80,7 @@ impl Matched {
 /// Flies a maneuver again with each model.
 #[must_use]
 pub fn fly_again(basis: &ProofInputs, flown: &RecordedManeuver) -> Matched {
-    match Flight::new(basis, flown) {
+    match RepeatableManeuver::new(basis, flown) {
         Ok(flight) => flight.matched(),
         Err(reason) => not_flown(basis, flown.maneuver, &reason),
     }
@@ -94,7 +95,7 @@ pub fn decisive_difference(
     basis: &ProofInputs,
     flown: &RecordedManeuver,
 ) -> Result<DecisiveDifference, String> {
-    Flight::new(basis, flown)?.decisive_difference()
+    RepeatableManeuver::new(basis, flown)?.decisive_difference()
 }
 
 /// Dutch roll of a lateral maneuver by its own estimates.
@@ -138,7 +139,7 @@ pub fn not_flown(basis: &ProofInputs, maneuver: &Maneuver, reason: &str) -> Matc
     }
 }
 
-/// Verdict of a maneuver before it is flown.
+/// Verdict row of a maneuver before it is flown again.
 fn verdict_row(maneuver: &Maneuver, model: ModelSource) -> MatchVerdictRow {
     MatchVerdictRow {
         maneuver_id: maneuver.maneuver_id.clone(),
@@ -162,21 +163,24 @@ struct Trimmed<'a> {
 }
 
 /// A maneuver that can be flown again.
-struct Flight<'a> {
+struct RepeatableManeuver<'a> {
     basis: &'a ProofInputs<'a>,
     maneuver: &'a Maneuver,
     local: Option<&'a LocalPosterior>,
     modes: Option<LateralModes>,
     tests: Vec<&'a Test>,
-    recording: Recording,
+    recording: ManeuverRecording,
 }
 
-impl<'a> Flight<'a> {
+impl<'a> RepeatableManeuver<'a> {
     /// A maneuver that can be flown again.
     ///
     /// # Errors
     /// The reason why it cannot.
-    fn new(basis: &'a ProofInputs, flown: &RecordedManeuver<'a>) -> Result<Flight<'a>, String> {
+    fn new(
+        basis: &'a ProofInputs,
+        flown: &RecordedManeuver<'a>,
+    ) -> Result<RepeatableManeuver<'a>, String> {
         let RecordedManeuver {
             record,
             maneuver,
@@ -193,13 +197,13 @@ impl<'a> Flight<'a> {
             return Err("no test judges its class".to_owned());
         }
         let aircraft = (basis.aircraft, basis.buildup);
-        Ok(Flight {
+        Ok(RepeatableManeuver {
             basis,
             maneuver,
             local,
             modes: dutch_roll(basis, maneuver, own),
             tests,
-            recording: Recording::new(record, maneuver, aircraft, specification.trim_s)?,
+            recording: ManeuverRecording::new(record, maneuver, aircraft, specification.trim_s)?,
         })
     }
 
@@ -210,7 +214,7 @@ impl<'a> Flight<'a> {
         let local = self.local.ok_or("the posterior has nothing of its axis")?;
         let posterior = self.trimmed(basis.posterior);
         let about = (&posterior.simulation, &posterior.start);
-        let mean = MeanRun::of(about, local, (basis.buildup, self.maneuver.axis))
+        let mean = MeanRun::fly(about, local, (basis.buildup, self.maneuver.axis))
             .ok_or("its start is not determined")?;
         let follows_mean = *model == ModelSource::Posterior;
         let own = (!follows_mean).then(|| self.trimmed(database));
@@ -231,7 +235,7 @@ impl<'a> Flight<'a> {
             quantity: decisive.quantity,
             mean: decisive.mean,
             slopes: named.collect(),
-            rest: decisive.rest,
+            fixed_deviation: decisive.fixed_deviation,
             follows_mean,
         })
     }
@@ -313,7 +317,7 @@ impl<'a> Flight<'a> {
             .get_or_insert_with(|| self.history(&simulated.run, &findings));
     }
 
-    fn row(&self, model: ModelSource, finding: &Finding) -> MatchRow {
+    fn row(&self, model: ModelSource, finding: &ToleranceFinding) -> MatchRow {
         let maneuver = self.maneuver;
         let tolerance = finding.tolerance;
         MatchRow {
@@ -344,7 +348,7 @@ impl<'a> Flight<'a> {
     fn verdict(
         &self,
         model: ModelSource,
-        findings: &[Finding],
+        findings: &[ToleranceFinding],
         repeat: Option<&Probabilities>,
     ) -> MatchVerdictRow {
         let decisive = judgement::decisive(findings);
@@ -362,7 +366,8 @@ impl<'a> Flight<'a> {
         }
     }
 
-    /// One if a surface moves after the last input; `None` if the maneuver ends before that.
+    /// Returns 1 if a surface moves after the last input, which indicates feedback, else 0. `None`
+    /// if the maneuver ends before that can be seen.
     fn closed_loop(&self) -> Option<usize> {
         let settled_s = self.maneuver.recognised.last_input_s? + SETTLED_S;
         let has_moved = self.recording.movement_after(settled_s) > MOVED_DEG;
@@ -370,7 +375,7 @@ impl<'a> Flight<'a> {
     }
 
     /// Judged quantities measured and computed, each once.
-    fn history(&self, run: &FreeRun, findings: &[Finding]) -> History {
+    fn history(&self, run: &FreeRun, findings: &[ToleranceFinding]) -> History {
         let recording = &self.recording;
         let times = (0..recording.samples).map(|k| recording.start_s + k as f64 * recording.step_s);
         let mut quantities = Vec::new();
@@ -380,7 +385,7 @@ impl<'a> Flight<'a> {
             }
         }
         let output = |quantity: &crate::tables::MatchedQuantity| {
-            let output = place(*quantity)?;
+            let output = output_index(*quantity)?;
             let computed = |k: usize| run.outputs.get(k).map_or(f64::NAN, |o| o[output]);
             let samples = 0..recording.samples;
             Some(HistoryOutput {

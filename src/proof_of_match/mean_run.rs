@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use super::free_run::{FreeRun, STATES, Simulation};
 use super::linear_run::{Histories, LinearRun, Parameter};
 use super::outputs::{COUNT, Outputs};
-use super::recording::Recording;
+use super::recording::ManeuverRecording;
 use super::start::MatchedStart;
 use crate::aero::{Axis, Buildup, Regressor};
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
@@ -36,7 +36,7 @@ pub struct MeanRun {
 impl MeanRun {
     /// Flies the mean of a posterior; `None` if its start is not determined.
     #[must_use]
-    pub fn of(
+    pub fn fly(
         (simulation, start): (&Simulation, &MatchedStart),
         posterior: &LocalPosterior,
         (buildup, axis): (&Buildup, Axis),
@@ -44,7 +44,7 @@ impl MeanRun {
         let covariance = start.covariance.as_ref()?;
         let recording = simulation.recording;
         let stride = stride(recording);
-        let derivatives = moving(posterior, buildup);
+        let derivatives = acting_derivatives(posterior, buildup);
         let own = start_parameters(axis);
         let moved = derivatives.iter().map(|(_, d)| Parameter::Derivative(*d));
         let parameters: Vec<Parameter> = moved.chain(own.map(Parameter::Start)).collect();
@@ -72,7 +72,7 @@ impl MeanRun {
     #[must_use]
     pub fn deficiency(
         &self,
-        recording: &Recording,
+        recording: &ManeuverRecording,
         mean: &[Outputs],
         roots: [&DMatrix<f64>; 2],
     ) -> Vec<Outputs> {
@@ -121,7 +121,7 @@ impl MeanRun {
 }
 
 /// Samples in a step of the run with slopes.
-fn stride(recording: &Recording) -> usize {
+fn stride(recording: &ManeuverRecording) -> usize {
     whole_steps(LONGEST_STEP_S, recording.step_s)
         .min(recording.samples)
         .max(1)
@@ -130,7 +130,7 @@ fn stride(recording: &Recording) -> usize {
 /// Indices of the derivatives that affect a simulation, among the values of a posterior and in the
 /// build-up.
 #[must_use]
-pub fn moving(posterior: &LocalPosterior, buildup: &Buildup) -> Vec<(usize, usize)> {
+pub fn acting_derivatives(posterior: &LocalPosterior, buildup: &Buildup) -> Vec<(usize, usize)> {
     let index = |value: &LocalValue| {
         let is_slope = value.kind == LocalKind::Derivative && !value.is_mach_slope;
         let mut derivatives = buildup.derivatives.iter();

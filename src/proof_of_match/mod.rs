@@ -1,14 +1,17 @@
-//! Proof of match: does the simulator still match the aircraft? Each maneuver is flown again by a
+//! Proof of match: comparison of simulators with the aircraft. Each maneuver is flown again by a
 //! body with six degrees of freedom, and judged by the tolerances of a standard.
 //!
-//! [`recording`] is the maneuver as recorded: inputs and outputs. [`derivative_table`] and
-//! [`aerodynamics`] are the model that flies it, [`free_run`] the flight, [`linear_run`] the slopes
-//! of its outputs, and [`start`] its initial state and trim. [`specification`] has the tolerances,
-//! which are the analyst's data; [`judgement`] compares, and [`dutch_roll`] adds the modes of the
-//! flight's own estimates; [`mean_run`] is the run at the posterior's mean with the part of the flight
-//! that it does not explain, [`repeat_flight`] adds the probability that a repeat flight passes, and
-//! [`mod@decisive_difference`] the difference that decides it, as a linear function of the
-//! derivatives.
+//! - [`recording`]: the maneuver as recorded, inputs and outputs;
+//! - [`derivative_table`] and [`aerodynamics`]: the model that flies it again;
+//! - [`free_run`]: the flight, and [`linear_run`]: the slopes of its outputs;
+//! - [`start`]: initial state and trim;
+//! - [`specification`]: tolerances, which are the analyst's data;
+//! - [`judgement`]: comparison with the tolerances;
+//! - [`dutch_roll`]: modes by the maneuver's own estimates;
+//! - [`mean_run`]: run at the posterior's mean, and the part of the flight that it does not explain;
+//! - [`repeat_flight`]: probability that a repeat flight passes;
+//! - [`mod@decisive_difference`]: the difference that decides whether it passes, as a linear
+//!   function of the derivatives.
 
 mod specification;
 mod outputs;

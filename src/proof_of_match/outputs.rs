@@ -26,7 +26,7 @@ pub type Outputs = [f64; COUNT];
 
 /// Index of a quantity among the outputs; `None` for one that is no time history.
 #[must_use]
-pub fn place(quantity: MatchedQuantity) -> Option<usize> {
+pub fn output_index(quantity: MatchedQuantity) -> Option<usize> {
     MATCHED.iter().position(|own| *own == quantity)
 }
 

@@ -27,7 +27,7 @@ const LEAST_NOISE: Outputs = [
 
 /// Inputs of the simulation at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Inputs {
+pub struct SimulationInputs {
     pub loading: Loading,
     pub mass: Mass,
     pub thrust: Thrust,
@@ -37,14 +37,14 @@ pub struct Inputs {
 
 /// Maneuver as recorded.
 #[derive(Clone, Debug)]
-pub struct Recording {
+pub struct ManeuverRecording {
     pub step_s: f64,
     pub start_s: f64,
     pub samples: usize,
     /// Samples over which initial state and trim are matched.
     pub trim_samples: usize,
     /// Inputs at samples and halfway between them.
-    inputs: Vec<Inputs>,
+    inputs: Vec<SimulationInputs>,
     /// Recorded signals of the build-up at the same points.
     signals: Vec<f64>,
     /// Number of the signals.
@@ -60,7 +60,7 @@ pub struct Recording {
     pub noise: Outputs,
 }
 
-impl Recording {
+impl ManeuverRecording {
     /// Cuts a maneuver out of its record.
     ///
     /// # Errors
@@ -70,7 +70,7 @@ impl Recording {
         maneuver: &Maneuver,
         (aircraft, buildup): (&Aircraft, &Buildup),
         longest_trim_s: f64,
-    ) -> Result<Recording, String> {
+    ) -> Result<ManeuverRecording, String> {
         let first = record.sample_at(maneuver.start_s);
         let range = first..record.sample_at(maneuver.end_s) + 1;
         let samples = range.len();
@@ -89,7 +89,7 @@ impl Recording {
         let motions: Vec<Motion> = window.motion(aircraft).points().collect();
         let measured = measured(record, range.clone());
         let trim_samples = trim_samples(record, maneuver, samples, longest_trim_s);
-        Ok(Recording {
+        Ok(ManeuverRecording {
             step_s: record.step_s,
             start_s: record.time_s(first),
             samples,
@@ -116,7 +116,7 @@ impl Recording {
 
     /// Inputs at a point: sample k is point 2k.
     #[must_use]
-    pub fn inputs(&self, point: usize) -> &Inputs {
+    pub fn inputs(&self, point: usize) -> &SimulationInputs {
         &self.inputs[point]
     }
 
@@ -147,7 +147,7 @@ impl Recording {
     }
 }
 
-fn inputs(motion: &Motion) -> Inputs {
+fn inputs(motion: &Motion) -> SimulationInputs {
     let loading = Loading {
         mass_slug: motion.mass,
         x_cg_ft: motion.cg.x_ft,
@@ -158,7 +158,7 @@ fn inputs(motion: &Motion) -> Inputs {
         iz_slug_ft2: motion.iz,
         ixz_slug_ft2: motion.ixz,
     };
-    Inputs {
+    SimulationInputs {
         loading,
         mass: loading.mass(),
         thrust: motion.thrust,

@@ -2,10 +2,10 @@
 //! noise are propagated to the differences between aircraft and simulator.
 //!
 //! A repeat flight is flown by an aircraft of the posterior with the same surfaces. To first order
-//! its outputs differ from those at the mean by the effects of the derivatives' deviations. Those
-//! of the simulator differ by the effects of the errors of its matched start. Both follow from the
-//! slopes of one free run. The noise of the sensors is white and independent, so its part of the
-//! probability is exact for each draw.
+//! its outputs differ from those at the mean by the effects of the derivatives' deviations. The
+//! outputs of the simulator differ by the effects of the errors of its matched start. Both effects
+//! follow from the slopes of one free run. The noise of the sensors is white and independent, so
+//! its part of the probability is exact for each draw.
 //!
 //! A flight may differ from the mean by more than these parts explain, for example if a derivative
 //! varies in a way that the posterior smooths, or the equations lack an effect. This *deficiency*
@@ -18,8 +18,8 @@ use super::free_run::{FreeRun, Simulation};
 use super::judgement::{Judged, Simulated, allowed_outside};
 use super::linear_run::Histories;
 use super::mean_run::{MeanRun, of_places};
-use super::outputs::{Outputs, place};
-use super::recording::Recording;
+use super::outputs::{Outputs, output_index};
+use super::recording::ManeuverRecording;
 use super::specification::Tolerance;
 use super::start::MatchedStart;
 use crate::aero::{Axis, Buildup};
@@ -63,7 +63,7 @@ pub struct Probabilities {
 }
 
 impl Probabilities {
-    /// The probabilities within 0 and 1, without the rounding errors of the sums.
+    /// Limits the probabilities to 0 and 1, which rounding errors of the sums may exceed.
     fn clamped(mut self) -> Probabilities {
         for probability in self.tolerances.iter_mut().chain([&mut self.whole]) {
             *probability = probability.clamp(0.0, 1.0);
@@ -82,7 +82,7 @@ pub fn repeats(
     model: (&Buildup, Axis),
     draws: usize,
 ) -> Option<Repeats> {
-    let about = MeanRun::of((simulation, start), posterior, model)?;
+    let about = MeanRun::fly((simulation, start), posterior, model)?;
     if about.derivatives.is_empty() {
         return None;
     }
@@ -130,7 +130,7 @@ impl Repeats {
     #[must_use]
     pub fn probabilities(
         &self,
-        recording: &Recording,
+        recording: &ManeuverRecording,
         simulated: &Simulated,
         judged: &[Judged],
         required_pct: f64,
@@ -143,7 +143,7 @@ impl Repeats {
             return sums;
         }
         let limits = judged.iter().map(|own| {
-            let output = place(own.tolerance.quantity)?;
+            let output = output_index(own.tolerance.quantity)?;
             let stated = (&own.tolerance, output);
             Some(SampleLimits::new(
                 recording,
@@ -255,7 +255,7 @@ struct SampleLimit {
 
 impl SampleLimits {
     fn new(
-        recording: &Recording,
+        recording: &ManeuverRecording,
         (tolerance, output): (&Tolerance, usize),
         stride: usize,
         required_pct: f64,
@@ -315,7 +315,7 @@ fn at_most_outside(inside: &[f64], allowed: usize) -> f64 {
     let mut outside = vec![0.0; allowed + 1];
     outside[0] = 1.0;
     for (before, inside) in inside.iter().enumerate() {
-        // No more samples are outside than there were.
+        // At most as many samples can be outside as were considered so far.
         for count in (1..=allowed.min(before + 1)).rev() {
             outside[count] = inside * outside[count] + (1.0 - inside) * outside[count - 1];
         }

@@ -65,7 +65,7 @@ pub struct Tolerance {
 }
 
 impl Test {
-    /// `true` for a maneuver that the test judges.
+    /// `true` if the test judges maneuvers of this axis and class.
     #[must_use]
     pub fn judges(&self, axis: Axis, class: &str) -> bool {
         let classes = self.classes.as_ref();

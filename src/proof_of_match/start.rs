@@ -1,17 +1,17 @@
 //! Start of a free run: initial state and trim, matched over the first samples of a maneuver.
 //!
 //! As in a qualification test guide, the simulator is trimmed to the aircraft before it runs free.
-//! The initial state and the six coefficients at trim are those with which the simulation fits all
-//! outputs best, weighted by their noise, up to the first input. After that the model alone changes
+//! Initial state and the six coefficients at trim are chosen so that the simulation fits all
+//! outputs best up to the first input, weighted by their noise. After that the model alone changes
 //! the coefficients.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::aerodynamics::{AboutTrim, COEFFICIENTS, Flow, Trim};
+use super::aerodynamics::{AboutTrim, COEFFICIENTS, Flow, SimulationTrim};
 use super::free_run::{FreeRun, STATES, Simulation, Start};
 use super::linear_run::{LinearRun, Parameter};
 use super::outputs::COUNT;
-use super::recording::Recording;
+use super::recording::ManeuverRecording;
 use crate::dynamics::{Equations, Lateral, Longitudinal, Motion};
 use crate::earth::air;
 use crate::numerics::symmetric;
@@ -37,7 +37,7 @@ pub struct MatchedStart {
 pub fn matched(simulation: &Simulation) -> MatchedStart {
     let recording = simulation.recording;
     let mut start = as_measured(simulation);
-    let Some((slopes, mut computed)) = Slopes::of(simulation, &start) else {
+    let Some((slopes, mut computed)) = StartSlopes::of(simulation, &start) else {
         return MatchedStart {
             start,
             covariance: None,
@@ -48,7 +48,7 @@ pub fn matched(simulation: &Simulation) -> MatchedStart {
             break;
         };
         for (parameter, by) in step.iter().enumerate() {
-            start = start.moved(parameter, *by);
+            start = start.with_change(parameter, *by);
         }
         if left > 0 {
             computed = simulation.fly(&start, recording.trim_samples, 1);
@@ -60,17 +60,17 @@ pub fn matched(simulation: &Simulation) -> MatchedStart {
     }
 }
 
-/// Slopes of the outputs along the parameters of a start, each over its noise.
-struct Slopes {
-    /// Row by row: samples, and outputs that ingest has not repaired.
+/// Slopes of the outputs along the parameters of a start, over the noise of each output.
+struct StartSlopes {
+    /// Sample, output and slopes of each row; outputs that ingest has repaired have no row.
     rows: Vec<(usize, usize, DVector<f64>)>,
     covariance: DMatrix<f64>,
 }
 
-impl Slopes {
+impl StartSlopes {
     /// Slopes, with the run at the start; `None` if the simulated aircraft departs or the samples
     /// do not determine all parameters.
-    fn of(simulation: &Simulation, start: &Start) -> Option<(Slopes, FreeRun)> {
+    fn of(simulation: &Simulation, start: &Start) -> Option<(StartSlopes, FreeRun)> {
         let recording = simulation.recording;
         let parameters: [Parameter; PARAMETERS] = std::array::from_fn(Parameter::Start);
         let LinearRun { run, slopes } =
@@ -89,11 +89,11 @@ impl Slopes {
             }
         }
         let covariance = symmetric::inverse(&information)?;
-        Some((Slopes { rows, covariance }, run))
+        Some((StartSlopes { rows, covariance }, run))
     }
 
     /// Gauss-Newton step; `None` if the aircraft departs or the step is not finite.
-    fn step(&self, recording: &Recording, computed: &FreeRun) -> Option<DVector<f64>> {
+    fn step(&self, recording: &ManeuverRecording, computed: &FreeRun) -> Option<DVector<f64>> {
         if computed.has_departed {
             return None;
         }
@@ -114,7 +114,7 @@ fn as_measured(simulation: &Simulation) -> Start {
     let recording = simulation.recording;
     let motions = &recording.motions;
     let states: Vec<[f64; STATES]> = motions.iter().map(state).collect();
-    let mut trim = Trim {
+    let mut trim = SimulationTrim {
         coefficients: [0.0; COEFFICIENTS],
         factors: mean_factors(simulation),
         alpha_deg: mean(motions.iter().map(|m| DEG * m.alpha)),

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use super::judged_aircraft::JudgedAircraft;
 use super::levels;
 use super::linear::Differentiation;
-use super::linear::{Controls, Flight, LinearModel};
+use super::linear::{Controls, LinearModel, SteadyFlight};
 use super::quantities::AxisQuantities;
 use super::specification::Specification;
 use super::trim::Trim;
@@ -22,8 +22,8 @@ use crate::tables::{
     Airframe, DeviationBasis, FlyingQuality, Level, LevelRow, QualityRow, RootRow,
 };
 
-/// Seed of the draws. All angles of attack use the same random numbers, so probabilities are as
-/// smooth over α as the posterior.
+/// Seed of the draws. All angles of attack use the same random numbers, so that probabilities vary
+/// as smoothly over α as the posterior.
 const SEED: u64 = 21;
 
 /// Share of draws with another pattern of modes, above which the standard deviation is taken from
@@ -184,7 +184,7 @@ pub fn linearised(
 ) -> (LinearModel, LocalPosterior) {
     let specification = basis.specification;
     let fixed = BTreeMap::new();
-    let flight = Flight {
+    let flight = SteadyFlight {
         aircraft: basis.aircraft,
         buildup: basis.buildup,
         trim,
@@ -196,7 +196,7 @@ pub fn linearised(
             pitch: &specification.pitch_control,
         },
     };
-    let posterior = basis.model.at(axis, &trim.condition);
+    let posterior = basis.model.posterior_at_condition(axis, &trim.condition);
     let linear = match axis {
         Axis::Longitudinal => flight.longitudinal(&posterior),
         Axis::Lateral => flight.lateral(&posterior),
@@ -256,11 +256,11 @@ impl JudgedFlight<'_> {
         let draws = axes.iter().map(|a| a.draws.len()).min().unwrap_or(0);
         let mean = levels_of(
             specification,
-            &together(axes.iter().map(AxisAnalysis::values)),
+            &all_values(axes.iter().map(AxisAnalysis::values)),
         );
         let mut counts = vec![[0_usize; 4]; mean.len()];
         for draw in 0..draws {
-            let values = together(axes.iter().map(|a| a.draws[draw].clone()));
+            let values = all_values(axes.iter().map(|a| a.draws[draw].clone()));
             for (counts, level) in counts.iter_mut().zip(levels_of(specification, &values)) {
                 counts[level as usize] += 1;
             }
@@ -288,11 +288,13 @@ impl JudgedFlight<'_> {
     }
 }
 
-fn together(axes: impl Iterator<Item = BTreeMap<FlyingQuality, f64>>) -> Vec<(FlyingQuality, f64)> {
+fn all_values(
+    axes: impl Iterator<Item = BTreeMap<FlyingQuality, f64>>,
+) -> Vec<(FlyingQuality, f64)> {
     axes.flatten().collect()
 }
 
-/// Level of each requirement, and the worst of them.
+/// Level of each requirement, then the worst level.
 fn levels_of(specification: &Specification, values: &levels::Values) -> Vec<Level> {
     let requirements = specification.requirements.iter();
     let mut found: Vec<Level> = requirements

@@ -1,6 +1,6 @@
 //! Lateral-directional equations about steady flight: states β, p, r, φ, as they are estimated.
 
-use super::linear::{AxisStates, Flight, LinearModel, Matrix, Vector};
+use super::linear::{AxisStates, LinearModel, Matrix, SteadyFlight, Vector};
 use super::trim::Trim;
 use crate::aircraft::{Aircraft, Thrust};
 use crate::dynamics::{Equations, Lateral, Rates};
@@ -21,7 +21,7 @@ pub fn rates(aircraft: &Aircraft, trim: &Trim) -> Rates<4> {
     Lateral::rates(&inputs, &Lateral::measured_state(&motion), &[0.0; 3])
 }
 
-impl Flight<'_> {
+impl SteadyFlight<'_> {
     /// Linear lateral-directional equations of a posterior.
     #[must_use]
     pub fn lateral(&self, posterior: &LocalPosterior) -> LinearModel {

@@ -20,11 +20,11 @@ pub type Matrix = SMatrix<f64, STATES, STATES>;
 pub type Vector = SVector<f64, STATES>;
 pub type ByCoefficient = SMatrix<f64, STATES, COEFFICIENTS>;
 
-/// Equations of an axis with their slopes along each value of the posterior: rates A x + B u of the states
-/// and the pitch control, and with a lag A x + B u + m α̇.
+/// Linear equations of an axis, with their slopes along each value of the posterior. The rates of
+/// the states x with the pitch control u are A x + B u, or with a lag A x + B u + m α̇.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearModel {
-    /// A without aerodynamics.
+    /// Matrix A without aerodynamics.
     pub rigid: Matrix,
     pub slopes: Vec<Matrix>,
     pub control_slopes: Vec<Vector>,
@@ -39,13 +39,13 @@ pub struct LinearModel {
 pub struct Lag {
     /// Index of α among the states.
     pub alpha: usize,
-    /// Slopes of m.
+    /// Slopes of m along each value of the posterior.
     pub slopes: Vec<Vector>,
 }
 
 /// Equations solved for the rates of the states, ẋ = A x + B u.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Solved {
+pub struct SolvedEquations {
     pub matrix: Matrix,
     pub control: Vector,
     /// Slopes of A and B along each value; empty unless they are requested.
@@ -56,13 +56,17 @@ pub struct Solved {
 impl LinearModel {
     /// Equations at values of the derivatives, solved for the rates.
     #[must_use]
-    pub fn solved(&self, values: &DVector<f64>, differentiation: Differentiation) -> Solved {
+    pub fn solved(
+        &self,
+        values: &DVector<f64>,
+        differentiation: Differentiation,
+    ) -> SolvedEquations {
         let terms = self.slopes.iter().zip(values.iter());
         let matrix = terms.fold(self.rigid, |sum, (slope, value)| sum + slope * *value);
         let control = weighted_sum(&self.control_slopes, values);
         let has_slopes = differentiation == Differentiation::Slopes;
         let count = if has_slopes { self.slopes.len() } else { 0 };
-        let explicit = Solved {
+        let explicit = SolvedEquations {
             matrix,
             control,
             slopes: self.slopes[..count].to_vec(),
@@ -76,9 +80,10 @@ impl LinearModel {
 }
 
 impl Lag {
-    /// Solves for the rates. With e the unit vector of α, ẋ = (I − m eᵀ)⁻¹ (A x + B u), and the inverse is
-    /// I + m eᵀ/(1 − eᵀm). The slopes follow from those of (I − m eᵀ) A.
-    fn solved(&self, explicit: &Solved, values: &DVector<f64>) -> Solved {
+    /// Solves the equations with a lag for the rates. Let e be the unit vector of α and I the
+    /// identity. Then ẋ = (I − m eᵀ)⁻¹ (A x + B u), and the inverse is I + m eᵀ/(1 − eᵀm). The
+    /// slopes follow from the slopes of (I − m eᵀ) A.
+    fn solved(&self, explicit: &SolvedEquations, values: &DVector<f64>) -> SolvedEquations {
         let effect = weighted_sum(&self.slopes, values);
         let share = effect / (1.0 - effect[self.alpha]);
         let solve = |matrix: Matrix| matrix + share * matrix.row(self.alpha);
@@ -90,7 +95,7 @@ impl Lag {
         let slope = |(own, lag): (&Matrix, &Vector)| solve(own + lag * matrix.row(self.alpha));
         let control_slope =
             |(own, lag): (&Vector, &Vector)| solve_vector(own + lag * control[self.alpha]);
-        Solved {
+        SolvedEquations {
             matrix,
             control,
             slopes: of_matrix.map(slope).collect(),
@@ -122,7 +127,7 @@ pub struct Effect {
     pub by_control: f64,
     /// Change with α̇, s.
     pub by_alpha_rate: f64,
-    /// Share of the coefficient at trim.
+    /// Part of the coefficient at trim.
     pub at_trim: f64,
 }
 
@@ -168,14 +173,14 @@ pub struct Controls<'a> {
 
 /// Aircraft in steady flight, with its build-up and controls.
 #[derive(Clone, Copy, Debug)]
-pub struct Flight<'a> {
+pub struct SteadyFlight<'a> {
     pub aircraft: &'a Aircraft,
     pub buildup: &'a Buildup,
     pub trim: &'a Trim,
     pub controls: Controls<'a>,
 }
 
-impl Flight<'_> {
+impl SteadyFlight<'_> {
     /// Effects of the values of a posterior. A value without a derivative in the model has no
     /// effect.
     #[must_use]
@@ -251,11 +256,11 @@ impl Flight<'_> {
                     ..Effect::default()
                 }
             }
-            part => self.part(part, states),
+            part => self.single_regressor(part, states),
         }
     }
 
-    fn part(&self, regressor: &Regressor, states: &AxisStates) -> Effect {
+    fn single_regressor(&self, regressor: &Regressor, states: &AxisStates) -> Effect {
         let trim = self.trim;
         let mut effect = Effect::constant(match regressor {
             Regressor::Constant => 1.0,

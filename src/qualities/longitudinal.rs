@@ -1,15 +1,15 @@
 //! Longitudinal equations about steady flight: states velocity, α, q, θ.
 //!
 //! The rows of α, q and θ are the equations that are estimated ([`crate::dynamics::Longitudinal`])
-//! with their own slopes. They take the velocity as measured; here it is a state, at constant
-//! thrust and density:
+//! with their own slopes. Estimation takes the velocity V as measured. Here V is a state, at
+//! constant thrust T and density, with γ the flight-path angle:
 //!
 //! m V̇ = T_x cos α + T_z sin α − q̄S (CA cos α + CN sin α) − m g sin γ,  q̄ ~ V².
 //!
 //! The pitch control balances the moment M of the thrust. Unlike the moment of the control, that of
 //! the thrust does not grow with V.
 
-use super::linear::{AxisStates, ByCoefficient, Flight, Lag, LinearModel, Matrix, Vector};
+use super::linear::{AxisStates, ByCoefficient, Lag, LinearModel, Matrix, SteadyFlight, Vector};
 use super::trim::Trim;
 use crate::aircraft::Aircraft;
 use crate::dynamics::{Equations, Longitudinal};
@@ -30,7 +30,7 @@ const AXIAL: usize = 2;
 
 /// Slopes of the states' rates at trim.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Slopes {
+pub struct RateSlopes {
     /// Along the states at constant coefficients.
     pub by_state: Matrix,
     pub by_coefficient: ByCoefficient,
@@ -38,7 +38,7 @@ pub struct Slopes {
 
 /// Slopes at trim, where the axial force coefficient is `axial_force`.
 #[must_use]
-pub fn slopes(aircraft: &Aircraft, trim: &Trim, axial_force: f64) -> Slopes {
+pub fn slopes(aircraft: &Aircraft, trim: &Trim, axial_force: f64) -> RateSlopes {
     let force = trim.qbar * aircraft.wing_area_ft2;
     let thrust = trim.thrust(aircraft, axial_force);
     let normal_force = trim.normal_force(aircraft, thrust);
@@ -66,13 +66,13 @@ pub fn slopes(aircraft: &Aircraft, trim: &Trim, axial_force: f64) -> Slopes {
     by_state[(ALPHA, THETA)] = -trim.gravity * sin_path / velocity;
     by_coefficient[(VELOCITY, NORMAL)] = -per_mass * sin;
     by_coefficient[(VELOCITY, AXIAL)] = -per_mass * cos;
-    Slopes {
+    RateSlopes {
         by_state,
         by_coefficient,
     }
 }
 
-impl Flight<'_> {
+impl SteadyFlight<'_> {
     /// Linear longitudinal equations of a posterior.
     #[must_use]
     pub fn longitudinal(&self, posterior: &LocalPosterior) -> LinearModel {

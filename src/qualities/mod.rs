@@ -1,13 +1,15 @@
-//! Qualities: is the aircraft good enough to fly? Modes of the posterior at each angle of attack,
-//! and the probability of each level of flying qualities.
+//! Flying qualities: modes of the posterior at each angle of attack, and the probability of each
+//! level.
 //!
-//! At an angle of attack [`trim`] is the steady flight that was flown there. [`linear`] is the
-//! equations that are estimated, linearised about it; its matrix is linear in the derivatives.
-//! [`modes`] are its roots with their slopes along each derivative, and [`quantities`] the
-//! quantities of the modes that a specification judges. [`specification`] has the limits, which are
-//! the analyst's data; [`analysis`] adds the standard deviations and the probabilities of the
-//! levels. [`judged_quantity`] is one quantity as a linear function of the derivatives, from which
-//! plans of the next flight follow.
+//! - [`trim`]: steady flight as flown at an angle of attack;
+//! - [`linear`]: the estimated equations, linearised about it; the matrix is linear in the
+//!   derivatives;
+//! - [`modes`]: roots of the matrix, with their slopes along each derivative;
+//! - [`quantities`]: quantities of the modes that a specification judges;
+//! - [`specification`]: limits, which are the analyst's data;
+//! - [`analysis`]: standard deviations, and probabilities of the levels;
+//! - [`judged_quantity`]: one quantity as a linear function of the derivatives, for plans of the
+//!   next flight.
 
 mod specification;
 mod judged_aircraft;
@@ -32,7 +34,7 @@ use analysis::Analysis;
 
 pub use judged_aircraft::JudgedAircraft;
 pub use judged_quantity::judged_quantity;
-pub use linear::{Controls, Differentiation, Flight, LinearModel};
+pub use linear::{Controls, Differentiation, LinearModel, SteadyFlight};
 pub use specification::{LevelLimit, Range, Specification};
 pub use trim::FlownConditions;
 

@@ -107,10 +107,10 @@ pub struct Modes {
 }
 
 impl Modes {
-    /// Modes of a matrix, with slopes along the parameters whose slopes of the matrix are given. `None`
-    /// for a matrix without roots.
+    /// Modes of a matrix, with their slopes along parameters; `along` has the slopes of the matrix
+    /// along each parameter. `None` if the eigenvalues cannot be computed.
     #[must_use]
-    pub fn of(axis: Axis, matrix: &Matrix, along: &[Matrix]) -> Option<Modes> {
+    pub fn of_matrix(axis: Axis, matrix: &Matrix, along: &[Matrix]) -> Option<Modes> {
         let roots = roots(matrix, along)?;
         let (fast, slow, pattern) = match axis {
             Axis::Longitudinal => longitudinal(&roots),
@@ -184,8 +184,9 @@ fn roots(matrix: &Matrix, along: &[Matrix]) -> Option<Vec<Root>> {
     Some(values.into_iter().map(|v| root(matrix, v, along)).collect())
 }
 
-/// Root with its mode. The slopes of root x and vector solve the bordered equations
-/// (A − λ) dx − x dλ = −dA x, xᴴ dx = 0.
+/// Root with its mode. Let A be the matrix, λ the root, and x its eigenvector of unit length. Their
+/// slopes dλ and dx along a parameter solve the bordered equations (A − λ) dx − x dλ = −dA x, xᴴ dx
+/// = 0.
 fn root(matrix: &Matrix, value: Complex<f64>, along: &[Matrix]) -> Root {
     let complex = matrix.map(|v| Complex::new(v, 0.0));
     let shifted = complex - SMatrix::<Complex<f64>, STATES, STATES>::identity() * value;

@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use super::linear::{Differentiation, LinearModel, Solved};
+use super::linear::{Differentiation, LinearModel, SolvedEquations};
 use super::modes::Modes;
 use crate::aero::Axis;
 use crate::numerics::dual::Dual;
@@ -26,7 +26,7 @@ impl LinearModel {
         differentiation: Differentiation,
     ) -> Option<AxisQuantities> {
         let solved = self.solved(values, differentiation);
-        let modes = Modes::of(axis, &solved.matrix, &solved.slopes)?;
+        let modes = Modes::of_matrix(axis, &solved.matrix, &solved.slopes)?;
         let quantities = match axis {
             Axis::Longitudinal => longitudinal(&modes, &solved, self.velocity / self.gravity),
             Axis::Lateral => lateral(&modes),
@@ -35,8 +35,8 @@ impl LinearModel {
     }
 }
 
-impl Solved {
-    /// Entry of A with its slopes.
+impl SolvedEquations {
+    /// Entry of the matrix A with its slopes.
     fn a(&self, i: usize, j: usize) -> Dual {
         let slopes = self.slopes.iter().map(|m| m[(i, j)]);
         Dual::new(self.matrix[(i, j)], slopes.collect())
@@ -70,7 +70,7 @@ impl Solved {
 
 fn longitudinal(
     modes: &Modes,
-    entries: &Solved,
+    entries: &SolvedEquations,
     velocity_over_gravity: f64,
 ) -> Vec<(FlyingQuality, Dual)> {
     let (fast, slow) = (modes.fast_pair(), modes.slow_pair());

@@ -90,7 +90,8 @@ impl Trim {
 #[derive(Clone, Debug, PartialEq)]
 struct FlownCondition {
     alpha_deg: f64,
-    /// By signal; includes the tunnel's third variable, if it has one.
+    /// Means of the condition's quantities by signal, including the tunnel's third variable if it
+    /// has one.
     quantities: BTreeMap<&'static str, f64>,
     /// By channel.
     surfaces_deg: BTreeMap<String, f64>,
@@ -233,7 +234,7 @@ fn mean_of<'a, K: Ord + Clone + 'a>(
         .collect()
 }
 
-/// Values interpolated at a fraction; a value that one of them lacks is taken from the other.
+/// Interpolates values at a fraction; a value that one map lacks is taken from the other.
 fn between<K: Ord + Clone>(
     lower: &BTreeMap<K, f64>,
     upper: &BTreeMap<K, f64>,

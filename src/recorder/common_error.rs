@@ -18,11 +18,11 @@ pub struct CommonError {
     pub mean: f64,
     /// Standard deviation of the mean, including the error that all flights share.
     pub bound: f64,
-    /// Standard deviation between flights.
+    /// Standard deviation of the error between flights.
     pub scatter: f64,
-    /// Upper 90 % limit of the scatter. That of few flights is itself uncertain.
+    /// Upper 90 % limit of the scatter. The scatter of few flights is itself uncertain.
     pub scatter_limit: f64,
-    /// Flights far from the others, which the mean leaves out.
+    /// Ids of the flights far from the others, which the mean leaves out.
     pub far: Vec<String>,
 }
 
@@ -52,7 +52,7 @@ impl CommonError {
         })
     }
 
-    /// Error of a flight with this evidence of its own, and its standard deviation.
+    /// Error of a flight from its own evidence and the common error, with its standard deviation.
     #[must_use]
     pub fn of_flight(&self, own: Option<&ErrorSample>) -> (f64, f64) {
         let prior = (self.scatter_limit.powi(2) + self.bound.powi(2)).recip();
@@ -65,8 +65,8 @@ impl CommonError {
     }
 }
 
-/// Error of the mean from the errors that all flights share: the flights' own, with the weights of
-/// the mean.
+/// Standard deviation of the mean from the parts that all flights share: the mean of the flights'
+/// systematic parts, with the weights of the mean.
 fn systematic(samples: &[&ErrorSample], pooled: &RandomEffects<1>) -> f64 {
     let weight = |s: &ErrorSample| (s.bound * s.bound + pooled.scatter_variance).recip();
     let moment: f64 = samples.iter().map(|s| weight(s) * s.systematic).sum();
@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_of_flights_that_say_little_hold() {
+    fn bounds_of_flights_with_little_information_hold() {
         const TIMES: u32 = 300;
         let mut random = RandomStream::new(3, "recorder");
         let mut inside = 0;

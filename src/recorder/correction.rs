@@ -1,14 +1,14 @@
 //! Corrections of flights by the errors of the other flights.
 //!
 //! A flight that determines an error by itself keeps its own estimate. Another flight gets the
-//! posterior from its weak evidence and the errors of the others. An error far from that of the
-//! others corrects nothing.
+//! posterior from its weak evidence and the errors of the others. If the error of a flight is far
+//! from the other flights', the flight is not corrected by it.
 
 use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use super::findings::Findings;
+use super::findings::RecorderFindings;
 use crate::flight::Correction;
 use crate::ingest::Compatibility;
 use crate::tables::{InstrumentError, InstrumentRow, InstrumentVerdict};
@@ -33,7 +33,7 @@ pub struct FlightCorrections {
 /// corrections of flights whose corrections change.
 pub fn correct_flights(
     rows: &mut [InstrumentRow],
-    findings: &mut Findings,
+    findings: &mut RecorderFindings,
     settings: &Compatibility,
 ) -> Vec<FlightCorrections> {
     let mut changed = BTreeSet::new();
@@ -55,9 +55,9 @@ pub fn correct_flights(
     changed.into_iter().map(of_flight).collect()
 }
 
-impl Findings {
-    /// Completes the errors of an instrument that its flight does not determine, and withdraws
-    /// corrections by errors that are far from those of the other flights.
+impl RecorderFindings {
+    /// Completes the errors of an instrument that its flight does not determine. Withdraws
+    /// corrections by errors that are far from the errors of the other flights.
     fn complete(&mut self, row: &mut InstrumentRow, settings: &Compatibility) {
         for (one, trend) in self.examined.iter().zip(&mut self.rows) {
             let (series, error) = (&one.series, one.series.error);
@@ -89,7 +89,7 @@ impl Findings {
     }
 }
 
-/// Value on a grid whose step is a power of two.
+/// Rounds a value to a grid whose step, a power of two, is a fraction of the bound.
 fn on_grid(value: f64, bound: f64) -> f64 {
     let step = (bound / STEPS_IN_BOUND).log2().floor().exp2();
     step * (value / step).round()
@@ -135,7 +135,7 @@ mod tests {
     }
 
     /// Eight flights with a scale error of 2 %, one far from them, and one that determines none.
-    fn campaign() -> (Vec<InstrumentRow>, Findings) {
+    fn campaign() -> (Vec<InstrumentRow>, RecorderFindings) {
         let scales = [
             0.019, 0.021, 0.02, 0.0195, 0.0205, 0.02, 0.0198, 0.0202, 0.3,
         ];
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flight_that_says_nothing_takes_the_others_and_a_far_one_corrects_nothing() {
+    fn a_flight_without_evidence_takes_the_others_errors_and_a_far_one_corrects_nothing() {
         let (mut rows, mut findings) = campaign();
         let corrected = correct_flights(&mut rows, &mut findings, &Compatibility::default());
         let flights: Vec<&str> = corrected.iter().map(|c| c.flight_id.as_str()).collect();

@@ -12,7 +12,7 @@ use crate::units::Unit;
 pub struct ErrorSample {
     pub flight_id: String,
     pub value: f64,
-    /// Standard deviation.
+    /// Standard deviation of the error.
     pub bound: f64,
     /// Standard deviation of the part that all flights share, such as the error of the equations.
     pub systematic: f64,

@@ -2,14 +2,14 @@
 
 use super::common_error::CommonError;
 use super::error_series::ErrorSeries;
-use super::history::{Change, Shape, change};
+use super::history::{Change, ChangeShape, change};
 use crate::error::{Problem, ProblemStage};
 use crate::flight::signal;
 use crate::tables::{
     ALL_FLIGHTS, CommonErrorVerdict, InstrumentError, InstrumentTrend, InstrumentTrendRow,
 };
 
-/// Probability of any false alarm about the history of all series.
+/// Probability of one or more false alarms over the histories of all series.
 const ALARM_PROBABILITY: f64 = 0.01;
 
 /// Number of standard deviations above which an error common to all flights is certain.
@@ -29,7 +29,7 @@ pub struct ExaminedSeries {
 
 /// Rows and problems of a campaign's instruments.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Findings {
+pub struct RecorderFindings {
     pub rows: Vec<InstrumentTrendRow>,
     pub problems: Vec<Problem>,
     pub examined: Vec<ExaminedSeries>,
@@ -37,11 +37,11 @@ pub struct Findings {
 
 /// Examines all series of a campaign.
 #[must_use]
-pub fn examine(series: Vec<ErrorSeries>) -> Findings {
+pub fn examine(series: Vec<ErrorSeries>) -> RecorderFindings {
     let examined: Vec<ExaminedSeries> = series.into_iter().map(ExaminedSeries::of).collect();
     let tests = examined.iter().filter(|one| one.change.is_some()).count();
     let alarm = ALARM_PROBABILITY / tests.max(1) as f64;
-    Findings {
+    RecorderFindings {
         rows: examined.iter().map(|one| one.row(alarm)).collect(),
         problems: examined.iter().flat_map(ExaminedSeries::problems).collect(),
         examined,
@@ -59,12 +59,12 @@ impl ExaminedSeries {
         }
     }
 
-    /// Flights far from the others.
+    /// Ids of the flights far from the others.
     pub fn far(&self) -> &[String] {
         self.common.as_ref().map_or(&[], |common| &common.far)
     }
 
-    /// `true` if the part of the mean that corrections leave is certainly no ordinary error.
+    /// `true` if the mean error that remains after corrections is certainly larger than ordinary.
     fn is_wrong_in_every_flight(&self) -> bool {
         self.common.as_ref().is_some_and(|common| {
             let size = (common.mean - self.series.corrected).abs();
@@ -93,8 +93,8 @@ impl ExaminedSeries {
         // The table has scale factors, as `instruments` does.
         let offset = f64::from(u8::from(series.error == InstrumentError::Scale));
         let verdict = match (sure.map(|change| change.shape), change) {
-            (Some(Shape::Step), _) => InstrumentTrend::Step,
-            (Some(Shape::Drift), _) => InstrumentTrend::Drift,
+            (Some(ChangeShape::Step), _) => InstrumentTrend::Step,
+            (Some(ChangeShape::Drift), _) => InstrumentTrend::Drift,
             (None, Some(_)) => InstrumentTrend::Steady,
             (None, None) => InstrumentTrend::TooFewFlights,
         };

@@ -1,9 +1,10 @@
 //! Steps and drifts of an error in the order of the flights.
 //!
-//! A step divides the flights in two parts with a mean each; a drift is a line over the flights. Either
-//! is a regression with the scatter between flights estimated beside it, and its size over its standard
-//! error has Student's t distribution. The probability of the largest step is that of one place times
-//! the number of places (Bonferroni), so false alarms are no more frequent than stated.
+//! A step divides the flights in two parts with a mean each; a drift is a line over the flights.
+//! Either is fitted by a regression, together with the scatter between flights; its size over its
+//! standard error has Student's t distribution. The probability of the largest step is the
+//! probability of a step at one place times the number of places (Bonferroni). False alarms are
+//! therefore no more frequent than stated.
 
 use super::common_error::CommonError;
 use super::error_series::{ErrorSample, ErrorSeries};
@@ -18,7 +19,7 @@ const FEWEST_FLIGHTS: usize = 6;
 
 /// Kind of an error's change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shape {
+pub enum ChangeShape {
     Step,
     Drift,
 }
@@ -26,7 +27,7 @@ pub enum Shape {
 /// Change of an error over the flights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
-    pub shape: Shape,
+    pub shape: ChangeShape,
     /// First flight after a step; first flight of a drift.
     pub since: String,
     /// Size of a step; change of a drift from the first flight to the last.
@@ -81,7 +82,7 @@ fn drift(observations: &[Observation], samples: &[&ErrorSample]) -> Option<Chang
     let last = (observations.len() - 1) as f64;
     let change = second_coefficient(observations, |i| [1.0, i as f64 / last - 0.5])?;
     Some(Change {
-        shape: Shape::Drift,
+        shape: ChangeShape::Drift,
         since: samples.first()?.flight_id.clone(),
         ..change
     })
@@ -95,7 +96,7 @@ fn second_coefficient(
     let fit = RandomEffects::of(observations, regressors)?;
     let (size, bound) = (fit.coefficients[1], fit.covariance[(1, 1)].sqrt());
     Some(Change {
-        shape: Shape::Step,
+        shape: ChangeShape::Step,
         since: String::new(),
         size,
         bound,
@@ -136,7 +137,10 @@ mod tests {
     fn a_step_is_found_with_its_flight_and_size() {
         let mut random = RandomStream::new(1, "step");
         let found = change_of(|i| if i >= 7 { 0.4 } else { 0.1 }, &mut random);
-        assert_eq!((found.shape, found.since.as_str()), (Shape::Step, "f07"));
+        assert_eq!(
+            (found.shape, found.since.as_str()),
+            (ChangeShape::Step, "f07")
+        );
         assert!(
             (found.size - 0.3).abs() < 3.0 * found.bound && found.bound < 0.03,
             "{found:?}"
@@ -148,7 +152,10 @@ mod tests {
     fn a_drift_is_found_with_its_size() {
         let mut random = RandomStream::new(2, "drift");
         let found = change_of(|i| 0.05 * i as f64, &mut random);
-        assert_eq!((found.shape, found.since.as_str()), (Shape::Drift, "f00"));
+        assert_eq!(
+            (found.shape, found.since.as_str()),
+            (ChangeShape::Drift, "f00")
+        );
         assert!((found.size - 0.55).abs() < 3.0 * found.bound, "{found:?}");
         assert!(found.probability < 1e-5, "{found:?}");
     }

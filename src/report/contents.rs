@@ -42,10 +42,10 @@ pub struct Contents<'a> {
     pub limits: &'a CollinearityLimits,
     pub posterior: &'a [PosteriorRow],
     pub trends: &'a [TrendRow],
-    /// Specification of flying qualities, and what it finds; empty without one.
+    /// Specification of flying qualities, and the rows judged by it; empty without a specification.
     pub specification: Option<&'a Specification>,
     pub qualities: &'a Qualities,
-    /// Tolerances of the proof of match, and each maneuver flown again; empty without them.
+    /// Tolerances of the proof of match, and each maneuver flown again; empty without tolerances.
     pub tolerances: Option<&'a proof_of_match::Specification>,
     pub matched: &'a [Matched],
     pub comparison: &'a [ComparisonRow],
@@ -58,7 +58,7 @@ pub struct Contents<'a> {
     pub problems: &'a [Problem],
     /// Identifiers of the maneuvers that get a page (see [`super::maneuvers_with_page`]).
     pub pages: &'a BTreeSet<String>,
-    /// Time histories of those maneuvers, reduced by [`super::thinned`].
+    /// Time histories of the maneuvers with a page, reduced by [`super::thinned`].
     pub histories: &'a [History],
     /// Angle of attack nearest to which the representative maneuver of a class lies, deg.
     pub typical_alpha_deg: f64,

@@ -87,12 +87,12 @@ fn seconds(history: &History) -> impl Iterator<Item = f64> {
 #[must_use]
 pub fn time_scale(history: &History) -> Scale {
     let duration_s = extent(seconds(history)).map_or(1.0, |(_, last)| last);
-    until(duration_s.max(1e-3))
+    scale_until(duration_s.max(1e-3))
 }
 
-/// Time axis from zero to an end that need not be round.
+/// Time axis from zero to `end_s`, which need not be a round number.
 #[must_use]
-pub fn until(end_s: f64) -> Scale {
+pub fn scale_until(end_s: f64) -> Scale {
     Scale {
         max: end_s,
         ..Scale::covering(0.0, end_s)

@@ -8,7 +8,7 @@ use crate::tables::Outcome;
 use crate::units::Unit;
 
 /// Dash in place of a missing value.
-pub const NOTHING: &str = "\u{2013}";
+pub const DASH: &str = "\u{2013}";
 
 /// Outcomes of a fit with their names in the report, in the order of its columns.
 pub const OUTCOMES: [(Outcome, &str); 5] = [
@@ -111,13 +111,14 @@ pub fn without_unit(signal: &str) -> &str {
         .unwrap_or(signal)
 }
 
-/// A number with `significant` digits and a typographic minus; a dash if missing or not finite.
+/// Writes a number with `significant` digits and a typographic minus; a dash if it is missing or
+/// not finite.
 #[must_use]
 pub fn number(value: Option<f64>, significant: usize) -> String {
     let Some(value) = value.filter(|v| v.is_finite()) else {
-        return NOTHING.to_owned();
+        return DASH.to_owned();
     };
-    Digits::of([value], significant).write(Some(value))
+    Digits::for_values([value], significant).write(Some(value))
 }
 
 /// A number with `decimals` decimals; a dash if not finite.
@@ -153,7 +154,7 @@ pub enum Digits {
 impl Digits {
     /// Form in which the largest value shows `significant` digits.
     #[must_use]
-    pub fn of(values: impl IntoIterator<Item = f64>, significant: usize) -> Digits {
+    pub fn for_values(values: impl IntoIterator<Item = f64>, significant: usize) -> Digits {
         let largest = values
             .into_iter()
             .filter(|v| v.is_finite())
@@ -185,7 +186,7 @@ impl Digits {
     #[must_use]
     pub fn write(self, value: Option<f64>) -> String {
         let Some(value) = value.filter(|v| v.is_finite()) else {
-            return NOTHING.to_owned();
+            return DASH.to_owned();
         };
         let text = match self {
             Digits::Decimals(decimals) => format!("{value:.decimals$}"),
@@ -239,9 +240,9 @@ mod tests {
         assert_eq!(number(Some(12_345.6), 3), "12346");
         assert_eq!(number(Some(0.0), 3), "0");
         assert_eq!(number(Some(1.2e-12), 3), "1.20e\u{2212}12");
-        assert_eq!(number(Some(f64::NAN), 3), NOTHING);
-        assert_eq!(number(Some(f64::NEG_INFINITY), 3), NOTHING);
-        assert_eq!(number(None, 3), NOTHING);
+        assert_eq!(number(Some(f64::NAN), 3), DASH);
+        assert_eq!(number(Some(f64::NEG_INFINITY), 3), DASH);
+        assert_eq!(number(None, 3), DASH);
         assert_eq!(fixed(-0.001, 1), "0.0");
         assert_eq!(angle(29.98), "30°");
         assert_eq!(angle(29.5), "29.5°");

@@ -1,7 +1,7 @@
 //! Selection of the maneuvers that get a page of their own.
 //!
-//! A campaign gets a page for each; a large archive no more than a browser can hold. The tables
-//! have all maneuvers, and `harvest show` draws any of them.
+//! In a campaign each maneuver gets a page; in a large archive only as many as a browser can show.
+//! The tables have all maneuvers, and `harvest show` draws any of them.
 
 use std::collections::{BTreeMap, BTreeSet};
 

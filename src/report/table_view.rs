@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::notation::NOTHING;
+use super::notation::DASH;
 
 /// A table with its title, a note, column heads and cells of plain text.
 #[derive(Clone, Debug, Serialize)]
@@ -40,7 +40,7 @@ impl TableView {
 /// `true` if every cell that is not empty is a number, and at least one is.
 fn is_numeric<'a>(cells: impl Iterator<Item = &'a String>) -> bool {
     let mut filled = cells
-        .filter(|cell| !cell.is_empty() && *cell != NOTHING)
+        .filter(|cell| !cell.is_empty() && *cell != DASH)
         .peekable();
     filled.peek().is_some() && filled.all(|cell| is_number(cell))
 }

@@ -23,14 +23,14 @@ pub struct Column<'a> {
 }
 
 impl Column<'_> {
-    /// The explanation on one line.
+    /// Explanation of the column on one line.
     #[must_use]
     pub fn explanation(&self) -> String {
         one_line(self.meaning)
     }
 }
 
-/// A doc comment's lines joined.
+/// Joins the lines of a doc comment.
 #[must_use]
 pub fn one_line(doc: &str) -> String {
     doc.split_whitespace().collect::<Vec<_>>().join(" ")

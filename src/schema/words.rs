@@ -9,7 +9,7 @@ pub struct Entry {
 
 /// An enum declared with [`words!`].
 pub trait Words {
-    /// The words in the order of declaration; free text stands last as `…`.
+    /// Words in the order of declaration; free text stands last as `…`.
     const ENTRIES: &'static [Entry];
 
     /// The word in the files.
@@ -61,7 +61,7 @@ macro_rules! words {
                 }
             }
 
-            /// The variant of a word.
+            /// Variant of a word; `None` for another word.
             #[must_use]
             pub fn from_word(word: &str) -> Option<Self> {
                 match word {

@@ -7,13 +7,14 @@ use super::settings::Settings;
 use crate::flight::Correction;
 use crate::ingest::compatibility::Action;
 
-/// Grid of the corrections, s. They affect every estimate of the campaign. On a grid, a further
-/// flight that moves a delay by less than a step leaves all estimates as they are. The rounding is
-/// part of the remaining uncertainty.
+/// Step of the grid to which the corrections are rounded, s. A correction affects every estimate of
+/// the campaign. A further flight that changes a delay by less than a step therefore leaves all
+/// estimates as they are. The rounding is part of the remaining uncertainty.
 const GRID_S: f64 = 5e-4;
 
-/// Steps of the remaining uncertainty, s, each √2 times the one before. A bound falls with the root
-/// of the number of flights, so a step lasts while the campaign doubles.
+/// Steps to which the remaining uncertainty is rounded up, s, each √2 times the one before. A bound
+/// falls with the root of the number of flights, so the uncertainty stays on one step until the
+/// number of flights has doubled.
 const UNCERTAINTIES_S: [f64; 16] = [
     0.5e-3, 0.7e-3, 1e-3, 1.4e-3, 2e-3, 2.8e-3, 4e-3, 5.6e-3, 8e-3, 11e-3, 16e-3, 23e-3, 32e-3,
     45e-3, 64e-3, 90e-3,
@@ -82,7 +83,7 @@ fn correction(delay: &SurfaceDelay, settings: &Settings) -> DelayCorrection {
     }
 }
 
-/// The next larger step of the remaining uncertainty.
+/// Smallest step of the remaining uncertainty that is not below a value.
 fn stepped_s(uncertainty_s: f64) -> f64 {
     let steps = UNCERTAINTIES_S.into_iter();
     let larger = steps.clone().find(|step| *step >= uncertainty_s);

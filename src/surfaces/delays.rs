@@ -1,9 +1,10 @@
 //! Delays of the surfaces from the evidence of many maneuvers.
 //!
-//! A recorder delays all its channels alike, or each bus by its own delay: τ_s = μ + d_s. μ and d_s
-//! are normal with standard deviations that the data determine, from well below a millisecond to
-//! the tens of milliseconds of a bus. A surface that hardly moves thus gets the delay of the
-//! others, with a bound as wide as they differ.
+//! A recorder delays all its channels alike, or each bus by its own delay. The delay of a surface s
+//! is τ_s = μ + d_s, with a common part μ and its own part d_s. μ and d_s are normal with standard
+//! deviations that the data determine, from well below a millisecond to the tens of milliseconds of
+//! a bus. A surface that hardly moves thus gets the delay of the others, with a bound as wide as
+//! the difference between surfaces.
 //!
 //! Maneuvers are weighted by Student's t, since a model that does not fit a maneuver biases its
 //! delays. The bound is the larger of the posterior's and the jackknife's, and at least the error
@@ -15,9 +16,9 @@ use super::evidence::{DelayEvidence, FlightEvidence, SurfaceDelay};
 use crate::numerics::random_effects::{Observation, RandomEffects};
 use crate::numerics::symmetric;
 
-/// Error of the equations in a delay, as a share of the sampling interval, since signals are linear
-/// between samples. In simulated campaigns without delay the estimate is 0.45 ms at a sampling
-/// interval of 25 ms.
+/// Error that linear interpolation between samples leaves in a delay, as a share of the sampling
+/// interval. In simulated campaigns without delay the estimate is 0.45 ms at a sampling interval of
+/// 25 ms.
 const OF_STEP: f64 = 0.02;
 
 /// Standard deviations that delays may have, in common and by surface, s: each twice the one
@@ -83,11 +84,13 @@ fn combined(groups: &[Vec<&DelayEvidence>], step_s: f64) -> Vec<SurfaceDelay> {
     if surfaces.is_empty() {
         return vec![];
     }
-    let sums: Vec<Vec<Information>> = groups
+    let sums: Vec<Vec<DelayInformation>> = groups
         .iter()
         .map(|group| {
             let members = group.iter();
-            members.map(|m| Information::of(m, &surfaces)).collect()
+            members
+                .map(|m| DelayInformation::of(m, &surfaces))
+                .collect()
         })
         .collect();
     let Some((delays, deviations, jackknife)) = robust(&sums, surfaces.len()) else {
@@ -116,24 +119,24 @@ fn surfaces_of(groups: &[Vec<&DelayEvidence>]) -> Vec<String> {
     surfaces
 }
 
-/// Quadratic cost ½ τᵀ H τ − τᵀ h of all surfaces' delays.
+/// Information on the delays τ of all surfaces: matrix H and vector h of the cost ½ τᵀ H τ − τᵀ h.
 #[derive(Clone, Debug)]
-struct Information {
+struct DelayInformation {
     matrix: DMatrix<f64>,
     moment: DVector<f64>,
 }
 
-impl Information {
-    fn zero(count: usize) -> Information {
-        Information {
+impl DelayInformation {
+    fn zero(count: usize) -> DelayInformation {
+        DelayInformation {
             matrix: DMatrix::zeros(count, count),
             moment: DVector::zeros(count),
         }
     }
 
     /// Information of a maneuver, extended to the list of all surfaces.
-    fn of(evidence: &DelayEvidence, surfaces: &[String]) -> Information {
-        let mut information = Information::zero(surfaces.len());
+    fn of(evidence: &DelayEvidence, surfaces: &[String]) -> DelayInformation {
+        let mut information = DelayInformation::zero(surfaces.len());
         let place = |surface: &String| surfaces.iter().position(|s| s == surface);
         let places: Vec<Option<usize>> = evidence.surfaces.iter().map(place).collect();
         let count = places.len();
@@ -149,13 +152,13 @@ impl Information {
         information
     }
 
-    fn add(&mut self, weight: f64, other: &Information) {
+    fn add(&mut self, weight: f64, other: &DelayInformation) {
         self.matrix += weight * &other.matrix;
         self.moment += weight * &other.moment;
     }
 
-    /// Squared distance of the own delays from given ones, over their degrees of freedom; the own
-    /// delays have a wide prior.
+    /// Squared distance of a maneuver's own delays from given delays, and its degrees of freedom.
+    /// The own delays have a wide prior.
     fn distance(&self, delays: &DVector<f64>) -> Option<(f64, f64)> {
         let count = delays.len();
         let own = &self.matrix + DMatrix::identity(count, count) * OWN_S.powi(-2);
@@ -168,11 +171,12 @@ impl Information {
 
 type Robust = (DVector<f64>, Vec<f64>, Vec<f64>);
 
-/// Delays with weights of the maneuvers, standard deviations, and those of the jackknife.
-fn robust(groups: &[Vec<Information>], count: usize) -> Option<Robust> {
+/// Estimates the delays with robust weights of the maneuvers. Returns delays, their standard
+/// deviations, and the standard deviations of the jackknife.
+fn robust(groups: &[Vec<DelayInformation>], count: usize) -> Option<Robust> {
     let mut weights: Vec<Vec<f64>> = groups.iter().map(|g| vec![1.0; g.len()]).collect();
     let mut sums = weighted_sums(groups, &weights, count);
-    let mut posterior = Posterior::of(&total(&sums, count))?;
+    let mut posterior = DelayPosterior::of(&total(&sums, count))?;
     for _ in 0..ROUNDS {
         let (mut square, mut freedom) = (0.0, 0.0);
         for (group, weights) in groups.iter().zip(&mut weights) {
@@ -192,19 +196,19 @@ fn robust(groups: &[Vec<Information>], count: usize) -> Option<Robust> {
             *weight /= dispersion;
         }
         sums = weighted_sums(groups, &weights, count);
-        posterior = Posterior::of(&total(&sums, count))?;
+        posterior = DelayPosterior::of(&total(&sums, count))?;
     }
     let jackknife = jackknife(&sums, count)?;
     Some((posterior.delays, posterior.deviations, jackknife))
 }
 
 fn weighted_sums(
-    groups: &[Vec<Information>],
+    groups: &[Vec<DelayInformation>],
     weights: &[Vec<f64>],
     count: usize,
-) -> Vec<Information> {
-    let sum = |(group, weights): (&Vec<Information>, &Vec<f64>)| {
-        let mut sum = Information::zero(count);
+) -> Vec<DelayInformation> {
+    let sum = |(group, weights): (&Vec<DelayInformation>, &Vec<f64>)| {
+        let mut sum = DelayInformation::zero(count);
         for (maneuver, weight) in group.iter().zip(weights) {
             sum.add(*weight, maneuver);
         }
@@ -213,8 +217,8 @@ fn weighted_sums(
     groups.iter().zip(weights).map(sum).collect()
 }
 
-fn total(sums: &[Information], count: usize) -> Information {
-    let mut total = Information::zero(count);
+fn total(sums: &[DelayInformation], count: usize) -> DelayInformation {
+    let mut total = DelayInformation::zero(count);
     for sum in sums {
         total.add(1.0, sum);
     }
@@ -222,14 +226,14 @@ fn total(sums: &[Information], count: usize) -> Information {
 }
 
 /// Standard deviations of the delays by leaving out one group at a time.
-fn jackknife(sums: &[Information], count: usize) -> Option<Vec<f64>> {
+fn jackknife(sums: &[DelayInformation], count: usize) -> Option<Vec<f64>> {
     let groups = sums.len() as f64;
     let total = total(sums, count);
     let mut left_out = Vec::with_capacity(sums.len());
     for sum in sums {
         let mut rest = total.clone();
         rest.add(-1.0, sum);
-        left_out.push(Posterior::of(&rest)?.delays);
+        left_out.push(DelayPosterior::of(&rest)?.delays);
     }
     let mean = left_out.iter().sum::<DVector<f64>>() / groups;
     let deviation = |s: usize| {
@@ -242,14 +246,14 @@ fn jackknife(sums: &[Information], count: usize) -> Option<Vec<f64>> {
 
 /// Mean and standard deviations of the delays.
 #[derive(Clone, Debug)]
-struct Posterior {
+struct DelayPosterior {
     delays: DVector<f64>,
     deviations: Vec<f64>,
 }
 
-impl Posterior {
+impl DelayPosterior {
     /// Mixture over the spreads of the delays, weighted by the evidence for each.
-    fn of(data: &Information) -> Option<Posterior> {
+    fn of(data: &DelayInformation) -> Option<DelayPosterior> {
         let mut parts = Vec::with_capacity(SPREADS_S.len().pow(2));
         for common_s in SPREADS_S {
             for own_s in SPREADS_S {
@@ -274,7 +278,7 @@ impl Posterior {
             parts.iter().zip(&shares).map(of_part).sum::<f64>()
         };
         let deviations = (0..delays.len()).map(|s| variance(s).sqrt()).collect();
-        Some(Posterior { delays, deviations })
+        Some(DelayPosterior { delays, deviations })
     }
 }
 
@@ -286,8 +290,8 @@ struct SpreadPosterior {
 }
 
 impl SpreadPosterior {
-    /// The prior has covariance own² I + common² 1 1ᵀ.
-    fn new(data: &Information, common_s: f64, own_s: f64) -> Option<SpreadPosterior> {
+    /// Posterior for one pair of spreads. The prior covariance is own² I + common² 1 1ᵀ.
+    fn new(data: &DelayInformation, common_s: f64, own_s: f64) -> Option<SpreadPosterior> {
         let count = data.moment.len();
         let (own, common) = (own_s * own_s, common_s * common_s);
         let along_one = own + count as f64 * common;
@@ -424,7 +428,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_hold_the_truth_as_often_as_they_say() {
+    fn bounds_have_their_nominal_coverage() {
         let mut noise = Noise(11);
         let (mut held, mut all) = (0, 0);
         for _ in 0..60 {

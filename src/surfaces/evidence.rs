@@ -13,7 +13,7 @@ use super::weighted_fit::{Prior, WeightedFit};
 const OF_STATES: f64 = 3.0;
 
 /// Prior standard deviation of a derivative along a surface about the tunnel's value, in sizes of
-/// its table, for the delays: it fixes the derivatives of surfaces that hardly move.
+/// its table, when delays are estimated. It fixes the derivatives of surfaces that hardly move.
 const OF_SURFACES: f64 = 0.5;
 
 /// Standard deviation of the tunnel's values in the comparison of effects, in sizes of the table:
@@ -28,13 +28,14 @@ const WITHOUT_TABLE: f64 = 1e3;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DelayEvidence {
     pub surfaces: Vec<String>,
-    /// H by rows, 1/s².
+    /// Matrix H, row by row, 1/s².
     pub information: Vec<f64>,
-    /// h, 1/s.
+    /// Vector h, 1/s.
     pub moment: Vec<f64>,
 }
 
-/// Delay of a surface against accelerations, rates and vanes; negative: ahead of them.
+/// Delay of a surface relative to accelerations, rates and vanes; negative if the surface is
+/// recorded early.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SurfaceDelay {
     pub surface: String,
@@ -61,7 +62,7 @@ pub struct FlightEvidence {
     pub step_s: f64,
     /// One entry per maneuver.
     pub delays: Vec<DelayEvidence>,
-    /// Delays that the flight gives by itself.
+    /// Delays from this flight alone.
     pub own_delays: Vec<SurfaceDelay>,
     /// One entry per maneuver and surface.
     pub effects: Vec<SurfaceEffect>,
@@ -96,7 +97,8 @@ impl ManeuverData {
         let CoefficientData { implied, terms } = coefficient;
         let shifted = terms.iter().map(|term| {
             let delay_s = term.surface.map_or(0.0, |s| delays_s[s]);
-            term.regressor.at(&self.frequencies_hz, delay_s)
+            term.regressor
+                .spectrum_at_delay(&self.frequencies_hz, delay_s)
         });
         let (columns, slopes): (Vec<Spectrum>, Vec<Spectrum>) = shifted.unzip();
         let priors: Vec<Prior> = (terms.iter().zip(&columns))
@@ -121,7 +123,11 @@ impl ManeuverData {
         for CoefficientData { implied, terms } in &self.coefficients {
             let columns: Vec<Spectrum> = terms
                 .iter()
-                .map(|term| term.regressor.at(&self.frequencies_hz, 0.0).0)
+                .map(|term| {
+                    term.regressor
+                        .spectrum_at_delay(&self.frequencies_hz, 0.0)
+                        .0
+                })
                 .collect();
             let priors: Vec<Prior> = (terms.iter().zip(&columns))
                 .map(|(term, column)| unsigned_prior(term, implied, column))

@@ -23,7 +23,8 @@ struct MeanEffect {
 }
 
 impl MeanEffect {
-    /// Mean weighted by the bounds; its own bound includes the scatter of the maneuvers.
+    /// Mean of the effects, weighted by their bounds. The bound of the mean includes the scatter
+    /// between maneuvers.
     fn of<'a>(effects: impl Iterator<Item = &'a SurfaceEffect> + Clone) -> MeanEffect {
         let weights = effects.clone().map(|e| e.bound.powi(-2));
         let information: f64 = weights.clone().sum();
@@ -49,7 +50,7 @@ impl MeanEffect {
 
 /// Rows and problems of a campaign's surfaces.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Findings {
+pub struct SurfaceFindings {
     pub rows: Vec<InstrumentRow>,
     pub problems: Vec<Problem>,
 }
@@ -61,8 +62,8 @@ pub fn findings(
     pooled: &[SurfaceDelay],
     corrections: &[DelayCorrection],
     channels: &BTreeMap<String, Channel>,
-) -> Findings {
-    let mut findings = Findings::default();
+) -> SurfaceFindings {
+    let mut findings = SurfaceFindings::default();
     for flight in flights {
         for delay in &flight.own_delays {
             let effects = flight.effects.iter();
@@ -79,7 +80,7 @@ pub fn findings(
     findings
 }
 
-impl Findings {
+impl SurfaceFindings {
     /// Adds the row of a flight's surface, and a problem where its sign is reversed.
     fn add(
         &mut self,

@@ -1,4 +1,4 @@
-//! Evidence of a flight: that of its maneuvers, linearised about their common delays.
+//! Evidence of a flight: the evidence of its maneuvers, linearised about their common delays.
 
 use super::delays;
 use super::evidence::{FlightEvidence, SurfaceDelay};
@@ -33,7 +33,7 @@ pub fn flight_evidence(
     };
     for _ in 0..STEPS {
         let about = std::mem::take(&mut evidence.own_delays);
-        let about_s = |surface: &str| known_delay_s(&about, surface);
+        let about_s = |surface: &str| delay_of_surface_s(&about, surface);
         evidence.delays = data.iter().filter_map(|d| d.delays(about_s)).collect();
         evidence.own_delays = delays::of_flight(&evidence.delays, evidence.step_s);
         let change = |delay: &SurfaceDelay| (delay.delay_s - about_s(&delay.surface)).abs();
@@ -45,8 +45,8 @@ pub fn flight_evidence(
     evidence
 }
 
-/// Delay of a surface among some; zero for another surface.
-fn known_delay_s(delays: &[SurfaceDelay], surface: &str) -> f64 {
+/// Delay of a surface; zero for a surface that is not in the list.
+fn delay_of_surface_s(delays: &[SurfaceDelay], surface: &str) -> f64 {
     let known = delays.iter().find(|delay| delay.surface == surface);
     known.map_or(0.0, |delay| delay.delay_s)
 }

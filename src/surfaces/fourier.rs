@@ -16,8 +16,8 @@ pub type Spectrum = Vec<Complex<f64>>;
 /// Lowest frequency, Hz: below it the motion is trim and drift.
 const LOWEST_HZ: f64 = 0.1;
 
-/// Highest frequency, Hz. Surfaces and airframe move below it; above it the rates' noise dominates,
-/// and up to 5 Hz the delays of simulated campaigns change by less than 0.1 ms.
+/// Highest frequency, Hz. Surfaces and airframe move below it, and the rates' noise dominates above
+/// it. Up to 5 Hz the delays of simulated campaigns change by less than 0.1 ms.
 const HIGHEST_HZ: f64 = 2.5;
 
 /// Largest share of the sampling rate, below which the slope of the rates keeps its phase.
@@ -27,7 +27,7 @@ const OF_RATE: f64 = 0.125;
 const TAPERED: f64 = 0.1;
 
 /// Least number of frequencies of a fit: about twice the number of regressors.
-const FEWEST: usize = 20;
+const FEWEST_FREQUENCIES: usize = 20;
 
 /// Band of frequencies of series of one length.
 #[derive(Clone, Debug)]
@@ -47,7 +47,7 @@ impl Band {
         let mut inside = (1..samples / 2).filter(|k| band_hz.contains(&(*k as f64 / length_s)));
         let first = inside.next()?;
         let numbers = first..first + 1 + inside.count();
-        (numbers.len() >= FEWEST).then(|| Band {
+        (numbers.len() >= FEWEST_FREQUENCIES).then(|| Band {
             step_s,
             harmonics: Harmonics::new(samples, numbers),
             taper: (0..samples).map(|i| taper(i, samples).0).collect(),
@@ -106,7 +106,8 @@ fn without_mean(series: &[f64], factors: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Taper at a sample, and its slope per sample: a raised cosine at either end, one between.
+/// Taper at a sample, and its slope per sample. The taper is a raised cosine at either end, and one
+/// between.
 fn taper(sample: usize, samples: usize) -> (f64, f64) {
     let rise = TAPERED * samples as f64;
     let from_start = sample as f64 + 0.5;
@@ -123,8 +124,9 @@ fn taper(sample: usize, samples: usize) -> (f64, f64) {
 
 /// Series of a surface and its spectra, prepared for shifts in time.
 ///
-/// With w the taper, y(t + τ) has the spectrum e^(jωτ) ∫ w(t − τ) y(t) e^(−jωt) dt. Since the taper
-/// rises over seconds, w(t − τ) ≈ w(t) − τ w'(t).
+/// Let w be the taper, τ the shift, s, and ω the angular frequency, rad/s. The tapered series y(t +
+/// τ) has the spectrum e^(jωτ) ∫ w(t − τ) y(t) e^(−jωt) dt. Since the taper rises over seconds, w(t
+/// − τ) ≈ w(t) − τ w'(t).
 #[derive(Clone, Debug)]
 pub struct Shifted {
     spectrum: Spectrum,
@@ -133,7 +135,7 @@ pub struct Shifted {
 
 impl Shifted {
     /// Spectrum of the series `delay_s` later, and its slope along the delay, 1/s.
-    pub fn at(&self, frequencies_hz: &[f64], delay_s: f64) -> (Spectrum, Spectrum) {
+    pub fn spectrum_at_delay(&self, frequencies_hz: &[f64], delay_s: f64) -> (Spectrum, Spectrum) {
         let all = frequencies_hz.iter().zip(&self.spectrum).zip(&self.edges);
         let one = |((frequency_hz, y), edge): ((&f64, &Complex<f64>), &Complex<f64>)| {
             let omega = 2.0 * PI * frequency_hz;
@@ -173,8 +175,8 @@ mod tests {
         let band = Band::new(700, STEP_S).unwrap();
         let exact = &band.spectra(&[series(0.0)])[0];
         let late = &band.shifted(&[series(0.5), series(0.012)])[1];
-        let (shifted, _) = late.at(&band.frequencies_hz(), 0.012);
-        let (recorded, _) = late.at(&band.frequencies_hz(), 0.0);
+        let (shifted, _) = late.spectrum_at_delay(&band.frequencies_hz(), 0.012);
+        let (recorded, _) = late.spectrum_at_delay(&band.frequencies_hz(), 0.0);
         assert!(distance(&shifted, exact) < 0.01 * distance(&recorded, exact));
     }
 
@@ -184,10 +186,10 @@ mod tests {
         let late = &band.shifted(&[series(0.0)])[0];
         let frequencies_hz = band.frequencies_hz();
         let (before, after) = (
-            late.at(&frequencies_hz, 0.009_999).0,
-            late.at(&frequencies_hz, 0.010_001).0,
+            late.spectrum_at_delay(&frequencies_hz, 0.009_999).0,
+            late.spectrum_at_delay(&frequencies_hz, 0.010_001).0,
         );
-        let slope = late.at(&frequencies_hz, 0.01).1;
+        let slope = late.spectrum_at_delay(&frequencies_hz, 0.01).1;
         for ((a, b), slope) in before.iter().zip(&after).zip(&slope) {
             assert_abs_diff_eq!(((b - a) / 2e-6).re, slope.re, epsilon = 1e-4);
             assert_abs_diff_eq!(((b - a) / 2e-6).im, slope.im, epsilon = 1e-4);

@@ -166,8 +166,9 @@ fn surface_index(derivative: &Derivative, surfaces: &[String]) -> Option<usize> 
     surfaces.iter().position(|s| s == surface)
 }
 
-/// Ratio of the response of the local straight line's slope to that of the exact derivative. It is
-/// real, since the line is symmetric about its sample, so it changes no phase.
+/// Frequency response of the slope of a local straight line, over the response of exact
+/// differentiation. The ratio is real, because the line is symmetric about its sample, so the slope
+/// has the right phase.
 fn slope_response(frequencies_hz: &[f64], step_s: f64) -> Vec<f64> {
     let reach = slope_reach(step_s);
     let response = |frequency_hz: &f64| {

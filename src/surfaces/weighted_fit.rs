@@ -6,8 +6,8 @@ use nalgebra::{Complex, DMatrix, DVector};
 use super::fourier::Spectrum;
 use crate::numerics::symmetric;
 
-/// Distance over which the residuals' power is averaged, Hz on either side: turbulence and sensor
-/// noise change little over it, and a maneuver of 15 s has 15 frequencies in it.
+/// Half width of the band over which the residuals' power is averaged, Hz. Turbulence and sensor
+/// noise change little over the band, and a maneuver of 15 s has 15 frequencies in it.
 const SMOOTHED_HZ: f64 = 0.5;
 
 /// Number of times that the weights are estimated anew.

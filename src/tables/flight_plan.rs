@@ -1,4 +1,4 @@
-//! Tables of the next flight: the cards with what they teach, and the goals before and after.
+//! Tables of the next flight: the cards with their information, and the goals before and after.
 
 use crate::schema::{table, words};
 
@@ -15,10 +15,10 @@ words! {
 }
 
 table! {
-    /// Cards that the next flight may fly, with what each teaches and the minutes it takes.
+    /// Cards that the next flight may fly, with their information and their minutes.
     ///
     /// `harvest next` writes it into `next/` of the reports. The cards of the flight come first, in the
-    /// order of flying; the others follow by what they teach per minute, then those that are refused.
+    /// order of flying; the others follow by information per minute, refused cards last.
     /// Information is in nats: each nat divides the standard deviations of the goals by e, in their
     /// weighted mean.
     pub struct NextCardRow in "next_cards" per "candidate card" {

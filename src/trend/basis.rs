@@ -3,10 +3,10 @@
 
 use nalgebra::RowDVector;
 
-/// A family of functions of α; a trend is a linear combination of them.
+/// Basis functions of α; a trend is their linear combination.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Basis {
-    /// The range of the data, deg.
+    /// Range of the data in α, deg.
     range: (f64, f64),
     order: usize,
     /// Knots inside the range, ascending, deg; empty for a polynomial.
@@ -47,7 +47,7 @@ impl Basis {
         self.order + 1 + self.knots.len()
     }
 
-    /// The name in the table `trends`.
+    /// Name of the basis in the table `trends`.
     pub(super) fn name(&self) -> String {
         if self.knots.is_empty() {
             return "polynomial".to_owned();
@@ -56,7 +56,7 @@ impl Basis {
         format!("spline, knots {}", knots.join(" "))
     }
 
-    /// The values of the functions at an angle of attack.
+    /// Values of the functions at an angle of attack.
     pub(super) fn row(&self, alpha_deg: f64) -> RowDVector<f64> {
         if self.knots.is_empty() {
             self.legendre(alpha_deg)

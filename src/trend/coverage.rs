@@ -13,7 +13,8 @@ struct Study {
     scatter: f64,
 }
 
-/// Shares of 95% bands that cover the truth, and of prediction bands that cover one more maneuver.
+/// Share of 95 % bands that cover the truth, and share of prediction bands that cover one more
+/// maneuver.
 fn coverage(study: &Study, campaigns: u64) -> (f64, f64) {
     let mut random = Lcg(11);
     let (mut held, mut predicted, mut all) = (0.0, 0.0, 0.0);

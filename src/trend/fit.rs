@@ -60,14 +60,15 @@ use nalgebra::{DMatrix, DVector};
 
 use super::basis::Basis;
 use super::lack_of_fit::LackOfFit;
-use super::point::{Point, flown_alphas};
+use super::point::{TrendPoint, flown_alphas};
 use super::robust::{Residual, RobustSolution, inverse_variances, weighted_solution};
 use super::scatter::{floored_variances, strata};
 use super::settings::{Criterion, Settings};
 use crate::numerics::order_statistics::upper_median;
 use crate::numerics::student;
 
-/// Standard deviations beyond which a residual has no influence on the order of the polynomial.
+/// Distance from the trend beyond which a residual has no further influence on the choice of the
+/// order, standard deviations.
 const OUTLYING: f64 = 3.0;
 
 /// A fitted trend.
@@ -87,7 +88,7 @@ pub(super) struct TrendFit {
     deviation_of_one_more: f64,
     degrees_of_freedom: usize,
     criterion: f64,
-    /// In the points' order.
+    /// Residual of each point, in the points' order.
     residuals: Vec<Residual>,
 }
 
@@ -103,7 +104,7 @@ impl Trend {
     /// Fits every order to points sorted by α, and takes the one with the least criterion: the lower
     /// one on a tie. `None` if no order has a solution.
     pub(super) fn through(
-        points: &[Point],
+        points: &[TrendPoint],
         settings: &Settings,
         knots_deg: &[f64],
     ) -> Option<Trend> {
@@ -137,10 +138,10 @@ impl Trend {
     }
 
     /// Value and standard error at an angle of attack.
-    pub(super) fn at(&self, alpha_deg: f64) -> (f64, f64) {
-        let (value, _) = self.best.at(alpha_deg);
+    pub(super) fn value_and_error(&self, alpha_deg: f64) -> (f64, f64) {
+        let (value, _) = self.best.value_and_error(alpha_deg);
         let variance = |(weight, fit): &(f64, TrendFit)| {
-            let (other, error) = fit.at(alpha_deg);
+            let (other, error) = fit.value_and_error(alpha_deg);
             weight * (error * error + (other - value).powi(2))
         };
         let averaged = self.orders.iter().map(variance).sum::<f64>().sqrt();
@@ -151,7 +152,7 @@ impl Trend {
     fn error_of_next_order(&self, alpha_deg: f64) -> f64 {
         let size = self.best.basis.size() + 1;
         let next = self.orders.iter().find(|(_, fit)| fit.basis.size() == size);
-        next.map_or(0.0, |(_, fit)| fit.at(alpha_deg).1)
+        next.map_or(0.0, |(_, fit)| fit.value_and_error(alpha_deg).1)
     }
 }
 
@@ -164,7 +165,7 @@ impl TrendFit {
     /// Candidates are polynomials and splines. With knots from the analyst, both go up to the third
     /// order. Without them the knots are the flown α between the ends: every one or every second one
     /// with straight lines, every second one with cubics.
-    fn all(points: &[Point], settings: &Settings, knots_deg: &[f64]) -> Vec<TrendFit> {
+    fn all(points: &[TrendPoint], settings: &Settings, knots_deg: &[f64]) -> Vec<TrendFit> {
         let (Some(first), Some(last)) = (points.first(), points.last()) else {
             return Vec::new();
         };
@@ -199,12 +200,16 @@ impl TrendFit {
             .filter(|basis| basis.order() <= highest && basis.size() > basis.order() + 1);
         let bases = polynomials.chain(bent).filter(|basis| basis.size() <= most);
         bases
-            .filter_map(|basis| TrendFit::of(points, basis, settings.criterion))
+            .filter_map(|basis| TrendFit::fit_basis(points, basis, settings.criterion))
             .collect()
     }
 
     /// The fit of one basis; `None` if the normal equations have no solution.
-    pub(super) fn of(points: &[Point], basis: Basis, criterion: Criterion) -> Option<TrendFit> {
+    pub(super) fn fit_basis(
+        points: &[TrendPoint],
+        basis: Basis,
+        criterion: Criterion,
+    ) -> Option<TrendFit> {
         let (n, p) = (points.len(), basis.size());
         let rows: Vec<_> = points.iter().map(|q| basis.row(q.alpha_deg)).collect();
         let design = DMatrix::from_rows(&rows);
@@ -212,10 +217,10 @@ impl TrendFit {
         let bounds2 = floored_variances(points);
         let degrees_of_freedom = n.checked_sub(p).filter(|d| *d > 0)?;
         let strata = strata(points);
-        let solution = RobustSolution::of(&design, &values, &bounds2, &strata)?;
+        let solution = RobustSolution::solve(&design, &values, &bounds2, &strata)?;
         let misfit: f64 = solution.deviations().map(deviance).sum();
         let by_bounds = inverse_variances(&bounds2);
-        let lack = LackOfFit::of(points, &solution.residuals, &bounds2, p);
+        let lack = LackOfFit::from_residuals(points, &solution.residuals, &bounds2, p);
         let bound2 = upper_median(bounds2.iter().copied()).unwrap_or(0.0);
         let totals = solution.variances.iter().zip(&bounds2);
         Some(TrendFit {
@@ -233,7 +238,7 @@ impl TrendFit {
     }
 
     /// Value and standard error at an angle of attack.
-    pub(super) fn at(&self, alpha_deg: f64) -> (f64, f64) {
+    pub(super) fn value_and_error(&self, alpha_deg: f64) -> (f64, f64) {
         let row = self.basis.row(alpha_deg);
         let variance = |covariance: &DMatrix<f64>| (&row * covariance * row.transpose())[(0, 0)];
         let variance = variance(&self.covariance).max(variance(&self.covariance_of_bounds));
@@ -292,10 +297,10 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    fn points(of: impl Fn(f64) -> f64, alphas: &[f64]) -> Vec<Point> {
-        let mut points: Vec<Point> = alphas
+    fn points(of: impl Fn(f64) -> f64, alphas: &[f64]) -> Vec<TrendPoint> {
+        let mut points: Vec<TrendPoint> = alphas
             .iter()
-            .map(|&a| Point {
+            .map(|&a| TrendPoint {
                 alpha_deg: a,
                 value: of(a),
                 bound: 0.01,
@@ -307,9 +312,9 @@ mod tests {
         points
     }
 
-    fn constant(points: &[Point]) -> Option<TrendFit> {
+    fn constant(points: &[TrendPoint]) -> Option<TrendFit> {
         let range = (points[0].alpha_deg, points[points.len() - 1].alpha_deg);
-        TrendFit::of(points, Basis::polynomial(range, 0), Criterion::Aicc)
+        TrendFit::fit_basis(points, Basis::polynomial(range, 0), Criterion::Aicc)
     }
 
     fn alphas() -> Vec<f64> {
@@ -336,7 +341,7 @@ mod tests {
             .expect("a fit");
             assert_eq!(fit.best.basis().order(), 3);
             for a in [5.0, 20.0, 40.0, 60.0] {
-                assert_relative_eq!(fit.at(a).0, cubic(a), epsilon = 0.01);
+                assert_relative_eq!(fit.value_and_error(a).0, cubic(a), epsilon = 0.01);
             }
         }
     }
@@ -352,7 +357,7 @@ mod tests {
             let trend = Trend::through(&data, &settings, &[]).expect("a trend");
             let weights: Vec<f64> = trend.orders.iter().map(|(weight, _)| *weight).collect();
             assert_eq!(weights, [1.0]);
-            let (value, error) = trend.at(20.0);
+            let (value, error) = trend.value_and_error(20.0);
             assert!((value - 0.5).abs() < 0.02, "{value}");
             assert!(error >= 0.01 / 3.0_f64.sqrt(), "{error}");
         }
@@ -366,7 +371,7 @@ mod tests {
             (30.0, 0.95, 0.1),
             (40.0, 1.05, 0.15),
         ];
-        let mut data = data.map(|(alpha_deg, value, bound)| Point {
+        let mut data = data.map(|(alpha_deg, value, bound)| TrendPoint {
             alpha_deg,
             value,
             bound,
@@ -375,15 +380,19 @@ mod tests {
         });
         count_flown(data.iter_mut(), 5.0);
         let fit = constant(&data).expect("a fit");
-        let sum = |f: &dyn Fn(&Point) -> f64| data.iter().map(f).sum::<f64>();
+        let sum = |f: &dyn Fn(&TrendPoint) -> f64| data.iter().map(f).sum::<f64>();
         let weight = sum(&|p| p.bound.powi(-2));
         assert_relative_eq!(fit.scatter(), 0.0);
         assert_relative_eq!(
-            fit.at(33.0).0,
+            fit.value_and_error(33.0).0,
             sum(&|p| p.value * p.bound.powi(-2)) / weight,
             max_relative = 1e-12
         );
-        assert_relative_eq!(fit.at(33.0).1, weight.sqrt().recip(), max_relative = 1e-12);
+        assert_relative_eq!(
+            fit.value_and_error(33.0).1,
+            weight.sqrt().recip(),
+            max_relative = 1e-12
+        );
     }
 
     #[test]
@@ -404,7 +413,7 @@ mod tests {
     }
 
     /// Pairs of maneuvers at 10, 20, … 50 deg, `apart` from each other.
-    fn pairs(of: impl Fn(f64) -> f64, apart: f64) -> Vec<Point> {
+    fn pairs(of: impl Fn(f64) -> f64, apart: f64) -> Vec<TrendPoint> {
         let alphas: Vec<f64> = (1..=5).flat_map(|i| [10.0 * f64::from(i); 2]).collect();
         let mut data = points(of, &alphas);
         for (i, p) in data.iter_mut().enumerate() {
@@ -429,7 +438,7 @@ mod tests {
             between2 - 0.5 * own2,
             max_relative = 1e-3
         );
-        let line = TrendFit::of(
+        let line = TrendFit::fit_basis(
             &pairs(|a| 0.01 * a, 0.02),
             Basis::polynomial((10.0, 50.0), 1),
             Criterion::Aicc,
@@ -442,7 +451,7 @@ mod tests {
         let fit = constant(&pairs(|a| 0.01 * a, 0.02)).expect("a fit");
         let averaged2 = fit.covariance[(0, 0)];
         assert_relative_eq!(
-            fit.at(33.0).1.powi(2),
+            fit.value_and_error(33.0).1.powi(2),
             averaged2 + fit.lack_of_fit2,
             max_relative = 1e-12
         );
@@ -463,7 +472,7 @@ mod tests {
         }
         let settings = Settings::default();
         let clean = Trend::through(&data, &settings, &[]).expect("a fit");
-        data.push(Point {
+        data.push(TrendPoint {
             alpha_deg: 60.0,
             value: 5.0,
             bound: 0.01,
@@ -472,7 +481,11 @@ mod tests {
         });
         let wild = Trend::through(&data, &settings, &[]).expect("a fit");
         for a in [10.0, 30.0, 50.0, 60.0] {
-            assert_relative_eq!(wild.at(a).0, clean.at(a).0, epsilon = 0.01);
+            assert_relative_eq!(
+                wild.value_and_error(a).0,
+                clean.value_and_error(a).0,
+                epsilon = 0.01
+            );
         }
         assert!(wild.best.scatter() < 0.02, "{}", wild.best.scatter());
     }
@@ -483,7 +496,7 @@ mod tests {
         data[0].value = 1.01;
         data[0].bound = 1e-9;
         let fit = constant(&data).expect("a fit");
-        assert!(fit.at(10.0).0 < 1.009);
+        assert!(fit.value_and_error(10.0).0 < 1.009);
     }
 
     #[test]
@@ -494,7 +507,11 @@ mod tests {
             .flat_map(|a| [*a, a + 0.1, a + 0.2, a + 0.3])
             .collect();
         let fit = Trend::through(&points(bent, &four), &Settings::default(), &[]).expect("a fit");
-        assert!((fit.at(20.0).0 - 0.4).abs() < 0.02, "{}", fit.at(20.0).0);
+        assert!(
+            (fit.value_and_error(20.0).0 - 0.4).abs() < 0.02,
+            "{}",
+            fit.value_and_error(20.0).0
+        );
     }
 
     #[test]

@@ -3,20 +3,20 @@
 
 use nalgebra::DVector;
 
-use super::point::Point;
+use super::point::TrendPoint;
 use super::scatter::scatter_squared;
 
 /// Variance of the residuals beyond the bounds, in two parts.
 pub(super) struct LackOfFit {
-    /// λ², the variance of the derivative about the curve.
+    /// Squared lack of fit λ²: variance of the derivative about the curve.
     pub lack2: f64,
     /// Variance of the maneuvers' own deviations, from maneuvers of one flown α.
     pub own2: f64,
 }
 
 impl LackOfFit {
-    pub(super) fn of(
-        points: &[Point],
+    pub(super) fn from_residuals(
+        points: &[TrendPoint],
         residuals: &DVector<f64>,
         variances: &[f64],
         coefficients: usize,
@@ -39,7 +39,7 @@ impl LackOfFit {
 struct AboutMeans {
     /// Residual of each maneuver.
     residuals: DVector<f64>,
-    /// One less each maneuver's share in the mean.
+    /// One minus each maneuver's share in its mean.
     freedom: Vec<f64>,
     /// Mean residual of each flown α.
     means: Vec<f64>,
@@ -47,7 +47,11 @@ struct AboutMeans {
     variances: Vec<f64>,
 }
 
-fn about_their_means(points: &[Point], residuals: &DVector<f64>, variances: &[f64]) -> AboutMeans {
+fn about_their_means(
+    points: &[TrendPoint],
+    residuals: &DVector<f64>,
+    variances: &[f64],
+) -> AboutMeans {
     let mut about = AboutMeans {
         residuals: residuals.clone(),
         freedom: Vec::with_capacity(points.len()),

@@ -1,9 +1,9 @@
-//! Trend fits the estimates of each derivative across α by least squares, for the derivative's group
-//! of classes and for each class alone.
+//! Trend fits the estimates of each derivative across α by least squares, for the derivative's
+//! group of classes and for each class alone.
 //!
-//! The fit is in [`fit`]: a polynomial or spline in α that a criterion chooses, with weights
-//! 1/(bound² + τ²), where τ is the scatter between maneuvers of a class beyond their bounds. Where the
-//! maneuvers are too few for a trend, [`means`] gives a mean at each flown α.
+//! The fit is in [`fit`]: a polynomial or spline in α, whose order a criterion chooses. The weights
+//! are 1/(bound² + τ²), with τ the scatter between maneuvers of a class beyond their bounds. Where
+//! the maneuvers are too few for a trend, [`means`] gives a mean at each flown α.
 
 mod basis;
 #[cfg(test)]
@@ -29,7 +29,7 @@ use crate::tables::{EstimateRow, OutlierRow, TrendRow};
 
 use fit::Trend;
 use means::{Mean, means};
-use point::{Point, count_flown};
+use point::{TrendPoint, count_flown};
 
 pub use settings::Settings;
 #[cfg(test)]
@@ -50,13 +50,13 @@ pub struct Trends {
     pub problems: Vec<Problem>,
 }
 
-/// Fits the trends of every derivative: its group's, then its classes'. Derivatives keep the order in
-/// which they first appear.
+/// Fits the trends of every derivative: its group's, then its classes'. Derivatives keep the order
+/// in which they first appear.
 ///
-/// `estimates` are those of converged fits. Estimates with status `estimated`, a value and a bound
-/// (the corrected one where there is one) count. A group of fewer than three maneuvers has means
-/// instead of a trend; a class of fewer is skipped. A trend is published at the multiples of the step
-/// and at the derivative's `breakpoints`, deg, inside the range of its data.
+/// `estimates` must come from converged fits. Estimates with status `estimated`, a value and a
+/// bound (the corrected one where there is one) count. A group of fewer than three maneuvers has
+/// means instead of a trend; a class of fewer is skipped. A trend is published at the multiples of
+/// the step and at the derivative's `breakpoints`, deg, inside the range of its data.
 #[must_use]
 pub fn trends(
     estimates: &[EstimateRow],
@@ -146,9 +146,9 @@ fn by_derivative<'a>(
 }
 
 /// The point of an estimate, with class and flown α at index 0; `None` without a value and a bound.
-fn point(e: &EstimateRow) -> Option<Point> {
+fn point(e: &EstimateRow) -> Option<TrendPoint> {
     let bound = e.bound_corrected.or(e.bound)?;
-    let p = Point {
+    let p = TrendPoint {
         alpha_deg: e.alpha_deg,
         value: e.value?,
         bound,
@@ -174,14 +174,14 @@ fn fit_trend(
         ));
     }
     let placed = placed(members, settings);
-    let points: Vec<Point> = placed.iter().map(|(p, _)| *p).collect();
+    let points: Vec<TrendPoint> = placed.iter().map(|(p, _)| *p).collect();
     let fit = Trend::through(&points, settings, knots_deg)
         .ok_or("the least-squares fit has no solution")?;
     let outliers = outliers(&placed, &fit, group, settings.outlier_z);
     let (half_width, named) = (fit.best.quantile_95(), outliers.len());
     let one_more = fit.best.deviation_of_one_more();
     let row = |alpha_deg: f64| {
-        let (value, own_error) = fit.at(clamp_to_data(&points, alpha_deg));
+        let (value, own_error) = fit.value_and_error(clamp_to_data(&points, alpha_deg));
         let standard_error =
             own_error.hypot(common_error(members, alpha_deg, settings.alpha_step_deg));
         let prediction = half_width * standard_error.hypot(one_more);
@@ -214,16 +214,19 @@ fn fit_trend(
 
 /// Estimates with their points, sorted by α: sums do not depend on the order in which the maneuvers
 /// come.
-fn placed<'a>(members: &[&'a EstimateRow], settings: &Settings) -> Vec<(Point, &'a EstimateRow)> {
+fn placed<'a>(
+    members: &[&'a EstimateRow],
+    settings: &Settings,
+) -> Vec<(TrendPoint, &'a EstimateRow)> {
     let classes: BTreeSet<&str> = members.iter().map(|e| e.class.as_str()).collect();
     let class = |e: &EstimateRow| classes.iter().position(|c| *c == e.class).unwrap_or(0);
     let of_class = |e: &EstimateRow| {
-        Some(Point {
+        Some(TrendPoint {
             class: class(e),
             ..point(e)?
         })
     };
-    let mut placed: Vec<(Point, &EstimateRow)> = members
+    let mut placed: Vec<(TrendPoint, &EstimateRow)> = members
         .iter()
         .filter_map(|e| Some((of_class(e)?, *e)))
         .collect();
@@ -239,7 +242,7 @@ fn placed<'a>(members: &[&'a EstimateRow], settings: &Settings) -> Vec<(Point, &
 
 /// Rows of the means of maneuvers that are too few for a trend.
 fn mean_rows(members: &[&EstimateRow], group: &str, settings: &Settings) -> Vec<TrendRow> {
-    let points: Vec<Point> = placed(members, settings)
+    let points: Vec<TrendPoint> = placed(members, settings)
         .iter()
         .map(|(point, _)| *point)
         .collect();
@@ -271,7 +274,7 @@ fn mean_rows(members: &[&EstimateRow], group: &str, settings: &Settings) -> Vec<
 
 /// The maneuvers further than `limit` standard deviations from the trend.
 fn outliers(
-    placed: &[(Point, &EstimateRow)],
+    placed: &[(TrendPoint, &EstimateRow)],
     fit: &Trend,
     group: &str,
     limit: f64,
@@ -289,7 +292,7 @@ fn outliers(
         alpha_deg: point.alpha_deg,
         value: point.value,
         bound: point.bound,
-        trend: fit.best.at(point.alpha_deg).0,
+        trend: fit.best.value_and_error(point.alpha_deg).0,
         z: residual.z,
         weight_share: residual.share,
     })
@@ -297,7 +300,7 @@ fn outliers(
 }
 
 /// Clamps α to the range of the data: a trend is not continued past its last maneuver.
-fn clamp_to_data(points: &[Point], alpha_deg: f64) -> f64 {
+fn clamp_to_data(points: &[TrendPoint], alpha_deg: f64) -> f64 {
     let (Some(first), Some(last)) = (points.first(), points.last()) else {
         return alpha_deg;
     };
@@ -337,7 +340,7 @@ fn common_error(members: &[&EstimateRow], alpha_deg: f64, step_deg: f64) -> f64 
 }
 
 /// The multiples of the step and the breakpoints inside the range of the data, ascending.
-fn grid(points: &[Point], settings: &Settings, breakpoints: &[f64]) -> Vec<f64> {
+fn grid(points: &[TrendPoint], settings: &Settings, breakpoints: &[f64]) -> Vec<f64> {
     let (step, reach) = (settings.alpha_step_deg, settings.alpha_reach_deg);
     let (Some(first), Some(last)) = (points.first(), points.last()) else {
         return Vec::new();

@@ -2,24 +2,25 @@
 
 /// One maneuver's estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Point {
+pub(super) struct TrendPoint {
     pub alpha_deg: f64,
     pub value: f64,
     pub bound: f64,
-    /// Index of its class among those of the trend.
+    /// Index of the maneuver's class among the classes of the trend.
     pub class: usize,
-    /// Index of its flown α among those of the trend.
+    /// Index of the maneuver's flown α among the flown α of the trend.
     pub flown: usize,
 }
 
-impl Point {
+impl TrendPoint {
     pub(super) fn key(&self) -> (f64, f64, f64, usize) {
         (self.alpha_deg, self.value, self.bound, self.class)
     }
 }
 
-/// Counts the flown α of points sorted by α: one spans half a step of the published grid.
-pub(super) fn count_flown<'a>(points: impl Iterator<Item = &'a mut Point>, step_deg: f64) {
+/// Numbers the flown α of points sorted by α. Points within half a step of the published grid count
+/// as one flown α.
+pub(super) fn count_flown<'a>(points: impl Iterator<Item = &'a mut TrendPoint>, step_deg: f64) {
     let mut current: Option<(usize, f64)> = None;
     for point in points {
         let (flown, first) = match current {
@@ -34,9 +35,9 @@ pub(super) fn count_flown<'a>(points: impl Iterator<Item = &'a mut Point>, step_
     }
 }
 
-/// The flown α, deg, ascending: each the mean of its maneuvers, to a tenth.
-pub(super) fn flown_alphas(points: &[Point]) -> Vec<f64> {
-    let mean = |own: &[Point]| own.iter().map(|p| p.alpha_deg).sum::<f64>() / own.len() as f64;
+/// Flown α, deg, ascending: each is the mean of its maneuvers, rounded to a tenth.
+pub(super) fn flown_alphas(points: &[TrendPoint]) -> Vec<f64> {
+    let mean = |own: &[TrendPoint]| own.iter().map(|p| p.alpha_deg).sum::<f64>() / own.len() as f64;
     points
         .chunk_by(|a, b| a.flown == b.flown)
         .map(|own| (10.0 * mean(own)).round() / 10.0)

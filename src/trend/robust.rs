@@ -1,14 +1,24 @@
 //! Weighted least squares in which one outlier distorts neither the coefficients nor τ.
 //!
-//! A residual beyond [`HUBER`] standard deviations counts as if it were at that limit: Huber's
-//! weights in the solution, his proposal 2 for τ. The covariance of the coefficients is that of an
-//! M-estimate (Huber 1981, section 7.6),
+//! | symbol | quantity | unit |
+//! |---|---|---|
+//! | n, p | number of points, number of coefficients | – |
+//! | b, τ | bound of a point, scatter between maneuvers | derivative |
+//! | V | diagonal matrix of the variances b² + τ² of the points | derivative² |
+//! | X | design: value of each basis function (column) at each point (row) | – |
+//! | u | residual of a point over its standard deviation √(b² + τ²) | – |
+//! | ψ(u) | u limited to ±[`HUBER`] | – |
+//! | m | share of the points with \|u\| up to [`HUBER`] | – |
+//! | K | correction for few points, 1 + (p/n)(1 − m)/m | – |
 //!
-//! K² · [Σψ²(uᵢ)/(n − p)] / m² · (Xᵀ V⁻¹ X)⁻¹, K = 1 + (p/n)(1 − m)/m,
+//! The solution weights a residual beyond [`HUBER`] standard deviations as if it were at that limit
+//! (Huber's weights); τ² is Huber's proposal 2. The coefficients are an M-estimate, whose
+//! covariance is (Huber 1981, section 7.6)
 //!
-//! with u the residuals over their standard deviations, ψ limiting them at [`HUBER`], m the share
-//! that is not limited and V = b² + τ². The bracket scales the covariance by the actual residuals
-//! instead of those that bounds and τ predict, which matters with few data.
+//! K² · [Σψ²(u)/(n − p)] / m² · (Xᵀ V⁻¹ X)⁻¹.
+//!
+//! The bracket scales the covariance by the actual residuals instead of the residuals that bounds
+//! and τ predict, which matters with few data.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -25,28 +35,28 @@ const SETTLED: f64 = 1e-6;
 /// Residual of one maneuver's estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Residual {
-    /// Over its standard deviation, which the estimate's leverage on the trend reduces.
+    /// Residual over its standard deviation, which the estimate's leverage on the trend reduces.
     pub z: f64,
-    /// Share of its weight that Huber's weights leave: one, less for an outlier.
+    /// Huber's weight over the full weight 1/(b² + τ²): one, less for an outlier.
     pub share: f64,
 }
 
-/// Coefficients and τ² of a design, solved together.
+/// Coefficients and scatter τ² of a design, solved together.
 pub(super) struct RobustSolution {
     pub coefficients: DVector<f64>,
-    /// (Xᵀ W X)⁻¹.
+    /// (Xᵀ W X)⁻¹, with W the diagonal matrix of `weights`.
     inverse: DMatrix<f64>,
-    /// W, Huber's weights over the variances.
+    /// Weight of each point: Huber's weight over the variance.
     weights: DVector<f64>,
     pub residuals: DVector<f64>,
-    /// b² + τ² of each point.
+    /// Variance b² + τ² of each point.
     pub variances: Vec<f64>,
 }
 
 impl RobustSolution {
-    /// Solution for points of these values and squared bounds, with one τ for each stratum; `None`
-    /// if the normal equations have none.
-    pub(super) fn of(
+    /// Solves for points with these values and squared bounds `bounds2`, with one τ for each
+    /// stratum; `None` if the normal equations have none.
+    pub(super) fn solve(
         design: &DMatrix<f64>,
         values: &DVector<f64>,
         bounds2: &[f64],
@@ -87,7 +97,7 @@ impl RobustSolution {
         residuals.zip(self.variances.iter().copied())
     }
 
-    /// Covariance of the coefficients.
+    /// Covariance of the coefficients, by the equation of this file.
     pub(super) fn covariance(&self, design: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let (n, p) = (design.nrows() as f64, design.ncols() as f64);
         let u2 = || self.deviations().map(|(r, v)| r * r / v);
@@ -124,12 +134,13 @@ fn smallest(variances: &[f64]) -> f64 {
     variances.iter().copied().fold(f64::INFINITY, f64::min)
 }
 
-/// Weights of points by their variances alone.
+/// Weights of the points from their variances alone, without Huber's weights.
 pub(super) fn inverse_variances(variances: &[f64]) -> DVector<f64> {
     DVector::from_iterator(variances.len(), variances.iter().map(|v| 1.0 / v))
 }
 
-/// 1 − h of each point, with h its leverage.
+/// Degrees of freedom 1 − h that each residual keeps, with h the leverage of the point: the share
+/// of its own value in the fitted value.
 fn residual_freedom(
     design: &DMatrix<f64>,
     weights: &DVector<f64>,
@@ -141,8 +152,8 @@ fn residual_freedom(
         .collect()
 }
 
-/// x M xᵀ of each row x of the design. For products this small the library takes several times as
-/// long.
+/// Quadratic form x M xᵀ of each row x of the design with the matrix M. For products this small the
+/// linear-algebra library takes several times as long.
 fn spreads(design: &DMatrix<f64>, matrix: &DMatrix<f64>) -> Vec<f64> {
     let (rows, columns_of_rows) = (design.transpose(), matrix.transpose());
     let mut image = vec![0.0; matrix.ncols()];

@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use super::point::Point;
+use super::point::TrendPoint;
 use crate::numerics::order_statistics::upper_median;
 
 /// Standard deviations beyond which the influence of a residual stays constant: Huber's weights. The
@@ -12,19 +12,19 @@ pub(super) const HUBER: f64 = 1.5;
 pub(super) const HUBER_VARIANCE: f64 = 0.778_465;
 /// Least bound, as a share of the median bound: bounds are uncertain by a factor of a few.
 const BOUND_FLOOR: f64 = 0.25;
-/// Least number of maneuvers of a class with a scatter of its own; classes with fewer share that of
-/// all.
+/// Least number of maneuvers of a class with a scatter of its own; classes with fewer maneuvers
+/// share the scatter of all.
 const OWN_SCATTER: usize = 8;
 
 /// Bounds squared, none smaller than the floor.
-pub(super) fn floored_variances(points: &[Point]) -> Vec<f64> {
+pub(super) fn floored_variances(points: &[TrendPoint]) -> Vec<f64> {
     let floor = BOUND_FLOOR * upper_median(points.iter().map(|p| p.bound)).unwrap_or(0.0);
     points.iter().map(|p| p.bound.max(floor).powi(2)).collect()
 }
 
 /// The points of each stratum, a set with one τ: every class with a scatter of its own, then all
 /// points, if any remain.
-pub(super) fn strata(points: &[Point]) -> Vec<Vec<usize>> {
+pub(super) fn strata(points: &[TrendPoint]) -> Vec<Vec<usize>> {
     let classes = points
         .iter()
         .map(|p| p.class)
@@ -45,7 +45,8 @@ pub(super) fn strata(points: &[Point]) -> Vec<Vec<usize>> {
     strata
 }
 
-/// b² + τ² of each point, with τ of its class if that is a stratum, otherwise τ of all.
+/// Variance b² + τ² of each point. τ is that of its class if the class is a stratum, otherwise that
+/// of all points.
 pub(super) fn total_variances(
     residuals: &DVector<f64>,
     variances: &[f64],
@@ -62,8 +63,8 @@ pub(super) fn total_variances(
     total
 }
 
-/// Solves for τ² of some of the points: the sum of their squared residuals over their variances,
-/// outliers cut, equals its expectation. The sum falls as τ² grows, so bisection finds it.
+/// Solves for τ² of some of the points. The sum of their squared residuals over their variances,
+/// with outliers cut, must equal its expectation. The sum falls as τ² grows, so bisection finds τ².
 pub(super) fn scatter_squared(
     residuals: &DVector<f64>,
     variances: &[f64],

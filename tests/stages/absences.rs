@@ -104,7 +104,7 @@ fn a_maneuver_of_the_axis_that_is_not_recorded_is_rejected_with_the_reason() {
 }
 
 #[test]
-fn a_pipeline_does_without_tunnel_and_sticks_and_check_says_what_it_costs() {
+fn a_pipeline_does_without_tunnel_and_sticks_and_check_reports_the_cost() {
     let campaign = Campaign::new();
     // Class flags stay: without them as well steps of the stabilator fit OLON as they fit PPSS.
     let sticks = ["stick_pitch", "stick_lat", "pedal", "psi", "rpm_l"];

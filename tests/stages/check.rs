@@ -6,7 +6,7 @@ use std::process::Stdio;
 use crate::support::{Campaign, harvest, run};
 
 #[test]
-fn help_teaches_subcommands_examples_and_exit_codes() {
+fn help_lists_subcommands_examples_and_exit_codes() {
     let outcome = run(harvest().arg("--help"));
     assert_eq!(outcome.code, Some(0));
     for word in [
@@ -55,7 +55,7 @@ fn every_subcommand_explains_its_options() {
 }
 
 #[test]
-fn the_shipped_pipeline_is_right_and_says_what_it_would_do() {
+fn the_shipped_pipeline_is_valid_and_check_lists_what_it_uses() {
     let outcome = run(harvest().arg("check"));
     assert_eq!(outcome.code, Some(0), "{outcome:?}");
     for word in [
@@ -119,7 +119,7 @@ fn a_typo_in_yaml_stops_with_file_line_and_what_was_meant() {
 }
 
 #[test]
-fn a_pipeline_that_does_not_exist_is_told_from_one_that_is_wrong() {
+fn a_missing_pipeline_is_distinguished_from_a_wrong_one() {
     let outcome = run(harvest().args(["check", "havr"]));
     assert_eq!(outcome.code, Some(1));
     assert!(

@@ -173,7 +173,7 @@ fn every_derivative_that_is_estimated_is_compared_and_the_combined_ones_too() {
 }
 
 #[test]
-fn a_tunnel_that_agrees_with_flight_is_said_to_agree() {
+fn a_tunnel_that_agrees_with_flight_has_the_verdict_agrees() {
     // The demonstration's tunnel is wrong on purpose; one that is flight's own trend agrees
     // everywhere.
     let campaign = Campaign::of_demo();

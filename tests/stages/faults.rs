@@ -315,7 +315,7 @@ fn a_reversed_sign_and_a_delay_in_one_flight_are_both_named() {
 }
 
 #[test]
-fn a_fault_refuses_the_flight_or_is_only_reported_as_the_settings_say() {
+fn a_fault_refuses_the_flight_or_is_only_reported_by_the_settings() {
     let config = config();
     let mut raw = ten_minutes(&config);
     delay(&mut raw, "q", 4);
@@ -337,7 +337,7 @@ fn a_fault_refuses_the_flight_or_is_only_reported_as_the_settings_say() {
 }
 
 #[test]
-fn of_a_healthy_flight_with_known_errors_the_table_tells_them() {
+fn the_table_has_the_known_errors_of_a_healthy_flight() {
     let config = config();
     let settings = few_windows(OnFault::Apply);
     let mut raw = ten_minutes(&config);

@@ -173,7 +173,7 @@ fn a_unit_in_the_file_that_is_not_the_channel_map_s_is_refused() {
 }
 
 #[test]
-fn a_unit_that_neither_file_nor_map_confesses_is_found_by_the_kinematics() {
+fn a_unit_stated_nowhere_is_found_by_the_kinematics() {
     let radians = with_values(&yaw_and_roll_steps(), "p", |_, p| p.to_radians());
     record_is_refused(&radians, "channel `p`", &["rad"]);
 }
@@ -212,7 +212,7 @@ fn lengths(campaign: &Campaign) -> Vec<(String, usize)> {
 }
 
 #[test]
-fn time_that_starts_anew_begins_a_stretch_and_says_where() {
+fn time_that_starts_anew_begins_a_stretch_and_is_reported_with_its_place() {
     let record = yaw_and_roll_steps();
     let back = with_values(
         &record,
@@ -405,7 +405,7 @@ fn a_channel_that_the_equations_can_do_without_is_reported_and_the_flight_goes_o
 }
 
 #[test]
-fn an_archive_of_spoiled_flights_only_still_says_what_is_wrong_with_each() {
+fn an_archive_of_spoiled_flights_only_reports_the_fault_of_each() {
     let campaign = Campaign::new();
     fs::write(campaign.flight("one"), "").unwrap();
     fs::write(campaign.flight("two"), "text").unwrap();
@@ -554,7 +554,7 @@ fn an_archive_that_does_not_exist_cannot_be_run() {
 }
 
 #[test]
-fn one_flight_in_two_places_counts_once_and_is_said() {
+fn one_flight_in_two_places_counts_once_and_is_reported() {
     let campaign = Campaign::of_pitch_steps();
     fs::create_dir(campaign.path("flights/copy")).unwrap();
     fs::copy(

@@ -316,7 +316,7 @@ fn columns_without_names_are_found_by_their_motion() {
 }
 
 #[test]
-fn signs_that_only_gravity_tells_are_not_sure_without_it() {
+fn signs_that_only_gravity_determines_are_not_sure_without_it() {
     // Without accelerations, pitch may be reversed together with yaw: every equation that is left holds.
     let copy = Copy::new()
         .without(&["an", "ax", "ay", "altitude", "mach", "qbar", "beta_vane"])
@@ -338,7 +338,7 @@ fn signs_that_only_gravity_tells_are_not_sure_without_it() {
 }
 
 #[test]
-fn an_altitude_above_the_sea_tells_which_way_is_up() {
+fn an_altitude_above_the_sea_determines_which_way_is_up() {
     let names = ["an", "ax", "ay", "qbar", "beta_vane", "mach"];
     let copy = Copy::new().without(&names).reversed(&["theta"]);
     copy.check(12);

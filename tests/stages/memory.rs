@@ -1,7 +1,7 @@
 //! Memory that stays with the process: a second maneuver takes no pages anew.
 #![cfg(all(target_os = "linux", target_env = "gnu"))]
 
-use harvest::memory::keep;
+use harvest::memory::keep_freed_memory;
 
 use crate::support::run;
 
@@ -34,7 +34,7 @@ fn faults_of_ten_maneuvers() -> u64 {
 #[ignore = "other tests share its heap: what_was_given_back_is_not_asked_for_again runs it in a process of its own"]
 fn alone() {
     let pages_of_a_maneuver = 10 * (512 << 10) / 4096;
-    keep();
+    keep_freed_memory();
     // Others share the machine's memory: what counts is that it can be.
     let least = (0..10).map(|_| faults_of_ten_maneuvers()).min();
     assert!(least < Some(pages_of_a_maneuver), "{least:?} faults");

@@ -448,7 +448,7 @@ fn explain_prints_origin_fit_and_dependencies_of_a_maneuver() {
 }
 
 #[test]
-fn what_needs_a_night_says_where_none_is_published() {
+fn a_command_that_needs_a_night_reports_that_none_is_published() {
     let campaign = Campaign::of_pitch_steps();
     for command in ["verify", "diff"] {
         let outcome = campaign.ends(command, 1);

@@ -26,7 +26,7 @@ fn texts(document: &Document) -> Vec<String> {
 }
 
 #[test]
-fn the_summary_can_be_read_and_every_page_says_which_it_is() {
+fn the_summary_can_be_read_and_every_page_has_its_number() {
     let texts = texts(&printed());
     let all = texts.join(" ");
     for words in [
@@ -95,7 +95,7 @@ fn every_derivative_and_maneuver_is_on_a_page_of_its_own_that_the_outline_names(
 }
 
 #[test]
-fn the_contents_tell_the_pages_on_which_the_chapters_are() {
+fn the_contents_list_the_pages_of_the_chapters() {
     let document = printed();
     let texts = texts(&document);
     let toc = document.get_toc().unwrap().toc;

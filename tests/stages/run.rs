@@ -261,7 +261,7 @@ fn each_stage_brings_its_predecessors_up_to_date_and_publishes_its_tables() {
 }
 
 #[test]
-fn tables_have_their_fixed_columns_and_parquet_says_what_csv_says() {
+fn tables_have_their_fixed_columns_and_parquet_equals_csv() {
     let campaign = Campaign::of_demo();
     for (path, bytes) in &demo().bytes {
         fs::create_dir_all(campaign.path("reports")).unwrap();
@@ -390,7 +390,7 @@ fn a_second_run_changes_nothing() {
 }
 
 #[test]
-fn a_second_run_of_a_campaign_with_a_refused_flight_changes_nothing_and_says_it_again() {
+fn a_second_run_of_a_campaign_with_a_refused_flight_changes_nothing_and_reports_it_again() {
     let campaign = Campaign::of_pitch_steps();
     fs::write(campaign.flight("spoiled"), "text").unwrap();
     campaign.ends("run", 2);
@@ -569,7 +569,7 @@ fn a_reports_folder_that_cannot_be_written_is_named() {
 }
 
 #[test]
-fn a_quiet_run_says_nothing() {
+fn a_quiet_run_prints_nothing() {
     let campaign = Campaign::of_pitch_steps();
     let outcome = run(campaign.command("segment").arg("--quiet"));
     assert_eq!(

@@ -143,7 +143,7 @@ fn the_analyst_s_event_takes_precedence_and_agrees_with_what_was_found() {
 }
 
 #[test]
-fn an_event_of_another_class_or_at_other_times_takes_precedence_and_is_told_apart() {
+fn an_event_of_another_class_or_at_other_times_takes_precedence_and_has_its_own_verdict() {
     let campaign = Campaign::of_pitch_steps();
     with_events(&campaign, "flight_001,PPSSTV,118.8,132.5\n");
     assert_eq!(only_maneuver(&campaign)["class"], "PPSSTV");
@@ -154,7 +154,7 @@ fn an_event_of_another_class_or_at_other_times_takes_precedence_and_is_told_apar
 }
 
 #[test]
-fn what_was_given_and_not_found_and_what_was_found_and_not_given_are_both_kept_and_told() {
+fn events_not_found_and_maneuvers_not_given_are_both_kept_and_reported() {
     let campaign = Campaign::of_pitch_steps();
     with_events(&campaign, "flight_001,PYRS,40,55\n");
     assert_eq!(verdicts(&campaign), ["not found", "not given"]);
@@ -309,7 +309,7 @@ fn a_new_class_a_frequency_sweep_is_a_matter_of_yaml() {
 }
 
 #[test]
-fn without_its_flags_a_flight_has_the_same_maneuvers_and_is_told_so() {
+fn without_its_flags_a_flight_has_the_same_maneuvers_and_a_problem() {
     let campaign = Campaign::new();
     campaign.add(
         "flight_001",

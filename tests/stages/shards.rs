@@ -133,7 +133,7 @@ fn a_shard_that_runs_again_or_twice_at_once_makes_the_same() {
 }
 
 #[test]
-fn a_plan_of_something_else_is_refused_and_says_what_changed() {
+fn a_plan_of_something_else_is_refused_with_what_changed() {
     let campaign = Campaign::of_both_axes();
     plan_of(&campaign, "flights", 1);
     let refused = |words: &str| {

@@ -149,7 +149,7 @@ fn mean_square_distance<const NX: usize, E: InGusts<NX>>() -> f64 {
 }
 
 #[test]
-fn estimates_with_noisy_surfaces_scatter_as_their_bounds_say() {
+fn estimates_with_noisy_surfaces_scatter_by_their_bounds() {
     // Some 300 estimates of an axis, which correlate within a maneuver.
     for mean_square in [
         mean_square_distance::<4, LongitudinalInGusts>(),

@@ -250,7 +250,7 @@ fn assert_joint_estimates_scatter_as_single_ones<const NX: usize, E: InGusts<NX>
 }
 
 #[test]
-fn joint_estimates_in_gusts_scatter_as_their_bounds_say() {
+fn joint_estimates_in_gusts_scatter_by_their_bounds() {
     assert_joint_estimates_scatter_as_single_ones::<4, LongitudinalInGusts>();
     assert_joint_estimates_scatter_as_single_ones::<6, LateralInGusts>();
 }

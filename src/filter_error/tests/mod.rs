@@ -378,7 +378,7 @@ fn assert_estimates_scatter_as_bounded<const NX: usize, E: InGusts<NX>>() {
 }
 
 #[test]
-fn estimates_in_gusts_scatter_as_their_bounds_say() {
+fn estimates_in_gusts_scatter_by_their_bounds() {
     assert_estimates_scatter_as_bounded::<4, LongitudinalInGusts>();
     assert_estimates_scatter_as_bounded::<6, LateralInGusts>();
 }

@@ -103,7 +103,7 @@ fn sets(choice: &CardChoice) -> Vec<Vec<usize>> {
 fn share_of_best(choice: &CardChoice) -> f64 {
     let worth = sets(choice)
         .into_iter()
-        .map(|times| CardSet::times(choice, &times).worth());
+        .map(|times| CardSet::with_times(choice, &times).worth());
     let best = worth.fold(0.0, f64::max);
     choice.choose().worth() / best
 }
@@ -167,7 +167,7 @@ fn a_card_updates_the_covariance_as_a_gaussian_observation_does() {
         expected
     };
     let expected: Vec<DMatrix<f64>> = choice.coefficients.iter().map(updated).collect();
-    let flown = CardSet::times(&choice, &times);
+    let flown = CardSet::with_times(&choice, &times);
     for aim in &choice.aims {
         let parts = aim.parts.iter();
         let variance: f64 = parts
@@ -176,7 +176,7 @@ fn a_card_updates_the_covariance_as_a_gaussian_observation_does() {
         assert_relative_eq!(flown.deviation(aim), variance.sqrt(), max_relative = 1e-9);
     }
     times[4] = 1;
-    let (once, without) = (CardSet::times(&choice, &times), flown.without(4));
+    let (once, without) = (CardSet::with_times(&choice, &times), flown.without(4));
     assert_relative_eq!(without.worth(), once.worth(), max_relative = 1e-9);
     assert_relative_eq!(
         once.gain(4),

@@ -11,8 +11,8 @@ fn decision(mean: f64, limits: &[f64], rest: f64) -> Decision {
     Decision {
         mean,
         limits: limits.to_vec(),
-        rest,
-        share: 0.9,
+        fixed_deviation: rest,
+        required_probability: 0.9,
         follows_mean: false,
     }
 }
@@ -42,7 +42,7 @@ fn simulated(decision: &Decision, after: f64) -> f64 {
             ..decision.clone()
         };
         let (_, probability) = tomorrow.most_probable(after);
-        decided += usize::from(probability >= decision.share);
+        decided += usize::from(probability >= decision.required_probability);
     }
     decided as f64 / FLIGHTS as f64
 }
@@ -51,7 +51,10 @@ fn simulated(decision: &Decision, after: f64) -> f64 {
 fn the_chance_of_a_decision_is_that_of_simulated_flights() {
     for decision in decisions() {
         for after in [0.2, 0.5, 0.8] {
-            let (found, expected) = (decision.decided(1.0, after), simulated(&decision, after));
+            let (found, expected) = (
+                decision.probability_of_decision(1.0, after),
+                simulated(&decision, after),
+            );
             // Three standard errors of 40,000 flights.
             assert!(
                 relative_eq!(found, expected, epsilon = 0.0075),
@@ -64,7 +67,7 @@ fn the_chance_of_a_decision_is_that_of_simulated_flights() {
 #[test]
 fn with_one_limit_the_chance_has_the_closed_form() {
     // d = 0.3, z of 90 % = 1.281552, σ′ = 0.5, τ = 0.866025: Φ(-0.393492) + Φ(-1.086312).
-    let found = decision(0.3, &[0.0], 0.0).decided(1.0, 0.5);
+    let found = decision(0.3, &[0.0], 0.0).probability_of_decision(1.0, 0.5);
     assert_relative_eq!(found, 0.346_978 + 0.138_671, epsilon = 2e-5);
 }
 
@@ -72,9 +75,13 @@ fn with_one_limit_the_chance_has_the_closed_form() {
 fn the_wanted_deviation_decides_with_the_stated_probability() {
     for decision in decisions().into_iter().take(3) {
         assert!(decision.is_open(1.0));
-        let wanted = decision.wanted(1.0);
+        let wanted = decision.largest_deciding_deviation(1.0);
         assert!(wanted > 0.0 && wanted < 1.0, "{decision:?}: {wanted}");
-        assert_relative_eq!(decision.decided(1.0, wanted), 0.9, epsilon = 1e-6);
+        assert_relative_eq!(
+            decision.probability_of_decision(1.0, wanted),
+            0.9,
+            epsilon = 1e-6
+        );
     }
 }
 
@@ -108,7 +115,11 @@ fn limits_that_follow_the_mean_are_reached_for_certain() {
         ..decision(0.0, &[-1.0, 1.0], 0.3)
     };
     let wanted = (1.0f64 / 1.644_854).powi(2) - 0.09;
-    assert_relative_eq!(own.wanted(1.0), wanted.sqrt(), max_relative = 1e-6);
-    assert_relative_eq!(own.decided(1.0, 0.99 * wanted.sqrt()), 1.0);
-    assert_relative_eq!(own.decided(1.0, 1.01 * wanted.sqrt()), 0.0);
+    assert_relative_eq!(
+        own.largest_deciding_deviation(1.0),
+        wanted.sqrt(),
+        max_relative = 1e-6
+    );
+    assert_relative_eq!(own.probability_of_decision(1.0, 0.99 * wanted.sqrt()), 1.0);
+    assert_relative_eq!(own.probability_of_decision(1.0, 1.01 * wanted.sqrt()), 0.0);
 }

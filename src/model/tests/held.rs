@@ -25,7 +25,7 @@ fn holding(id: &str, flight: &str) -> Flown {
     flown
 }
 
-fn knowing(id: &str, flight: &str, value: f64) -> Flown {
+fn estimating(id: &str, flight: &str, value: f64) -> Flown {
     Flown::new(id, flight, 20.0, &[("CN_q", value)], &diagonal([0.1]))
 }
 
@@ -50,17 +50,19 @@ fn the_other_flights_are_as_if_one_s_own_had_not_been_there() {
     let own = others.remove(1);
     let rest = of(&others).unwrap();
     let asked = vec![vec![(0, 1.0), (4, -0.5)], vec![(7, 2.0)]];
-    let without = OtherFlights::new(&rest, None, &weights).unwrap().of(&asked);
+    let without = OtherFlights::new(&rest, None, &weights)
+        .unwrap()
+        .means_and_covariance(&asked);
     let left = OtherFlights::new(&whole, Some(&own), &weights)
         .unwrap()
-        .of(&asked);
+        .means_and_covariance(&asked);
     assert_relative_eq!(left.0, without.0, epsilon = 1e-9);
     assert_relative_eq!(left.1, without.1, epsilon = 1e-9);
 }
 
 #[test]
-fn an_estimate_moves_by_what_the_other_flights_say_of_what_it_held() {
-    let flown = [holding("a", "f"), knowing("b", "g", 9.0)];
+fn an_estimate_moves_by_the_other_flights_differences_of_its_held_values() {
+    let flown = [holding("a", "f"), estimating("b", "g", 9.0)];
     let others = posterior(&flown[1..], &tunnel(None), &exact());
     let (value, deviation) = at(&others, "CN_q", 20.0);
     let [slope, rate] = &rows(&flown)[1..] else {
@@ -86,9 +88,9 @@ fn an_estimate_moves_by_what_the_other_flights_say_of_what_it_held() {
 }
 
 #[test]
-fn a_flight_says_nothing_of_what_its_own_maneuvers_hold() {
+fn a_flight_does_not_change_what_its_own_maneuvers_hold() {
     // Another maneuver of the flight determines CN_q; no other flight does.
-    let own = rows(&[holding("a", "f"), knowing("b", "f", 9.0)]);
+    let own = rows(&[holding("a", "f"), estimating("b", "f", 9.0)]);
     assert_relative_eq!(
         own[2].value.unwrap(),
         own[2].wind_tunnel.unwrap(),

@@ -122,7 +122,7 @@ fn an_error_of_the_class_is_not_averaged_away() {
 }
 
 #[test]
-fn what_a_maneuver_held_wrongly_is_put_right_by_a_maneuver_that_knows_it() {
+fn a_wrong_held_value_is_corrected_by_a_maneuver_that_estimates_it() {
     // CN_q is 4 above the tunnel; a maneuver that held it took it for CN_alpha, by 0.01 for each unit.
     let held = slope("m", "f", 0.04 + 0.01 * 4.0).with(
         SharedError::Held("CN_q".into()),
@@ -180,7 +180,7 @@ fn without_a_tunnel_flight_alone_speaks() {
 }
 
 #[test]
-fn a_wild_maneuver_loses_its_weight() {
+fn an_outlier_loses_its_weight() {
     let settings = crate::model::Settings {
         degrees_of_freedom: 4.0,
         ..exact()

@@ -5,7 +5,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::fixture::{Flown, at, buildup, diagonal, exact, posterior, tunnel};
 use crate::aero::{Axis, Condition};
-use crate::model::{Evidence, Model, Outlook, Point, PointQuantity, Settings};
+use crate::model::{Evidence, Model, Outlook, OutlookPoint, PointQuantity, Settings};
 use crate::output_error::error_effect::SharedError;
 
 /// A maneuver that estimates slope and damping and holds nothing, with a bias of its flight, whose
@@ -26,8 +26,8 @@ fn settings() -> Settings {
     }
 }
 
-fn points() -> Vec<Point> {
-    let point = |derivative: &str, alpha_deg| Point {
+fn points() -> Vec<OutlookPoint> {
+    let point = |derivative: &str, alpha_deg| OutlookPoint {
         quantity: PointQuantity::Published(derivative.into()),
         condition: Condition {
             alpha_deg,
@@ -47,7 +47,12 @@ fn outlook(model: &Model, flown: &[Flown], planned: &[Flown]) -> Outlook {
     outlook_on(&points(), model, flown, planned)
 }
 
-fn outlook_on(points: &[Point], model: &Model, flown: &[Flown], planned: &[Flown]) -> Outlook {
+fn outlook_on(
+    points: &[OutlookPoint],
+    model: &Model,
+    flown: &[Flown],
+    planned: &[Flown],
+) -> Outlook {
     let flown: Vec<Evidence> = flown.iter().map(Flown::evidence).collect();
     let planned: Vec<Evidence> = planned.iter().map(Flown::evidence).collect();
     let (buildup, tunnel) = (buildup(), tunnel(None));
@@ -85,10 +90,10 @@ fn a_combination_has_the_variance_of_the_local_posterior() {
         mach: 0.3,
         third: None,
     };
-    let local = model.at(Axis::Longitudinal, &condition);
+    let local = model.posterior_at_condition(Axis::Longitudinal, &condition);
     let weights = DVector::from_fn(local.values.len(), |i, _| 0.5 - i as f64);
     let values = local.values.iter().cloned();
-    let point = Point {
+    let point = OutlookPoint {
         quantity: PointQuantity::Combination(values.zip(weights.iter().copied()).collect()),
         condition,
     };

@@ -13,7 +13,7 @@ use crate::model::open_scales::add_open_scales;
 use crate::model::posterior::{LeavingOut, gaussian, information, of_differences};
 use crate::model::scale_prior::Scale;
 use crate::model::scales::{logarithms_of, most_probable, negative_log_posterior, scales_of};
-use crate::model::term::{Term, TermSources};
+use crate::model::term::{PosteriorTerm, TermSources};
 use crate::model::unknowns::root_of_differences;
 use crate::model::{Evidence, Settings};
 use crate::numerics::random::RandomStream;
@@ -47,7 +47,7 @@ pub fn campaign() -> Vec<Flown> {
 }
 
 /// Terms and data of a campaign.
-pub fn data(flown: &[Flown], settings: &Settings) -> (Vec<Term>, Data) {
+pub fn data(flown: &[Flown], settings: &Settings) -> (Vec<PosteriorTerm>, Data) {
     let evidence: Vec<Evidence> = flown.iter().map(Flown::evidence).collect();
     let (buildup, tunnel) = (buildup(), tunnel(None));
     let basis = TermSources {
@@ -93,7 +93,7 @@ fn dense(data: &Data, weights: &[f64]) -> (DMatrix<f64>, DVector<f64>, DMatrix<f
 fn the_normal_equations_give_generalised_least_squares() {
     let flown = campaign();
     let (terms, mut data) = data(&flown, &Settings::default());
-    data.set_between(&terms, &scales());
+    data.add_grid_noise(&terms, &scales());
     let weights = vec![1.0, 0.4, 1.0, 1.0, 1.0, 0.7, 1.0, 1.0, 1.0, 1.0];
     let root = data.unknowns.root(&terms, &scales(), EXACT);
     let found = gaussian(
@@ -124,7 +124,7 @@ fn the_normal_equations_give_generalised_least_squares() {
 }
 
 /// Information of the data on the differences.
-fn observed(terms: &[Term], data: &Data) -> ObservedDifferences {
+fn observed(terms: &[PosteriorTerm], data: &Data) -> ObservedDifferences {
     let weights: Vec<f64> = data
         .flights
         .iter()
@@ -341,7 +341,11 @@ fn between_the_points_the_prior_s_variance_is_kept() {
         mach: 0.3,
         third: None,
     };
-    assert_relative_eq!(prior.between(&scale, &at(10.0)), 0.0, epsilon = 1e-18);
+    assert_relative_eq!(
+        prior.variance_between_points(&scale, &at(10.0)),
+        0.0,
+        epsilon = 1e-18
+    );
     // Half way between two points the straight line and what lies between make up the whole variance
     // but for their covariance, which the closed form has.
     let step = prior.grid.alphas_deg[1] - prior.grid.alphas_deg[0];
@@ -359,7 +363,7 @@ fn between_the_points_the_prior_s_variance_is_kept() {
     let expected =
         scale.size.powi(2) / 1.25 * shape * (1.5 + 0.5 * fading(step) - 2.0 * fading(0.5 * step));
     assert_relative_eq!(
-        prior.between(&scale, &at(middle)),
+        prior.variance_between_points(&scale, &at(middle)),
         expected,
         max_relative = 1e-9
     );

@@ -15,7 +15,8 @@ pub(super) struct Causes {
     gone_flights: BTreeSet<String>,
     /// Causes of changed maneuvers, by the derivatives that they estimate and by class.
     of_derivatives: BTreeMap<String, BTreeMap<String, BTreeSet<String>>>,
-    /// Classes that were flown. A trend's group that is no class has maneuvers of several.
+    /// Classes that were flown. A trend's group that is not a class has maneuvers of several
+    /// classes.
     classes: BTreeSet<String>,
 }
 
@@ -54,8 +55,8 @@ impl Causes {
         phrase(causes.iter().map(|c| c.words.as_str()))
     }
 
-    /// Causes by settings and methods up to the estimate; those of other classes only if there are
-    /// no others.
+    /// Causes by settings and methods up to the estimate. Settings of other classes are listed only
+    /// if there are no other causes.
     fn of_settings(&self, class: &str) -> Vec<&Cause> {
         let (of_others, own): (Vec<&Cause>, Vec<&Cause>) = self
             .of_origin(false)
@@ -125,7 +126,7 @@ impl Causes {
     }
 }
 
-/// `true` for a setting of another class than this.
+/// `true` for a setting of a class other than this one.
 fn is_of_other_class(cause: &Cause, class: &str) -> bool {
     let mut path = cause.subject.split('.');
     matches!(path.next(), Some("classes" | "recognition"))
@@ -135,15 +136,19 @@ fn is_of_other_class(cause: &Cause, class: &str) -> bool {
 /// Joins causes to one phrase; a long list is cut, [`crate::lineage::Changes::causes`] has all.
 fn phrase<'a>(causes: impl Iterator<Item = &'a str>) -> String {
     /// Largest number of causes in a phrase, so that it fits a line of the report.
-    const MOST: usize = 4;
+    const MOST_CAUSES: usize = 4;
     let mut unique: Vec<&str> = Vec::new();
     for cause in causes.flat_map(|c| c.split("; ")) {
         if !unique.contains(&cause) {
             unique.push(cause);
         }
     }
-    let more = unique.len().saturating_sub(MOST);
-    let mut text = unique.into_iter().take(MOST).collect::<Vec<_>>().join("; ");
+    let more = unique.len().saturating_sub(MOST_CAUSES);
+    let mut text = unique
+        .into_iter()
+        .take(MOST_CAUSES)
+        .collect::<Vec<_>>()
+        .join("; ");
     if more > 0 {
         text = format!("{text}; and {more} more");
     }

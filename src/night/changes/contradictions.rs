@@ -19,9 +19,9 @@ const LEAST_PROBABILITY: f64 = 1e-5;
 /// Parts that are contradicted now, but were not in the earlier night.
 pub fn contradictions(before: &NightTables, now: &NightTables) -> Vec<Contradiction> {
     let known = before.self_check.iter().filter(|row| is_contradicted(row));
-    let known: BTreeSet<(&str, &str)> = known.map(place).collect();
+    let known: BTreeSet<(&str, &str)> = known.map(item_and_coefficient).collect();
     let now = now.self_check.iter().filter(|row| is_contradicted(row));
-    now.filter(|row| !known.contains(&place(row)))
+    now.filter(|row| !known.contains(&item_and_coefficient(row)))
         .map(|row| Contradiction {
             item: row.item.clone(),
             coefficient: row.coefficient.clone(),
@@ -31,7 +31,7 @@ pub fn contradictions(before: &NightTables, now: &NightTables) -> Vec<Contradict
         .collect()
 }
 
-fn place(row: &SelfCheckRow) -> (&str, &str) {
+fn item_and_coefficient(row: &SelfCheckRow) -> (&str, &str) {
     (&row.item, &row.coefficient)
 }
 

@@ -10,14 +10,15 @@ use crate::tables::{InstrumentError, InstrumentTrend, InstrumentTrendRow};
 /// earlier or later than before is not reported again.
 pub fn instruments(before: &NightTables, now: &NightTables) -> Vec<InstrumentChange> {
     let known = before.instrument_trends.iter();
-    let known: BTreeSet<_> = known.filter_map(place).collect();
+    let known: BTreeSet<_> = known.filter_map(kind_of_change).collect();
     let now = now.instrument_trends.iter();
-    let is_new = |row: &&InstrumentTrendRow| place(row).is_some_and(|at| !known.contains(&at));
+    let is_new =
+        |row: &&InstrumentTrendRow| kind_of_change(row).is_some_and(|at| !known.contains(&at));
     now.filter(is_new).filter_map(change).collect()
 }
 
 /// Error and the kind of its change; `None` for a steady error.
-fn place(row: &InstrumentTrendRow) -> Option<(&str, InstrumentError, InstrumentTrend)> {
+fn kind_of_change(row: &InstrumentTrendRow) -> Option<(&str, InstrumentError, InstrumentTrend)> {
     let changes = matches!(row.verdict, InstrumentTrend::Step | InstrumentTrend::Drift);
     changes.then_some((row.channel.as_str(), row.error, row.verdict))
 }

@@ -1,7 +1,9 @@
-//! Information of the flights since the last night about each derivative, in nats.
+//! Information that the flights since the earlier night gave about each derivative, in nats.
 //!
-//! With the posterior of a derivative at the tunnel's breakpoints N(m₀, P₀) in the earlier night and
-//! N(m, P) now, it is their Kullback-Leibler divergence
+//! Let m₀ and P₀ be mean and covariance of a derivative's posterior at n points, the tunnel's
+//! breakpoints, in the earlier night. Let m and P be mean and covariance now. The information is
+//! the Kullback-Leibler divergence of the two posteriors,
+//!
 //! ½ (tr P₀⁻¹P − n + (m − m₀)' P₀⁻¹ (m − m₀) + ln |P₀| − ln |P|).
 
 use std::collections::BTreeMap;
@@ -16,25 +18,30 @@ use crate::tables::{CovarianceRow, PosteriorRow};
 const LEAST_NATS: f64 = 0.1;
 
 /// Flight condition in ten-thousandths of the variables' units.
-type Point = (i64, Option<i64>, Option<i64>);
+type PublishedPoint = (i64, Option<i64>, Option<i64>);
 
 /// Posterior of one derivative at the points that both nights have.
-struct Posterior {
+struct DerivativePosterior {
     values: DVector<f64>,
     covariance: DMatrix<f64>,
 }
 
 /// Rows of a night by derivative.
-struct Night<'a> {
-    rows: BTreeMap<&'a str, BTreeMap<Point, &'a PosteriorRow>>,
-    covariances: BTreeMap<&'a str, BTreeMap<(Point, Point), f64>>,
+struct PosteriorRows<'a> {
+    rows: BTreeMap<&'a str, BTreeMap<PublishedPoint, &'a PosteriorRow>>,
+    covariances: BTreeMap<&'a str, BTreeMap<(PublishedPoint, PublishedPoint), f64>>,
 }
 
 /// Derivatives on which flight added information, the most first.
 pub fn learnt(before: &NightTables, now: &NightTables) -> Vec<Learnt> {
-    let (before, now) = (Night::of(before), Night::of(now));
+    let (before, now) = (
+        PosteriorRows::of_tables(before),
+        PosteriorRows::of_tables(now),
+    );
     let names = now.rows.keys();
-    let mut all: Vec<Learnt> = names.filter_map(|name| of(name, &before, &now)).collect();
+    let mut all: Vec<Learnt> = names
+        .filter_map(|name| information_gained(name, &before, &now))
+        .collect();
     all.sort_by(|a, b| {
         b.nats
             .total_cmp(&a.nats)
@@ -43,10 +50,14 @@ pub fn learnt(before: &NightTables, now: &NightTables) -> Vec<Learnt> {
     all
 }
 
-fn of(derivative: &str, before: &Night, now: &Night) -> Option<Learnt> {
+fn information_gained(
+    derivative: &str,
+    before: &PosteriorRows,
+    now: &PosteriorRows,
+) -> Option<Learnt> {
     let (rows_before, rows) = (before.rows.get(derivative)?, now.rows.get(derivative)?);
     let points = rows.keys().filter(|p| rows_before.contains_key(p));
-    let points: Vec<Point> = points
+    let points: Vec<PublishedPoint> = points
         .filter(|p| now.has(derivative, **p))
         .copied()
         .collect();
@@ -71,7 +82,7 @@ fn of(derivative: &str, before: &Night, now: &Night) -> Option<Learnt> {
 }
 
 /// Divergence in nats; `None` if a covariance is not positive definite.
-fn divergence(before: &Posterior, now: &Posterior) -> Option<f64> {
+fn divergence(before: &DerivativePosterior, now: &DerivativePosterior) -> Option<f64> {
     let n = before.values.len();
     let root = Cholesky::new(before.covariance.clone())?;
     let own = Cholesky::new(now.covariance.clone())?;
@@ -85,9 +96,9 @@ fn divergence(before: &Posterior, now: &Posterior) -> Option<f64> {
     Some(0.5 * (trace - n as f64 + square + log(&root) - log(&own)))
 }
 
-impl<'a> Night<'a> {
-    fn of(tables: &NightTables<'a>) -> Night<'a> {
-        let mut night = Night {
+impl<'a> PosteriorRows<'a> {
+    fn of_tables(tables: &NightTables<'a>) -> PosteriorRows<'a> {
+        let mut night = PosteriorRows {
             rows: BTreeMap::new(),
             covariances: BTreeMap::new(),
         };
@@ -106,12 +117,16 @@ impl<'a> Night<'a> {
     }
 
     /// `true` for a point at which covariances are published.
-    fn has(&self, derivative: &str, point: Point) -> bool {
+    fn has(&self, derivative: &str, point: PublishedPoint) -> bool {
         let own = self.covariances.get(derivative);
         own.is_some_and(|own| own.contains_key(&(point, point)))
     }
 
-    fn posterior(&self, derivative: &str, points: &[Point]) -> Option<Posterior> {
+    fn posterior(
+        &self,
+        derivative: &str,
+        points: &[PublishedPoint],
+    ) -> Option<DerivativePosterior> {
         let (rows, own) = (
             self.rows.get(derivative)?,
             self.covariances.get(derivative)?,
@@ -124,14 +139,14 @@ impl<'a> Night<'a> {
             }
         }
         let values = points.iter().map(|p| rows[p].value);
-        Some(Posterior {
+        Some(DerivativePosterior {
             values: DVector::from_iterator(n, values),
             covariance,
         })
     }
 }
 
-fn points(row: &CovarianceRow) -> (Point, Point) {
+fn points(row: &CovarianceRow) -> (PublishedPoint, PublishedPoint) {
     (
         point(row.first_alpha_deg, row.first_mach, row.first_third),
         point(row.second_alpha_deg, row.second_mach, row.second_third),
@@ -139,7 +154,7 @@ fn points(row: &CovarianceRow) -> (Point, Point) {
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "variables of tables")]
-fn point(alpha_deg: f64, mach: Option<f64>, third: Option<f64>) -> Point {
+fn point(alpha_deg: f64, mach: Option<f64>, third: Option<f64>) -> PublishedPoint {
     let rounded = |v: f64| (v * 1e4).round() as i64;
     (rounded(alpha_deg), mach.map(rounded), third.map(rounded))
 }
@@ -149,16 +164,16 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    fn posterior(values: &[f64], covariance: &[f64]) -> Posterior {
+    fn posterior(values: &[f64], covariance: &[f64]) -> DerivativePosterior {
         let n = values.len();
-        Posterior {
+        DerivativePosterior {
             values: DVector::from_column_slice(values),
             covariance: DMatrix::from_row_slice(n, n, covariance),
         }
     }
 
     #[test]
-    fn half_the_deviation_teaches_its_logarithm_less_what_chance_would() {
+    fn half_the_deviation_gains_its_logarithm_less_the_gain_by_chance() {
         let (before, now) = (posterior(&[1.0], &[4.0]), posterior(&[1.0], &[1.0]));
         let expected = 2f64.ln() - 0.5 * (1.0 - 0.25);
         assert_relative_eq!(
@@ -175,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn points_that_say_the_same_teach_once() {
+    fn strongly_correlated_points_count_once() {
         // Two points correlated by 0.999...: the second adds next to nothing.
         let r = 1.0 - 1e-9;
         let before = posterior(&[0.0, 0.0], &[4.0, 4.0 * r, 4.0 * r, 4.0]);
@@ -186,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn the_same_posterior_teaches_nothing() {
+    fn equal_posteriors_have_no_divergence() {
         let same = posterior(&[1.0, 2.0], &[2.0, 0.5, 0.5, 1.0]);
         assert_relative_eq!(divergence(&same, &same).unwrap(), 0.0, epsilon = 1e-12);
     }

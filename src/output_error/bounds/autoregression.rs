@@ -1,8 +1,10 @@
-//! Noise of one output as an autoregressive process: v_k + Σ a_j v_{k−j} = e_k with white e.
+//! Noise of one output as an autoregressive process.
 //!
-//! The process follows from autocovariances by the recursion of Levinson and Durbin, in the order
-//! of the least information criterion (Akaike's, corrected for few samples). White noise has order
-//! 0.
+//! The noise v at sample k follows from the samples before it and white noise e, with the
+//! coefficients a_j: v_k + Σ a_j v_{k−j} = e_k.
+//!
+//! The process is fitted to autocovariances by the recursion of Levinson and Durbin. Its order has
+//! the least information criterion (Akaike's, corrected for few samples). White noise has order 0.
 
 /// Autoregressive process.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,8 +44,8 @@ impl Autoregression {
         best
     }
 
-    /// Extends the process by one order. Returns false, unchanged, without a further
-    /// autocovariance, or if no process can have it.
+    /// Extends the process by one order. Returns `false` and leaves the process unchanged if there
+    /// is no further autocovariance, or if no process can have it.
     fn lengthen(&mut self, autocovariances: &[f64]) -> bool {
         let a = &mut self.coefficients;
         let Some((next, past)) = autocovariances
@@ -88,10 +90,10 @@ impl Autoregression {
         self.innovation / (gain * gain)
     }
 
-    /// Samples until the impulse response has decayed, at most `longest`.
+    /// Number of samples until the impulse response has decayed, at most `longest`.
     pub fn memory(&self, longest: usize) -> usize {
         const DEAD: f64 = 1e-3;
-        /// Response so small that it cannot grow again.
+        /// Response below which the computation ends, because it cannot grow above `DEAD` again.
         const GONE: f64 = 1e-9;
         let order = self.coefficients.len();
         let (mut answer, mut last) = (vec![1.0], 0);

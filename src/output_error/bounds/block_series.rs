@@ -22,9 +22,9 @@ const BLOCKS_PER_COEFFICIENT: usize = 10;
 /// One output of one maneuver in blocks of samples.
 #[derive(Clone, Debug)]
 pub struct BlockSeries {
-    /// Weight of a sample.
+    /// Weight of a sample in the cost.
     pub(super) weight: f64,
-    /// Samples of a whole block.
+    /// Number of samples in a whole block.
     pub(super) block_length: f64,
     /// Mean residual of each block.
     residuals: AlignedMatrix,
@@ -35,16 +35,16 @@ pub struct BlockSeries {
     pub(crate) counts: Vec<f64>,
     /// Summed sensitivities of each block.
     pub(crate) sensitivities: AlignedMatrix,
-    /// Σ s sᵀ of the blocks' sums.
+    /// Sum Σ s sᵀ over the blocks, with s the summed sensitivities of a block.
     pub(super) between: AlignedMatrix,
-    /// Σ s sᵀ of the samples' sensitivities about their block's mean.
+    /// Sum Σ s sᵀ over the samples, with s the sensitivities less the mean of their block.
     pub(super) within: AlignedMatrix,
 }
 
 impl BlockSeries {
     /// Divides one output's `samples` into blocks. `sums_of` returns a block's sums and writes its
-    /// summed sensitivities to a row. `square` and `squares` are Σ v² and Σ s sᵀ of all samples that
-    /// count.
+    /// summed sensitivities to a row. `square` is Σ v² and `squares` is Σ s sᵀ over all samples
+    /// that count, with residuals v and sensitivities s.
     #[must_use]
     pub fn new(
         step_s: f64,
@@ -144,8 +144,8 @@ impl BlockSeries {
         filtered
     }
 
-    /// Multiplies the autocovariance R of a process with unit innovation by rows that are already
-    /// filtered once.
+    /// Multiplies the autocovariance R of a process with unit innovation by rows that the process
+    /// has already filtered once.
     pub(super) fn times_autocovariance(
         &self,
         mut filtered: AlignedMatrix,

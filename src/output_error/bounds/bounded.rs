@@ -1,5 +1,5 @@
-//! Data of the bounds (1.7) besides the likelihood: residuals with their sensitivities in blocks,
-//! and the noise of signals that the equations take as exact.
+//! Data that the bounds (1.7) need besides the likelihood: residuals with their sensitivities in
+//! blocks, and the noise of signals that the equations take as exact.
 
 use nalgebra::DMatrix;
 
@@ -9,7 +9,7 @@ use crate::dynamics::{Equations, OUTPUTS};
 use crate::output_error::case::Case;
 use crate::output_error::kernel::response::Response;
 use crate::output_error::likelihood::definition::Likelihood;
-use crate::output_error::likelihood::joint::{Joint, Member};
+use crate::output_error::likelihood::joint::{Joint, JointMember};
 
 /// Data whose estimates have bounds.
 pub trait Bounded: Likelihood {
@@ -17,7 +17,8 @@ pub trait Bounded: Likelihood {
     /// series are independent.
     fn series(&self, response: &Self::Response, weights: &[f64; OUTPUTS]) -> Vec<BlockSeries>;
 
-    /// Σ Sᵀ W R W S for white residuals.
+    /// Covariance Σ Sᵀ W R W S of the gradient for white residuals, with sensitivities S, weights W
+    /// and noise variances R.
     fn white_covariance(&self, response: &Self::Response, weights: &[f64; OUTPUTS])
     -> DMatrix<f64>;
 
@@ -103,7 +104,7 @@ impl<const NX: usize, E: Equations<NX>> Bounded for Joint<'_, NX, E> {
     }
 }
 
-impl<const NX: usize, E: Equations<NX>> Member<'_, NX, E> {
+impl<const NX: usize, E: Equations<NX>> JointMember<'_, NX, E> {
     fn widened(&self, series: &[BlockSeries], parameters: usize) -> Vec<BlockSeries> {
         series
             .iter()

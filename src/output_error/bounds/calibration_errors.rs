@@ -2,10 +2,11 @@
 //! for noise. A bias or scale error moves a maneuver's estimates as a whole and hardly shows in the
 //! residuals.
 //!
-//! The estimates solve Σ Sᵀ W v = 0. An error of one standard deviation changes the residuals at
-//! the same parameters to v′, so the estimates move by H⁻¹ Σ Sᵀ W (v′ − v), to first order in the
-//! error. A surface's scale error or bias is equivalent to its derivatives
-//! in error, so v′ − v follows from sensitivities. For other errors it is integrated.
+//! Let S be the sensitivities, W the weights, v the residuals and H = Σ Sᵀ W S the information
+//! matrix. The estimates solve Σ Sᵀ W v = 0. An error of one standard deviation changes the
+//! residuals at the same parameters to v′, so the estimates change by H⁻¹ Σ Sᵀ W (v′ − v), to first
+//! order in the error. A surface's scale error or bias is equivalent to its derivatives in error,
+//! so v′ − v follows from sensitivities. For other errors it is integrated.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -24,7 +25,7 @@ use crate::output_error::likelihood::outcome::Fit;
 use crate::settings::settings;
 
 settings! {
-    /// Uncertainty that calibration leaves of a signal, standard deviations: reading = (1 + scale) ·
+    /// Uncertainty of a signal after calibration, standard deviations: reading = (1 + scale) ·
     /// truth + bias.
     #[derive(Copy)]
     pub struct Calibration {
@@ -40,9 +41,9 @@ settings! {
 pub struct Misreading<'a> {
     pub signal: &'a str,
     pub scale: f64,
-    /// In the signal's unit.
+    /// Bias, in the signal's unit.
     pub bias: f64,
-    /// Delay of a surface; other signals have none.
+    /// Delay of a surface, s; zero for other signals.
     pub delay_s: f64,
 }
 
@@ -58,7 +59,7 @@ impl<'a> Misreading<'a> {
         }
     }
 
-    /// Effect of the error, which changes the parameters by `change`.
+    /// Effect of the error, given the change of the parameters.
     #[must_use]
     pub fn effect(&self, change: &DVector<f64>) -> ErrorEffect {
         let signal = self.signal.to_owned();
@@ -72,7 +73,7 @@ impl<'a> Misreading<'a> {
         ErrorEffect::new(error, deviation, change)
     }
 
-    /// Window as it would have been recorded with the error.
+    /// Window as an instrument with the error would have recorded it.
     #[must_use]
     pub fn of_window(&self, window: &Window) -> Window {
         let misread = window.misread(self.signal, self.scale, self.bias);
@@ -106,7 +107,7 @@ impl Calibration {
 
 /// Maneuver with its fit.
 #[derive(Debug)]
-pub struct Fitted<'a, const NX: usize, E: Equations<NX>> {
+pub struct FittedManeuver<'a, const NX: usize, E: Equations<NX>> {
     pub aircraft: &'a Aircraft,
     pub window: &'a Window,
     pub model: &'a Model<'a>,
@@ -115,7 +116,7 @@ pub struct Fitted<'a, const NX: usize, E: Equations<NX>> {
     pub weights: &'a [f64; OUTPUTS],
 }
 
-impl<const NX: usize, E: Equations<NX>> Fitted<'_, NX, E> {
+impl<const NX: usize, E: Equations<NX>> FittedManeuver<'_, NX, E> {
     /// Changes of the gradient Σ Sᵀ W v by each error, in the order of the case's parameters.
     ///
     /// # Errors
@@ -176,7 +177,7 @@ impl<const NX: usize, E: Equations<NX>> Fitted<'_, NX, E> {
     /// Every derivative, held at its value in the fit.
     fn all_held(&self) -> Vec<(&Derivative, f64)> {
         let free = self.model.free.iter().filter_map(|d| {
-            let j = place(&self.case.names, &d.name)?;
+            let j = index_of(&self.case.names, &d.name)?;
             Some((*d, self.values[j]))
         });
         free.chain(self.model.held.iter().copied()).collect()
@@ -211,26 +212,26 @@ impl<const NX: usize, E: Equations<NX>> Fitted<'_, NX, E> {
 /// Name of a signal that equals one throughout.
 const ONE: &str = "one";
 
-/// Effects of errors of all surfaces, from one pass. A surface acts through its derivatives alone: its
-/// scale error changes the outputs as errors of its derivatives, and its bias as errors of the
-/// coefficients' constants.
+/// Effects of errors of all surfaces, from one pass. A surface acts through its derivatives alone.
+/// Its scale error changes the outputs as an error of these derivatives does, and its bias as
+/// errors of the coefficients' constants do.
 struct SurfaceErrors<'a> {
     /// Derivatives along surfaces, with their values.
     derivatives: Vec<(&'a Derivative, f64)>,
-    /// Places of the case's parameters among those of this pass.
+    /// Places of the case's parameters among the parameters of this pass.
     places: Vec<usize>,
     names: Vec<String>,
-    /// Σ Sᵀ W S of all parameters of this pass.
+    /// Information Σ Sᵀ W S on all parameters of this pass.
     information: DMatrix<f64>,
 }
 
 impl<'a> SurfaceErrors<'a> {
     /// Runs the pass with the derivatives along surfaces and constant deflections free as well.
     fn new<const NX: usize, E: Equations<NX>>(
-        fitted: &Fitted<NX, E>,
+        fitted: &FittedManeuver<NX, E>,
         held: &[(&'a Derivative, f64)],
     ) -> Result<SurfaceErrors<'a>, Diverged> {
-        let Fitted { model, case, .. } = fitted;
+        let FittedManeuver { model, case, .. } = fitted;
         let is_free = |d: &Derivative| model.free.iter().any(|f| f.name == d.name);
         let (derivatives, rest): (Vec<_>, Vec<_>) = held
             .iter()
@@ -251,7 +252,7 @@ impl<'a> SurfaceErrors<'a> {
         let values = wide
             .names
             .iter()
-            .map(|name| match place(&case.names, name) {
+            .map(|name| match index_of(&case.names, name) {
                 Some(j) => fitted.values[j],
                 None => derivatives
                     .iter()
@@ -265,7 +266,7 @@ impl<'a> SurfaceErrors<'a> {
         Ok(SurfaceErrors {
             derivatives,
             places: places
-                .map(|name| place(&wide.names, name).unwrap_or(0))
+                .map(|name| index_of(&wide.names, name).unwrap_or(0))
                 .collect(),
             information: cost::sums(&response, fitted.weights).information,
             names: wide.names,
@@ -285,7 +286,7 @@ impl<'a> SurfaceErrors<'a> {
 
     /// Subtracts a change of one parameter times its column of the information matrix.
     fn subtract_column(&self, name: &str, change: f64, shift: &mut DVector<f64>) {
-        if let Some(column) = place(&self.names, name) {
+        if let Some(column) = index_of(&self.names, name) {
             for (shift, &row) in shift.iter_mut().zip(&self.places) {
                 *shift -= change * self.information[(row, column)];
             }
@@ -315,7 +316,7 @@ fn is_along(derivative: &Derivative, surface: &str) -> bool {
     derivative.regressor.surface() == Some(surface)
 }
 
-fn place(names: &[String], name: &str) -> Option<usize> {
+fn index_of(names: &[String], name: &str) -> Option<usize> {
     names.iter().position(|n| n == name)
 }
 
@@ -329,7 +330,8 @@ fn constant_name(coefficient: Coefficient, regressor: &Regressor) -> String {
 }
 
 /// Adds the effect of errors common to all data to a fit's corrected covariance. Each error is
-/// given by its change of the gradient at one standard deviation ([`Fitted::gradient_shifts`]).
+/// given by its change of the gradient at one standard deviation
+/// ([`FittedManeuver::gradient_shifts`]).
 pub fn add_calibration_errors<D: Likelihood>(
     data: &D,
     errors: &[Misreading],

@@ -44,13 +44,13 @@ use crate::output_error::case::blocks::BlockSums;
 
 /// Largest number of rounds in which the absorbed part is added back.
 const ROUNDS: usize = 30;
-/// Relative change of an output's long-run variance below which its noise has settled.
+/// Relative change of an output's long-run variance in a round below which its noise has settled.
 const SETTLED: f64 = 0.01;
-/// Change of the absorbed part, as a share of the variance, below which white noise that has settled
-/// is not computed again: a bound is accurate to some hundredths only.
+/// Change of the absorbed variance, as a share of the variance, below which settled white noise is
+/// not computed again. A bound is accurate to some hundredths only.
 const UNCHANGED: f64 = 1e-3;
-/// Share of the noise variance that must remain in the residuals for white noise to be found in one
-/// round, by the ratio of the residuals' variance to that share.
+/// Least share of the noise variance that remains in the residuals for which white noise is found
+/// in one round: the residuals' variance is divided by the share.
 const MOSTLY_LEFT: f64 = 0.95;
 
 /// Estimated noise of each output, in the order of the outputs.
@@ -204,8 +204,8 @@ fn settle_noise<'a>(
 fn total_covariance(outputs: &[NoiseIteration], parameters: usize) -> AlignedMatrix {
     let mut sum = AlignedMatrix::zeros(parameters, parameters);
     for output in outputs {
-        sum.add_scaled(&output.by_fast, 1.0);
-        sum.add_scaled(&output.by_slow, 1.0);
+        sum.add_scaled(&output.covariance_from_fast, 1.0);
+        sum.add_scaled(&output.covariance_from_slow, 1.0);
     }
     sum
 }
@@ -223,15 +223,16 @@ struct NoiseIteration<'a> {
     /// Variance of the blocks' means.
     variance: f64,
     /// Covariance of the parameters from the noise within blocks.
-    by_fast: AlignedMatrix,
+    covariance_from_fast: AlignedMatrix,
     /// Covariance of the parameters from the noise of the blocks' means.
-    by_slow: AlignedMatrix,
-    /// `by_slow` if the blocks' means were white with unit variance.
-    by_white: AlignedMatrix,
-    /// C, the change of the estimates with each block mean; `None` until the noise is coloured.
+    covariance_from_slow: AlignedMatrix,
+    /// Covariance of the parameters if the blocks' means were white with unit variance.
+    covariance_from_white: AlignedMatrix,
+    /// Change C of the estimates with each block mean; `None` until the noise is coloured.
     changes: Option<AlignedMatrix>,
-    /// R C of the process with innovations of variance one; `None` for white noise.
-    spread: Option<AlignedMatrix>,
+    /// Product R C, with R the autocovariance of the process for innovations of variance one;
+    /// `None` for white noise.
+    process_times_changes: Option<AlignedMatrix>,
     /// Mean variance of the block means that the parameters absorb (diagonal of S K Sᵀ), in the round
     /// in which the absorbed part was last added.
     absorbed_variance: f64,
@@ -251,11 +252,11 @@ impl<'a> NoiseIteration<'a> {
             pairs,
             slow: Autoregression::white(0.0),
             variance: 0.0,
-            by_fast: by_fast.scaled_by(square * series.fast_variance),
-            by_slow: by_white.clone(),
-            by_white,
+            covariance_from_fast: by_fast.scaled_by(square * series.fast_variance),
+            covariance_from_slow: by_white.clone(),
+            covariance_from_white: by_white,
             changes: None,
-            spread: None,
+            process_times_changes: None,
             absorbed_variance: 0.0,
             settled: false,
             observed: vec![],
@@ -270,7 +271,10 @@ impl<'a> NoiseIteration<'a> {
         let (series, inverse) = (self.series, self.inverse);
         let slow = Autoregression::fitted(autocovariances, self.pairs[0]);
         if slow.is_white() {
-            self.by_slow = self.by_white.clone().scaled_by(slow.innovation);
+            self.covariance_from_slow = self
+                .covariance_from_white
+                .clone()
+                .scaled_by(slow.innovation);
         } else {
             let changes = self.changes.get_or_insert_with(|| {
                 series
@@ -279,16 +283,17 @@ impl<'a> NoiseIteration<'a> {
                     .scaled_by(series.weight)
             });
             let filtered = series.filtered(changes, &slow);
-            self.by_slow = filtered.gram().scaled_by(slow.innovation);
-            self.spread = Some(series.times_autocovariance(filtered, &slow));
+            self.covariance_from_slow = filtered.gram().scaled_by(slow.innovation);
+            self.process_times_changes = Some(series.times_autocovariance(filtered, &slow));
         }
         self.slow = slow;
         self.variance = autocovariances.first().copied().unwrap_or(0.0);
     }
 
-    /// Runs one round: adds the part that parameters of this covariance absorb to the residuals'
-    /// autocovariances, and fits the noise to the sum. For white noise the variance that leaves the
-    /// observed residuals is computed directly, so only the other outputs can change it later.
+    /// Runs one round: adds the part that the parameters absorb, for their present covariance, to
+    /// the residuals' autocovariances, and fits the noise to the sum. White noise of which the
+    /// residuals keep most is solved for directly, so only other outputs can change its variance
+    /// later.
     fn iterate(&mut self, covariance: &AlignedMatrix) {
         let (pairs, length) = (self.pairs[0], self.series.block_length);
         let absorbed_variance = covariance.dot(&self.series.between) / (length * length * pairs);
@@ -297,7 +302,7 @@ impl<'a> NoiseIteration<'a> {
             return;
         }
         self.absorbed_variance = absorbed_variance;
-        let absorbed = self.absorbed(covariance);
+        let absorbed = self.absorbed_autocovariance(covariance);
         let left = self.variance - absorbed[0] / pairs;
         let stronger = if self.slow.is_white() && left > MOSTLY_LEFT * self.variance {
             self.observed[0] / left
@@ -315,12 +320,12 @@ impl<'a> NoiseIteration<'a> {
     }
 
     /// Absorbed part R C Sᵀ + S Cᵀ R − S K Sᵀ, summed over all pairs of blocks at each lag.
-    fn absorbed(&mut self, covariance: &AlignedMatrix) -> Vec<f64> {
+    fn absorbed_autocovariance(&mut self, covariance: &AlignedMatrix) -> Vec<f64> {
         let (series, lags) = (self.series, self.series.lags());
         let (sums, length) = (&series.sensitivities, series.block_length);
         let factor = self.slow.innovation / length;
         let mut inner = covariance.clone().scaled_by(-0.5 / (length * length));
-        if let Some(mut half) = self.spread.take() {
+        if let Some(mut half) = self.process_times_changes.take() {
             half.add_product(sums, &inner.scaled_by(1.0 / factor));
             let before = half.lagged_products(sums, lags);
             let after = sums.lagged_products(&half, lags);
@@ -337,7 +342,10 @@ impl<'a> NoiseIteration<'a> {
     /// Adds the variances of the parameters from this output.
     fn add_variances(&self, estimates: &mut VarianceEstimates) {
         let series = self.series;
-        estimates.add(self.by_fast.diagonal(), series.fast_degrees_of_freedom);
+        estimates.add(
+            self.covariance_from_fast.diagonal(),
+            series.fast_degrees_of_freedom,
+        );
         let absorbed_blocks =
             series.weight / series.block_length * self.inverse.dot(&series.between);
         let degrees_of_freedom = self.pairs[0] - absorbed_blocks;
@@ -347,7 +355,7 @@ impl<'a> NoiseIteration<'a> {
                 filtered: series.filtered(changes, &self.slow),
                 degrees_of_freedom,
             }),
-            _ => estimates.add(self.by_slow.diagonal(), degrees_of_freedom),
+            _ => estimates.add(self.covariance_from_slow.diagonal(), degrees_of_freedom),
         }
     }
 }

@@ -1,5 +1,8 @@
-//! "Consider" covariance: the effect of the held values' uncertainty on the estimates, G P Gᵀ with
-//! G = −H⁻¹ Σ S_fᵀ W S_h.
+//! "Consider" covariance: effect of the uncertainty of held values on the estimates.
+//!
+//! Let S_f and S_h be the sensitivities to free parameters and to held values, W the weights, H the
+//! information on the free parameters, and P the covariance of the held values. The covariance is G
+//! P Gᵀ with G = −H⁻¹ Σ S_fᵀ W S_h.
 
 use std::collections::BTreeMap;
 
@@ -20,7 +23,7 @@ pub struct Considered<'a, const NX: usize, E: Equations<NX>> {
     pub wide: &'a Case<NX, E>,
     /// Value of every parameter of `wide`, by name.
     pub values: BTreeMap<&'a str, f64>,
-    /// Index of each parameter of `case` among those of the fit.
+    /// Index of each parameter of `case` among the parameters of the fit.
     pub places: Vec<usize>,
 }
 

@@ -1,7 +1,9 @@
 //! Cramér-Rao bounds (1.6, 1.7) in a form that holds for any weights.
 //!
-//! With H = Σ Sᵀ W S and residual covariance R̂, the covariance of the estimates is H⁻¹ [Σ Sᵀ W R̂
-//! W S] H⁻¹. It is H⁻¹, the usual bound, if W = R̂⁻¹, which the weights of Tables 2 and 4 are not.
+//! Let S be the sensitivities, W the weights, H = Σ Sᵀ W S the information matrix and R̂ the
+//! covariance of the residuals. The covariance of the estimates is H⁻¹ [Σ Sᵀ W R̂ W S] H⁻¹. It
+//! equals the usual bound H⁻¹ only if W = R̂⁻¹, which does not hold for the weights of Tables 2 and
+//! 4.
 //!
 //! The corrected bound uses the residuals' autocovariance ([`coloured`]) and is never below the
 //! bound for white residuals. Student's t widens it where the autocovariance has few degrees of
@@ -54,7 +56,7 @@ pub fn residual_noise<D: Bounded>(
     max_condition_number: f64,
 ) -> Option<ResidualNoise> {
     let sums = data.sums(&fit.response, &fit.weights);
-    match Identification::of(&sums.information, max_condition_number) {
+    match Identification::identify(&sums.information, max_condition_number) {
         Identification::Determined { inverse, .. } => {
             let series = data.series(&fit.response, &fit.weights);
             Some(coloured::residual_noise(&inverse, &series))

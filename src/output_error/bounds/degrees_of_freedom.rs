@@ -1,18 +1,28 @@
-//! Degrees of freedom of a variance from coloured residuals. The noise's spectrum is itself an
-//! estimate from a few seconds, so normal intervals are too short and Student's t replaces them.
+//! Degrees of freedom of a variance from coloured residuals. The noise's spectrum is itself
+//! estimated from a few seconds of data. Normal intervals are therefore too short, and Student's t
+//! replaces them.
 //!
-//! An output gives a parameter the variance V = σ² Q(φ). Q is Σ u², with u the parameter's
-//! sensitivities filtered by the process 1/A. An autoregressive process fitted to N values has
-//! var σ² = 2σ⁴/N and cov φ = σ² Γ⁻¹/N, independent of each other (Brockwell and Davis 1991, sections
-//! 8.1 and 10.8), with σ² Γ⁻¹ = L Lᵀ − U Uᵀ of its coefficients (Siddiqui 1958). The delta method
-//! gives var V = 2V²/N + σ⁴ ∇Qᵀ cov φ ∇Q, where ∂u/∂φ_i is −u filtered once more, i samples late.
-//! The sum V of several outputs' variances has ν = 2V²/Σ var V degrees of freedom (Satterthwaite
-//! 1946).
+//! | symbol | quantity |
+//! |---|---|
+//! | N | number of independent values from which the process is fitted |
+//! | φ, σ² | coefficients of the autoregressive process A, and variance of its innovations |
+//! | u | changes of one estimate with the values of an output, filtered by 1/A |
+//! | Q = Σ u² | so that V = σ² Q is the variance of the estimate from this output |
+//! | Γ | autocovariance matrix of the process |
+//! | L, U | lower triangular matrices of the coefficients, with σ² Γ⁻¹ = L Lᵀ − U Uᵀ (Siddiqui 1958) |
+//!
+//! σ² and φ are independent, with var σ² = 2σ⁴/N and cov φ = σ² Γ⁻¹/N (Brockwell and Davis 1991,
+//! sections 8.1 and 10.8). The delta method gives
+//!
+//! var V = 2V²/N + σ⁴ ∇Qᵀ cov φ ∇Q,
+//!
+//! where ∂u/∂φ_i is −u filtered once more, i samples late. Several outputs add their variances V.
+//! The sum has ν = 2 (Σ V)²/Σ var V degrees of freedom (Satterthwaite 1946).
 
 use super::autoregression::Autoregression;
 use crate::numerics::matrix::AlignedMatrix;
 
-/// Variance of each parameter, with the variance of that estimate.
+/// Estimated variance of each parameter, with the variance of that estimate.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct VarianceEstimates {
     variances: Vec<f64>,
@@ -55,7 +65,7 @@ impl VarianceEstimates {
         let mut twice = filtered.clone();
         twice.filter_columns(&noise.coefficients);
         let covariance = coefficient_covariance(&noise.coefficients, *degrees_of_freedom);
-        // Q, and −½ of its slopes along the coefficients.
+        // Q, and −½ times its slopes along the coefficients.
         let square = filtered.lagged_products_by_column(filtered, 0);
         let slopes: Vec<Vec<f64>> = (1..=noise.coefficients.len())
             .map(|lag| twice.lagged_products_by_column(filtered, lag))
@@ -93,7 +103,7 @@ impl VarianceEstimates {
     }
 }
 
-/// Covariance of the coefficients of a process fitted to a number of values, (L Lᵀ − U Uᵀ)/N.
+/// Covariance (L Lᵀ − U Uᵀ)/N of the coefficients of a process that is fitted to N values.
 fn coefficient_covariance(coefficients: &[f64], values: f64) -> Vec<Vec<f64>> {
     let p = coefficients.len();
     let lower = |i: usize, k: usize| if i == k { 1.0 } else { coefficients[i - k - 1] };

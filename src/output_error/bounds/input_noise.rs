@@ -3,11 +3,12 @@
 //! integrated to slow errors. Derivatives follow these, but they are hardly visible in the
 //! residuals beside the sensors' own noise.
 //!
-//! An error of one surface sample changes the gradient Σ Sᵀ W v directly through the outputs and
-//! indirectly through the later states. An adjoint λ = ∂(gradient)/∂(state), integrated backwards,
-//! contains both. White noise of variance σ² adds σ² Σ_k g_k g_kᵀ to the gradient's covariance.
-//! Surfaces act through three coefficients, so three vectors g per sample suffice for any number of
-//! surfaces.
+//! An error of one surface sample changes the gradient Σ Sᵀ W v of the cost directly through the
+//! outputs, and indirectly through the later states. Let S be the sensitivities, W the weights and
+//! v the residuals. An adjoint λ = ∂(gradient)/∂(state), integrated backwards, contains both
+//! effects. If g_k is the change of the gradient with the surface at sample k, white noise of
+//! variance σ² adds σ² Σ_k g_k g_kᵀ to the gradient's covariance. Surfaces act through three
+//! coefficients, so three vectors g per sample suffice for any number of surfaces.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 #![expect(
     clippy::needless_range_loop,
@@ -67,13 +68,13 @@ struct Adjoint<'a, const NX: usize, E: Equations<NX>> {
 
 /// Slopes of one block, taken in its middle.
 struct BlockSlopes<const NX: usize> {
-    /// State half a block later along the state.
+    /// Slope of the state half a block later along the present state.
     half_block: SMatrix<f64, NX, NX>,
-    /// Weighted outputs along the states.
+    /// Slopes of the weighted outputs along the states.
     outputs_by_state: SMatrix<f64, OUTPUTS, NX>,
-    /// Weighted outputs along the coefficients.
+    /// Slopes of the weighted outputs along the coefficients.
     outputs_by_coefficient: SMatrix<f64, OUTPUTS, COEFFICIENTS>,
-    /// State along a coefficient during one sample.
+    /// Slope of the next state along a coefficient that acts during one sample.
     state_by_coefficient: SMatrix<f64, NX, COEFFICIENTS>,
 }
 
@@ -203,8 +204,8 @@ impl<const NX: usize, E: Equations<NX>> Adjoint<'_, NX, E> {
         at
     }
 
-    /// Covariance of the coefficients' errors at a sample; the noise of each surface and of the dynamic
-    /// pressure acts on all of them.
+    /// Covariance of the errors of the coefficients at a sample; the noise of each surface and of
+    /// the dynamic pressure acts on all coefficients.
     #[inline(always)]
     fn coefficient_noise(&self, k: usize) -> [[f64; COEFFICIENTS]; COEFFICIENTS] {
         let mut covariance = [[0.0; COEFFICIENTS]; COEFFICIENTS];
@@ -230,7 +231,7 @@ impl<const NX: usize, E: Equations<NX>> Adjoint<'_, NX, E> {
     }
 }
 
-/// Adds the covariance of effects of one noise.
+/// Adds the covariance that one noise source causes by its effects.
 #[inline(always)]
 fn add_product(
     covariance: &mut [[f64; COEFFICIENTS]; COEFFICIENTS],

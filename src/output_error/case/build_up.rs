@@ -15,10 +15,10 @@ use nalgebra::SVector;
 
 use crate::dynamics::COEFFICIENTS;
 
-/// Term of the build-up: one derivative's coefficient, the state its regressor is proportional to
-/// (if any), and the column of regressors or factors of proportion.
+/// Term of the build-up: coefficient of one derivative; state to which its regressor is
+/// proportional, if any; and column of regressors, or of factors of proportion.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Term {
+pub(crate) struct BuildUpTerm {
     pub coefficient: usize,
     pub state: Option<usize>,
     pub column: usize,
@@ -27,7 +27,7 @@ pub(crate) struct Term {
 /// Term of the build-up with the value of its derivative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ValuedTerm {
-    pub term: Term,
+    pub term: BuildUpTerm,
     pub value: f64,
 }
 

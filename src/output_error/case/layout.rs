@@ -2,20 +2,21 @@
 //!
 //! Terms of this file:
 //!
-//! - A *vector* is [`VECTOR`] numbers that the processor computes at once; a *lane* is the place of
-//!   one of them, counted through all vectors. Each lane holds the sensitivities to one parameter.
+//! - A *vector* is [`VECTOR`] numbers that the processor computes at once. A *lane* is the place of
+//!   one number, counted through all vectors. Each lane holds the sensitivities to one parameter.
 //! - A *group* is the lanes of one coefficient's derivatives, in whole vectors.
-//! - A *slot* is a place within a group. The same slot of each group has the same kind of regressor.
+//! - A *slot* is a place within a group. The same slot of each group has the same kind of
+//!   regressor.
 //! - A *row* is the regressors of one point in time; a *column* is one regressor over all points.
 //!
 //! # Lanes
 //!
 //! Lanes are, in order:
 //!
-//! 1. the group of each coefficient. All groups have the same number of lanes. A vector thus contains
-//!    derivatives of one coefficient only, and needs one factor ∂(rates)/∂(coefficient). The first
-//!    slots are derivatives along a state, in the order of the states, then derivatives along a
-//!    state times a measured signal, then those along measured signals;
+//! 1. the group of each coefficient. All groups have the same number of lanes. A vector thus
+//!    contains derivatives of one coefficient only, and needs one factor ∂(rates)/∂(coefficient).
+//!    The first slots are derivatives along a state, in the order of the states, then derivatives
+//!    along a state times a measured signal, then those along measured signals;
 //! 2. the group of the parameters without a regressor, such as initial states.
 //!
 //! A bias shifts an output and not the states, so it needs no lane in the integration. Two lanes
@@ -23,16 +24,16 @@
 //!
 //! # Regressors
 //!
-//! Usually each surface has one derivative in each of the three coefficients. Their regressor is the
-//! same column, so all groups read one row of shared columns, if the columns of all coefficients fit
-//! into the widest group. A slot without a derivative is computed and ignored. In a *dense* layout
-//! each group has a row of its own, with zero in the slots without a derivative; parameters without
-//! a regressor take these slots.
+//! Usually each surface has one derivative in each of the three coefficients. Their regressor is
+//! the same column, so all groups read one row of shared columns, if the columns of all
+//! coefficients fit into the widest group. A slot without a derivative is computed and ignored. In
+//! a *dense* layout each group has a row of its own, with zero in the slots without a derivative;
+//! parameters without a regressor take these slots.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use super::build_up::Term;
+use super::build_up::BuildUpTerm;
 use crate::dynamics::COEFFICIENTS;
 use crate::numerics::simd::VECTOR;
 
@@ -54,18 +55,18 @@ pub(crate) struct LaneLayout {
     /// Lane of each parameter in order, without the biases.
     pub parameter_lanes: Vec<usize>,
     /// Spare lane that holds the residual while sums are taken.
-    pub residual: usize,
+    pub residual_lane: usize,
     /// Spare lane that holds a one while sums are taken.
-    pub one: usize,
+    pub one_lane: usize,
     /// Spare lanes that hold the biases' sensitivities where these are kept.
     pub biases: Vec<usize>,
     /// Number of lanes of each vector that are computed, counted from its first lane.
-    pub used: Vec<usize>,
+    pub lanes_used: Vec<usize>,
     /// Index in a row of the first regressor of each coefficient's group; equal where groups share
     /// columns.
     pub regressors: [usize; COEFFICIENTS],
     /// Number of regressors in a row.
-    pub row: usize,
+    pub row_length: usize,
     /// Columns of regressors in a row: (index in the row, column).
     pub columns: Vec<(usize, usize)>,
     /// Slots of derivatives along a state times a measured signal: (slot in each group, state).
@@ -73,38 +74,38 @@ pub(crate) struct LaneLayout {
 }
 
 impl LaneLayout {
-    /// Layout of the derivatives `terms`, sorted by coefficient, and of the numbers `initial_states`
-    /// and `biases` of other parameters. `followed` are the states of the axis that regressors can be
-    /// proportional to.
+    /// Layout for the derivatives `terms`, sorted by coefficient, and for this number of initial
+    /// states and biases. `followed` are the states of the axis that regressors can be proportional
+    /// to.
     pub fn new(
-        terms: &[Term],
+        terms: &[BuildUpTerm],
         followed: &[usize],
         initial_states: usize,
         biases: usize,
     ) -> LaneLayout {
         let slots = GroupSlots::new(terms, followed);
         let mut layout = LaneLayout::with_terms(terms, followed, &slots);
-        layout.place_others(initial_states);
+        layout.append_parameters(initial_states);
         layout.place_spare_lanes(biases);
         layout
     }
 
-    /// Layout for many parameters without a regressor (`others`): they take the slots of the groups
-    /// in which no derivative stands, and the rest follows in the last group.
-    pub fn dense(terms: &[Term], followed: &[usize], others: usize) -> LaneLayout {
-        let slots = GroupSlots::new(terms, followed).apart(terms);
+    /// Layout for many parameters without a regressor (`others`). They take the slots of the groups
+    /// that have no derivative; the rest follows in the last group.
+    pub fn dense(terms: &[BuildUpTerm], followed: &[usize], others: usize) -> LaneLayout {
+        let slots = GroupSlots::new(terms, followed).with_own_columns(terms);
         let mut layout = LaneLayout::with_terms(terms, followed, &slots);
         let free = (0..layout.groups[COEFFICIENTS - 1].end)
             .filter(|lane| !layout.parameter_lanes.contains(lane))
             .take(others);
         let free: Vec<usize> = free.collect();
         layout.parameter_lanes.extend(&free);
-        layout.place_others(others - free.len());
+        layout.append_parameters(others - free.len());
         layout.place_spare_lanes(0);
         layout
     }
 
-    fn with_terms(terms: &[Term], followed: &[usize], slots: &GroupSlots) -> LaneLayout {
+    fn with_terms(terms: &[BuildUpTerm], followed: &[usize], slots: &GroupSlots) -> LaneLayout {
         let mut layout = LaneLayout::with_groups(slots);
         let products = slots.along_states.iter().enumerate().skip(followed.len());
         layout.products = products.map(|(slot, (state, _))| (slot, *state)).collect();
@@ -115,7 +116,7 @@ impl LaneLayout {
     fn with_groups(slots: &GroupSlots) -> LaneLayout {
         let width = slots.width;
         let mut layout = LaneLayout {
-            row: if slots.shared {
+            row_length: if slots.shared {
                 width
             } else {
                 COEFFICIENTS * width
@@ -129,7 +130,7 @@ impl LaneLayout {
         layout
     }
 
-    fn place_terms(&mut self, terms: &[Term], slots: &GroupSlots) {
+    fn place_terms(&mut self, terms: &[BuildUpTerm], slots: &GroupSlots) {
         for term in terms {
             let slot = slots.slot(term);
             let group = &self.groups[term.coefficient];
@@ -141,10 +142,10 @@ impl LaneLayout {
         self.columns.dedup();
     }
 
-    /// Puts `count` parameters without a regressor into the last group.
-    fn place_others(&mut self, count: usize) {
+    /// Appends `count` parameters without a regressor in the last group.
+    fn append_parameters(&mut self, count: usize) {
         let first = self.groups[COEFFICIENTS - 1].end;
-        self.groups[COEFFICIENTS] = first..first + padded(count);
+        self.groups[COEFFICIENTS] = first..first + whole_vectors(count);
         self.parameter_lanes.extend(first..first + count);
     }
 
@@ -153,18 +154,18 @@ impl LaneLayout {
             .filter(|lane| !self.parameter_lanes.contains(lane))
             .take(biases.max(2))
             .collect();
-        (self.residual, self.one) = (spare[0], spare[1]);
+        (self.residual_lane, self.one_lane) = (spare[0], spare[1]);
         self.biases = spare[..biases].to_vec();
         let lanes = self.parameter_lanes.iter().chain(&spare);
         let vectors = lanes.max().map_or(0, |last| last / VECTOR + 1);
-        self.used = (0..vectors).map(|v| self.lanes_used(v)).collect();
+        self.lanes_used = (0..vectors).map(|v| self.count_used_lanes(v)).collect();
     }
 
-    fn lanes_used(&self, vector: usize) -> usize {
+    fn count_used_lanes(&self, vector: usize) -> usize {
         let lanes = self
             .parameter_lanes
             .iter()
-            .chain([&self.residual, &self.one]);
+            .chain([&self.residual_lane, &self.one_lane]);
         lanes
             .filter(|lane| **lane / VECTOR == vector)
             .map(|lane| lane % VECTOR + 1)
@@ -174,24 +175,28 @@ impl LaneLayout {
 
     /// Number of lanes: whole vectors.
     pub fn width(&self) -> usize {
-        VECTOR * self.used.len().max(self.groups[COEFFICIENTS].end / VECTOR)
+        VECTOR
+            * self
+                .lanes_used
+                .len()
+                .max(self.groups[COEFFICIENTS].end / VECTOR)
     }
 
-    /// First lane of the initial states, behind those of the derivatives.
+    /// First lane of the initial states, which follow the derivatives.
     pub fn first_initial_state(&self) -> usize {
         self.groups[COEFFICIENTS].start
     }
 }
 
-fn padded(count: usize) -> usize {
+fn whole_vectors(count: usize) -> usize {
     count.next_multiple_of(VECTOR)
 }
 
 /// Slots that all groups have in common: derivatives along a state, along a state times a measured
 /// signal, then along measured signals.
 struct GroupSlots {
-    /// First slots of every group: state, and the column of the signal it is multiplied by; `None` as
-    /// long as no derivative needs the slot.
+    /// First slots of every group: a state, and the column of the signal that multiplies the state;
+    /// `None` while no derivative needs the slot.
     along_states: Vec<(usize, Option<usize>)>,
     columns: [Vec<usize>; COEFFICIENTS],
     /// Lanes of a group.
@@ -201,11 +206,11 @@ struct GroupSlots {
 }
 
 impl GroupSlots {
-    fn new(terms: &[Term], followed: &[usize]) -> GroupSlots {
+    fn new(terms: &[BuildUpTerm], followed: &[usize]) -> GroupSlots {
         let along_states = slots_along_states(terms, followed);
         let own: [Vec<usize>; COEFFICIENTS] = std::array::from_fn(|k| columns_of(terms, k));
         let all: BTreeSet<usize> = own.iter().flatten().copied().collect();
-        let room = |columns: usize| padded(along_states.len() + columns);
+        let room = |columns: usize| whole_vectors(along_states.len() + columns);
         let widest = own.iter().map(Vec::len).max().map_or(0, room);
         let width = if terms.is_empty() { 0 } else { widest };
         let shared = room(all.len()) <= width;
@@ -222,8 +227,8 @@ impl GroupSlots {
         }
     }
 
-    /// The same slots with columns of its own in each group.
-    fn apart(self, terms: &[Term]) -> GroupSlots {
+    /// Same slots, but each group has its own columns.
+    fn with_own_columns(self, terms: &[BuildUpTerm]) -> GroupSlots {
         GroupSlots {
             columns: std::array::from_fn(|k| columns_of(terms, k)),
             shared: false,
@@ -231,7 +236,7 @@ impl GroupSlots {
         }
     }
 
-    fn slot(&self, term: &Term) -> usize {
+    fn slot(&self, term: &BuildUpTerm) -> usize {
         let slot = match term.state {
             Some(state) => {
                 let own = (state, Some(term.column));
@@ -246,9 +251,10 @@ impl GroupSlots {
     }
 }
 
-/// Slots of derivatives along a state. Each followed state has one, which the first derivative along
-/// it takes with its column; a derivative along the same state with another column adds a slot.
-fn slots_along_states(terms: &[Term], followed: &[usize]) -> Vec<(usize, Option<usize>)> {
+/// Slots of derivatives along a state. Each followed state has one slot, which the first derivative
+/// along this state takes with its column. A derivative along the same state with another column
+/// adds a slot.
+fn slots_along_states(terms: &[BuildUpTerm], followed: &[usize]) -> Vec<(usize, Option<usize>)> {
     let mut slots: Vec<(usize, Option<usize>)> = followed.iter().map(|s| (*s, None)).collect();
     for term in terms {
         let Some(state) = term.state else { continue };
@@ -265,7 +271,7 @@ fn slots_along_states(terms: &[Term], followed: &[usize]) -> Vec<(usize, Option<
 }
 
 /// Columns of one coefficient's derivatives along measured signals alone.
-fn columns_of(terms: &[Term], coefficient: usize) -> Vec<usize> {
+fn columns_of(terms: &[BuildUpTerm], coefficient: usize) -> Vec<usize> {
     let own = terms
         .iter()
         .filter(|term| term.coefficient == coefficient && term.state.is_none());
@@ -278,7 +284,7 @@ mod tests {
 
     #[test]
     fn in_a_dense_layout_other_parameters_stand_where_no_regressor_is() {
-        let term = |coefficient, state, column| Term {
+        let term = |coefficient, state, column| BuildUpTerm {
             coefficient,
             state,
             column,

@@ -21,7 +21,7 @@ use std::sync::Arc;
 
 use nalgebra::SVector;
 
-use self::build_up::{BuildUp, PointBuildUp, Term, ValuedTerm};
+use self::build_up::{BuildUp, BuildUpTerm, PointBuildUp, ValuedTerm};
 use self::layout::LaneLayout;
 use self::noisy_inputs::NoisyInputs;
 use self::regressors::{PreparedMotion, RegressorColumns};
@@ -31,7 +31,7 @@ use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
 
 pub use self::model::{InitialState, Model};
 
-/// Measured outputs (deg, deg/s, g), and the samples that count.
+/// Measured outputs (deg, deg/s, g), and a mask of the samples that count.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Measurements {
     pub values: Vec<[f64; OUTPUTS]>,
@@ -49,7 +49,7 @@ pub struct Case<const NX: usize, E: Equations<NX>> {
     /// Distinct regressors and factors of proportion, each at every point.
     pub(crate) columns: Vec<Vec<f64>>,
     /// Term of each free derivative.
-    pub(crate) terms: Vec<Term>,
+    pub(crate) terms: Vec<BuildUpTerm>,
     pub(crate) layout: LaneLayout,
     /// Free derivatives of each coefficient.
     pub(crate) ranges: [Range<usize>; COEFFICIENTS],
@@ -93,8 +93,8 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         )
     }
 
-    /// Prepares the same maneuver as recorded by another recorder. `windows` are that of the case
-    /// and that of the other recorder.
+    /// Prepares the same maneuver as another recorder would have recorded it. `windows` are the
+    /// window of this case and the window of the other recorder.
     #[must_use]
     pub fn as_recorded(
         &self,
@@ -121,7 +121,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     ) -> Self {
         let free = model.free_in_order();
         let mut columns = RegressorColumns::<NX, E>::new(aircraft, window);
-        let terms: Vec<Term> = free.iter().map(|d| columns.term(d)).collect();
+        let terms: Vec<BuildUpTerm> = free.iter().map(|d| columns.term(d)).collect();
         let held = model.held.iter().map(|(d, value)| ValuedTerm {
             term: columns.term(d),
             value: *value,
@@ -178,7 +178,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         self.terms.len()
     }
 
-    /// Number of samples that count, of each output.
+    /// Number of samples of each output that count.
     #[must_use]
     pub fn used(&self) -> [usize; OUTPUTS] {
         std::array::from_fn(|o| self.measurements.used.iter().filter(|used| used[o]).count())
@@ -229,7 +229,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         }
     }
 
-    fn regressor(&self, term: Term, point: usize, x: &SVector<f64, NX>) -> f64 {
+    fn regressor(&self, term: BuildUpTerm, point: usize, x: &SVector<f64, NX>) -> f64 {
         self.columns[term.column][point] * term.state.map_or(1.0, |i| x[i])
     }
 
@@ -255,7 +255,7 @@ fn build_up_of<const NX: usize>(terms: &[ValuedTerm], columns: &[Vec<f64>]) -> B
 }
 
 /// Ranges of the terms of each coefficient, sorted by coefficient.
-fn ranges_by_coefficient(terms: &[Term]) -> [Range<usize>; COEFFICIENTS] {
+fn ranges_by_coefficient(terms: &[BuildUpTerm]) -> [Range<usize>; COEFFICIENTS] {
     let first_of = |k: usize| terms.partition_point(|term| term.coefficient < k);
     std::array::from_fn(|k| first_of(k)..first_of(k + 1))
 }

@@ -1,20 +1,20 @@
 //! Noise of a dynamic pressure that is recorded more slowly than the other signals.
 //!
-//! Between two recorded values the signal is on the line through them, so the error of a value
-//! lasts over the samples on either side. Every coefficient acts in proportion to the dynamic
-//! pressure.
+//! Between two recorded values the signal is interpolated linearly, so the error of a value affects
+//! the samples on either side. Every coefficient acts in proportion to the dynamic pressure.
 
 use std::ops::Range;
 
 use super::surface_noise::white_variance;
 use crate::flight::{Mark, Record, signal};
 
-/// Variance, relative to the dynamic pressure squared, of white noise that has the same effect on
-/// slow motion as the noise of a slow dynamic pressure. Zero for one recorded at full rate.
+/// Variance of white noise that has the same effect on slow motion as the noise of a slow dynamic
+/// pressure, relative to the square of the dynamic pressure. Zero for a dynamic pressure recorded
+/// at full rate.
 ///
-/// On lines through values at every nth sample, each value counts n times in a sum over the
-/// samples. Its variance σ² adds n² σ² to the sum's variance, as n samples of white noise of
-/// variance n σ² do.
+/// If every nth sample is recorded, and the others are interpolated linearly, each recorded value
+/// counts n times in a sum over the samples. Its variance σ² adds n² σ² to the variance of the sum.
+/// n samples of white noise of variance n σ² add the same.
 #[must_use]
 pub fn relative_variance(record: &Record, range: Range<usize>) -> f64 {
     let Some(series) = record.signals.get(signal::QBAR) else {

@@ -6,7 +6,7 @@ use std::marker::PhantomData;
 use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
 
-use super::build_up::Term;
+use super::build_up::BuildUpTerm;
 use super::chunking::{WIDEST_STRIDE, ZERO_POINTS};
 use crate::aero::{Derivative, Regressor};
 use crate::aircraft::Aircraft;
@@ -18,17 +18,18 @@ use crate::units::DEG;
 /// Measured motion of a window, prepared for the equations of one axis.
 #[derive(Debug)]
 pub(crate) struct PreparedMotion<const NX: usize, E: Equations<NX>> {
-    /// At every point.
+    /// Inputs of the rates at every point.
     pub rate_inputs: Vec<E::RateInputs>,
     /// α and β at the c.g. at every point, rad.
     flow: Vec<[f64; 2]>,
-    /// At every sample.
+    /// Inputs of the sensors at every sample.
     pub sensor_inputs: Vec<E::SensorInputs>,
     /// Measured states at every sample.
     pub states: Vec<SVector<f64, NX>>,
     /// Coefficients that the motion implies at every sample.
     pub implied: Vec<[f64; COEFFICIENTS]>,
-    /// Implied coefficients without the part that is proportional to the angular accelerations.
+    /// The implied coefficients without their part that is proportional to the angular
+    /// accelerations.
     pub implied_without_accelerations: Vec<[f64; COEFFICIENTS]>,
 }
 
@@ -97,7 +98,7 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Preparation<'_, NX, E> {
 pub(super) struct RegressorColumns<'a, const NX: usize, E: Equations<NX>> {
     aircraft: &'a Aircraft,
     window: &'a Window,
-    /// A derivative of each column.
+    /// One derivative that has each column.
     derivatives: Vec<&'a Derivative>,
     equations: PhantomData<E>,
 }
@@ -113,7 +114,7 @@ impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
     }
 
     /// Term of a derivative, with a new column where no earlier derivative has the same.
-    pub fn term(&mut self, derivative: &'a Derivative) -> Term {
+    pub fn term(&mut self, derivative: &'a Derivative) -> BuildUpTerm {
         let known = self
             .derivatives
             .iter()
@@ -122,7 +123,7 @@ impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
             self.derivatives.push(derivative);
             self.derivatives.len() - 1
         });
-        Term {
+        BuildUpTerm {
             coefficient: derivative.coefficient.index(),
             state: derivative.regressor.find(E::state_of),
             column,
@@ -183,7 +184,7 @@ impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
             .collect()
     }
 
-    /// Measured values at every point; a vane's in deg.
+    /// Measured values of a regressor at every point; a vane's values are in deg.
     fn measured(&self, regressor: &Regressor, motion: &PreparedMotion<NX, E>) -> Vec<f64> {
         let aircraft = self.aircraft;
         match regressor {
@@ -206,7 +207,7 @@ impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
         }
     }
 
-    /// α̇ c̄/2V that the measured motion implies.
+    /// Reduced rate α̇ c̄/2V that the measured motion implies.
     fn reduced_alpha_rate(&self) -> Vec<f64> {
         let aircraft = self.aircraft;
         let reduced = |motion: Motion| {

@@ -14,12 +14,12 @@ use crate::numerics::order_statistics::upper_median_of_magnitudes;
 #[derive(Clone, Debug, PartialEq)]
 pub struct NoisySurface {
     pub(crate) variance: f64,
-    pub(crate) effects: Vec<Effect>,
+    pub(crate) effects: Vec<DeflectionEffect>,
 }
 
 /// Effect of a deflection through one derivative.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Effect {
+pub(crate) struct DeflectionEffect {
     pub coefficient: usize,
     pub value: DerivativeValue,
     /// Coefficient per deflection and unit of the derivative, sample by sample; one throughout
@@ -56,7 +56,7 @@ pub fn noisy_surfaces(aircraft: &Aircraft, window: &Window, model: &Model) -> Ve
             let own = derivatives
                 .iter()
                 .filter(|(d, _)| d.regressor.surface() == Some(surface));
-            let effects = own.map(|(d, value)| Effect::new(aircraft, window, d, *value));
+            let effects = own.map(|(d, value)| DeflectionEffect::new(aircraft, window, d, *value));
             noisy.push(NoisySurface {
                 variance,
                 effects: effects.collect(),
@@ -66,13 +66,13 @@ pub fn noisy_surfaces(aircraft: &Aircraft, window: &Window, model: &Model) -> Ve
     noisy
 }
 
-impl Effect {
+impl DeflectionEffect {
     fn new(
         aircraft: &Aircraft,
         window: &Window,
         derivative: &Derivative,
         value: DerivativeValue,
-    ) -> Effect {
+    ) -> DeflectionEffect {
         let factors = match derivative.regressor {
             Regressor::Vane(_) => {
                 let times_qbar = derivative.coefficient_factor(aircraft, 1.0);
@@ -81,7 +81,7 @@ impl Effect {
             }
             _ => vec![],
         };
-        Effect {
+        DeflectionEffect {
             coefficient: derivative.coefficient.index(),
             value,
             factors,

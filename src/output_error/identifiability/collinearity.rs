@@ -122,14 +122,14 @@ impl Directions {
     }
 
     /// `v_jk²/λ_k`: part of the scaled variance of parameter j from direction k.
-    fn part(&self, j: usize, k: usize) -> f64 {
+    fn variance_part(&self, j: usize, k: usize) -> f64 {
         let v = self.eigen.eigenvectors[(j, k)];
         v * v / self.eigenvalue(k)
     }
 
     fn variance(&self, j: usize) -> f64 {
         (0..self.eigen.eigenvalues.len())
-            .map(|k| self.part(j, k))
+            .map(|k| self.variance_part(j, k))
             .sum()
     }
 
@@ -156,7 +156,7 @@ impl Directions {
     fn group(&self, k: usize, limits: &CollinearityLimits) -> Option<CollinearGroup> {
         let index = (self.most / self.eigenvalue(k)).sqrt();
         let parameters: Vec<usize> = (0..self.eigen.eigenvalues.len())
-            .filter(|&j| self.part(j, k) / self.variance(j) >= limits.variance_proportion)
+            .filter(|&j| self.variance_part(j, k) / self.variance(j) >= limits.variance_proportion)
             .collect();
         let condition_index = if self.is_undetermined(k) {
             f64::INFINITY

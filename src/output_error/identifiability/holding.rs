@@ -10,7 +10,8 @@
 //! all parameters give it for every F without another fit.
 //!
 //! Errors of values that are already held do not count in `V_j`: a free parameter absorbs them and
-//! spares the others. If they counted, each held value would cause the next to be held.
+//! spares the others. If these errors counted, each held value would cause the next parameter to be
+//! held.
 //!
 //! The parameter of the largest ratio is held first, until no ratio is above one. Then each held
 //! parameter whose ratio alone is below one is freed, at most once, so the iteration ends.
@@ -39,12 +40,13 @@ pub struct HoldingCandidates {
 /// Reason to hold a parameter while the others stay free or held as they are.
 #[derive(Clone, Debug, PartialEq)]
 pub enum HoldingReason {
-    /// Its regressor did not move, so the data do not depend on the parameter.
+    /// The regressor did not move, so the data do not depend on the parameter.
     NotExcited,
-    /// Free, it would take part in a direction that the data do not determine, with these others.
+    /// If free, the parameter would take part in a direction that the data do not determine,
+    /// together with these parameters.
     NotSeparable(Vec<usize>),
-    /// Free, its bound would exceed the uncertainty of its tunnel value. `partner` is the estimate
-    /// it would correlate with most, with the correlation.
+    /// If free, the parameter would have a bound above the uncertainty of its tunnel value.
+    /// `partner` is the estimate with the largest correlation, and that correlation.
     Bound {
         bound: f64,
         uncertainty: f64,
@@ -175,8 +177,8 @@ impl HoldingCandidates {
             })
     }
 
-    /// Parameter that may be held with the largest size relative to the tunnel's uncertainty, above
-    /// a limit.
+    /// Holdable parameter whose size is largest relative to its tunnel uncertainty; `None` if no
+    /// ratio exceeds a limit.
     fn largest_ratio(&self, free: &[usize], sizes: &DVector<f64>, limit: f64) -> Option<usize> {
         let ratios = free
             .iter()
@@ -255,7 +257,7 @@ fn freed_set(held: &[bool], parameter: usize) -> Option<(Vec<usize>, usize)> {
     Some((free, at))
 }
 
-/// Parameter that correlates most with one, and the correlation.
+/// Parameter that correlates most with the parameter `at`, and the correlation.
 fn largest_correlation(covariance: &DMatrix<f64>, at: usize) -> Option<(usize, f64)> {
     let unit = scale(covariance);
     let others = (0..unit.len()).filter(|&i| i != at);

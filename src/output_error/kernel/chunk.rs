@@ -103,7 +103,7 @@ pub(crate) fn fill_regressor_rows<const NX: usize, E: Equations<NX>>(
     for &(place, column) in &layout.columns {
         let column = &case.columns[column][points.first..][..=points.stride * (POINTS - 1)];
         for k in 0..POINTS {
-            rows[k * layout.row + place] = column[k * points.stride];
+            rows[k * layout.row_length + place] = column[k * points.stride];
         }
     }
 }

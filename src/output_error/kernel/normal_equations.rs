@@ -1,6 +1,6 @@
-//! Sums of the normal equations, output by output: Σ s sᵀ, Σ s v, Σ s and Σ v² over the samples
-//! that count, with sensitivities s and residual v. Weights (1.4, 1.5) are applied afterwards, so
-//! other weights need no other pass.
+//! Sums of the normal equations of each output. With sensitivities s and residual v they are Σ s
+//! sᵀ, Σ s v, Σ s and Σ v² over the samples that count. Weights (1.4, 1.5) are applied afterwards,
+//! so other weights need no other pass.
 //!
 //! A sample's row holds the sensitivities, the residual and a one, so all sums of an output are one
 //! symmetric matrix. A coarse pass skips samples; its sums count the remaining ones as many times.
@@ -28,9 +28,9 @@ use crate::output_error::case::layout::LaneLayout;
 pub(crate) struct NormalSums {
     /// Gram matrix of the rows (s, v, 1) of each output; the lower triangle counts.
     gram: [AlignedBuffer; OUTPUTS],
-    /// Σ v (s, v, 1) of each output.
+    /// Moments Σ v (s, v, 1) of each output.
     moments: [AlignedBuffer; OUTPUTS],
-    /// Number of samples that count, of each output.
+    /// Number of samples of each output that count.
     counts: [usize; OUTPUTS],
     /// Distance between the samples of the pass.
     stride: usize,
@@ -125,8 +125,8 @@ impl NormalSums {
             };
         }
         BlockSums {
-            count: sums[self.layout.one],
-            residual: sums[self.layout.residual],
+            count: sums[self.layout.one_lane],
+            residual: sums[self.layout.residual_lane],
         }
     }
 
@@ -135,12 +135,12 @@ impl NormalSums {
         self.stride * self.counts[output]
     }
 
-    /// Σ v² of an output.
+    /// Sum Σ v² of an output.
     pub fn square(&self, output: usize) -> f64 {
-        self.stride as f64 * self.moments[output].slice()[self.layout.residual]
+        self.stride as f64 * self.moments[output].slice()[self.layout.residual_lane]
     }
 
-    /// Σ_o w_o Σ s v of all parameters.
+    /// Gradient Σ_o w_o Σ s v over the outputs o with weights w_o, for all parameters.
     pub fn gradient(&self, weights: &[f64; OUTPUTS]) -> DVector<f64> {
         let sum_of = |place: ParameterPlace| -> f64 {
             (0..OUTPUTS)
@@ -152,7 +152,7 @@ impl NormalSums {
         DVector::from_vec(sums)
     }
 
-    /// Σ s sᵀ of one output, for all parameters.
+    /// Sum Σ s sᵀ of one output, for all parameters.
     pub fn squares(&self, output: usize) -> DMatrix<f64> {
         self.symmetric_by_parameter(|a, b| {
             if a.acts_on(output) && b.acts_on(output) {
@@ -163,7 +163,7 @@ impl NormalSums {
         })
     }
 
-    /// Σ_o w_o Σ s sᵀ of all parameters.
+    /// Information Σ_o w_o Σ s sᵀ over the outputs o with weights w_o, for all parameters.
     pub fn information(&self, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {
         let width = self.layout.width();
         let mut sum = vec![0.0; width * width];
@@ -192,7 +192,7 @@ impl NormalSums {
         let lanes = &self.layout.parameter_lanes;
         let (derivatives, initial_states) = lanes.split_at(self.derivatives);
         let biases = self.biased_outputs.iter().map(|&o| ParameterPlace {
-            lane: self.layout.one,
+            lane: self.layout.one_lane,
             only_output: Some(o),
         });
         lane_places(derivatives)
@@ -253,8 +253,8 @@ impl Sink for NormalAccumulator<'_> {
 
 impl NormalSums {
     /// Writes residual and one into the rows of a chunk's samples that count, and clears the other
-    /// rows. `residual` returns that of a sample and output, or `None` if the sample does not
-    /// count.
+    /// rows. `residual` returns the residual of a sample and output, or `None` if the sample does
+    /// not count.
     #[inline(always)]
     pub fn complete_rows(
         &mut self,
@@ -268,8 +268,8 @@ impl NormalSums {
             for o in 0..OUTPUTS {
                 let row = &mut rows[(k * OUTPUTS + o) * width..][..width];
                 if let Some(residual) = residual(k, o) {
-                    row[layout.residual] = residual;
-                    row[layout.one] = 1.0;
+                    row[layout.residual_lane] = residual;
+                    row[layout.one_lane] = 1.0;
                     counts[o] += 1;
                 } else {
                     row.fill(0.0);
@@ -314,13 +314,19 @@ impl NormalSums {
                 stride: OUTPUTS * width,
                 count: samples,
             };
-            own.add_weighted_sum(simd, layout.residual, moments[o].slice_mut());
-            own.add_gram_interleaved(simd, &layout.used, gram[o].slice_mut(), width, interleaved);
+            own.add_weighted_sum(simd, layout.residual_lane, moments[o].slice_mut());
+            own.add_gram_interleaved(
+                simd,
+                &layout.lanes_used,
+                gram[o].slice_mut(),
+                width,
+                interleaved,
+            );
         }
     }
 }
 
-/// Adds the rows of some samples, from `first` on, to those of their blocks.
+/// Adds the rows of some samples, from `first` on, to the rows of their blocks.
 #[inline(always)]
 fn add_to_blocks<S: Simd>(
     simd: S,

@@ -1,11 +1,12 @@
 //! One pass over a maneuver: the states, and the sensitivities of all parameters beside them.
 //!
 //! A pass goes chunk by chunk. The [`Trajectory`] integrates the states and records the slopes of
-//! each stage. [`Propagators`] turn the slopes into matrices for all steps of the chunk side by side.
-//! With them all sensitivities take a step at once, s ← Φ s + Σ_j Γ_jk r_j over the stages j, where k
-//! is the coefficient of a derivative and r its regressor. Outputs have the sensitivities
-//! C s + D_k r. Parameters lie side by side in the lanes of the processor's vectors ([`LaneLayout`]).
-//! While the sink sums one chunk, the trajectory of the next one advances between the rows.
+//! each stage. [`Propagators`] turn the slopes into matrices for all steps of the chunk side by
+//! side. Let s be the sensitivities of the states to a derivative, k the coefficient of the
+//! derivative, and r_j its regressor at the stage j. All sensitivities take a step at once,
+//! s ← Φ s + Σ_j Γ_jk r_j. The outputs have the sensitivities C s + D_k r. Parameters lie side by side in
+//! the lanes of the processor's vectors ([`LaneLayout`]). While the sink sums one chunk, the
+//! trajectory of the next one advances between the rows.
 //!
 //! The loops are compiled for several widths of vectors and chosen when the program runs. Each lane
 //! is computed alike in all of them, with fused multiplication, so every width gives the same bits.
@@ -127,7 +128,7 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
         let sensitivities = sensitivities.slice_mut();
         let mut rows = AlignedBuffer::zeros(CHUNK * OUTPUTS * layout.width());
         let rows = rows.slice_mut();
-        let mut regressors = AlignedBuffer::zeros(POINTS * layout.row);
+        let mut regressors = AlignedBuffer::zeros(POINTS * layout.row_length);
         let regressors = regressors.slice_mut();
         let mut build_up = ChunkBuildUp::<NX>::ZERO;
         let mut histories = [StageHistory::<NX>::EMPTY; 2];
@@ -217,13 +218,13 @@ fn initial_sensitivities<const NX: usize>(
 
 /// Correction of the states by the measurements, between a sample's outputs and the next step.
 pub(crate) trait Correction<const NX: usize> {
-    /// Returns the factors of the first vector's regressors in the outputs, if they differ from
-    /// those of the step's first stage.
+    /// Returns the factors of the first vector's regressors in the outputs, if they differ from the
+    /// factors at the step's first stage.
     fn output_factors(&self, k: usize) -> Option<&[f64; VECTOR]>;
 
-    /// Corrects the sensitivities `s` of the states in the vectors at some lanes, after those of
-    /// the outputs, `y`, were computed at the chunk's sample k. Changes `y` to the sensitivities
-    /// that the sink receives.
+    /// Corrects the sensitivities `s` of the states in the vectors at some lanes. The sensitivities
+    /// `y` of the outputs were computed before, at the chunk's sample k. Replaces `y` by the
+    /// sensitivities that the sink receives.
     fn correct<S: Simd, const N: usize>(
         &self,
         simd: S,
@@ -360,13 +361,13 @@ impl<S: Simd, const NX: usize, K: Correction<NX>> Propagation<'_, S, NX, K> {
     /// Regressors of a vector at the start, the middle and the end of a step.
     #[inline(always)]
     fn points(&self, k: usize, place: usize) -> [S::f64s; 3] {
-        let row = self.layout.row / S::F64_LANES;
+        let row = self.layout.row_length / S::F64_LANES;
         let from = &self.regressors[2 * k * row + place..];
         [from[0], from[row], from[2 * row]]
     }
 }
 
-/// C s + D r for lanes of one group.
+/// Sensitivities C s + D r of the outputs, for lanes of one group.
 #[inline(always)]
 fn output_sensitivities<S: Simd, const NX: usize, E: Equations<NX>>(
     simd: S,
@@ -388,7 +389,7 @@ fn output_sensitivities<S: Simd, const NX: usize, E: Equations<NX>>(
     y
 }
 
-/// Φ s + Σ Γ r for lanes of some groups.
+/// Sensitivities Φ s + Σ Γ r of the states after a step, for lanes of some groups.
 #[inline(always)]
 fn next_sensitivities<S: Simd, const NX: usize, E: Equations<NX>, const N: usize>(
     simd: S,

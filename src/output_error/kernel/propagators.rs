@@ -1,10 +1,18 @@
-//! Propagators: the exact effect of a Runge-Kutta step on sensitivities, s ← Φ s + Σ Γ_j r_j over its
-//! stages j, for the steps of a chunk side by side in the lanes of vectors.
+//! Propagators: exact effect of a Runge-Kutta step on sensitivities, for the steps of a chunk side
+//! by side in the lanes of vectors.
 //!
-//! A_j and B_j are the slopes of stage j along states and coefficients. The step's end depends on the
-//! slope of each stage directly and through the later stages that start from it:
-//! M₄ = h/6, M₃ = h/3 + h M₄A₄, M₂ = h/3 + h/2 M₃A₃, M₁ = h/6 + h/2 M₂A₂. Then Φ = 1 + Σ M_j A_j and
-//! Γ_j = M_j B_j.
+//! | symbol | quantity |
+//! |---|---|
+//! | h | step, s |
+//! | A_j, B_j | slopes of the rates at stage j along states and coefficients |
+//! | r_j | regressor of a derivative at stage j |
+//! | M_j | change of the state at the end of the step with the rates of stage j |
+//!
+//! A step changes the sensitivities s of the states to s ← Φ s + Σ_j Γ_j r_j, with Φ = 1 + Σ_j M_j
+//! A_j and Γ_j = M_j B_j. The rates of a stage act on the end of the step directly, and through the
+//! later stages that start from them:
+//!
+//! M₄ = h/6, M₃ = h/3 + h M₄A₄, M₂ = h/3 + h/2 M₃A₃, M₁ = h/6 + h/2 M₂A₂.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -28,13 +36,13 @@ use crate::output_error::case::chunking::CHUNK;
 /// Propagators and output slopes of a chunk: entry by entry, sample after sample.
 #[repr(align(64))]
 pub(crate) struct Propagators<const NX: usize> {
-    /// Φ by state and state.
+    /// Matrix Φ, by state after and state before the step.
     pub phi: [[[f64; CHUNK]; NX]; NX],
-    /// Γ by stage, coefficient and state.
+    /// Matrices Γ, by stage, coefficient and state.
     pub gamma: [[[[f64; CHUNK]; NX]; COEFFICIENTS]; STAGES],
-    /// C: total slopes of the outputs along states.
+    /// Total slopes C of the outputs along the states.
     pub c: [[[f64; CHUNK]; NX]; OUTPUTS],
-    /// D: slopes of the outputs along coefficients.
+    /// Slopes D of the outputs along the coefficients.
     pub d: [[[f64; CHUNK]; COEFFICIENTS]; OUTPUTS],
 }
 
@@ -157,7 +165,7 @@ impl<const NX: usize> Propagators<NX> {
     }
 }
 
-/// M A of a stage.
+/// Product M A of a stage.
 #[inline(always)]
 fn times_a<S: Simd, const NX: usize, E: Equations<NX>>(
     simd: S,

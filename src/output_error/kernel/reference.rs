@@ -38,11 +38,11 @@ pub struct Reference<'a, const NX: usize, E: Equations<NX>> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlainSums {
     pub outputs: Vec<[f64; OUTPUTS]>,
-    /// Σ w v².
+    /// Sum Σ w v² over outputs and samples, with weights w and residuals v.
     pub weighted_square: f64,
-    /// Σ w s v.
+    /// Gradient Σ w s v, with sensitivities s.
     pub gradient: DVector<f64>,
-    /// Σ w s sᵀ.
+    /// Information Σ w s sᵀ.
     pub information: DMatrix<f64>,
 }
 
@@ -62,7 +62,8 @@ struct Coefficients<const NX: usize> {
 }
 
 impl<'a, const NX: usize, E: Equations<NX>> Reference<'a, NX, E> {
-    /// Pass over the maneuver of a case; aircraft, window and model are those of the case.
+    /// Pass over the maneuver of a case; aircraft, window and model must be the ones from which the
+    /// case was made.
     #[must_use]
     pub fn new(
         aircraft: &'a Aircraft,
@@ -133,9 +134,9 @@ impl<'a, const NX: usize, E: Equations<NX>> Reference<'a, NX, E> {
         runge_kutta::step(from, self.window.step_s, slope, Augmented::plus)
     }
 
-    /// Rates of the states (2.1-2.3, 3.1-3.4) and of their sensitivities s to each derivative:
-    /// ṡ = A s + B_k r, with A the slopes of the rates along the states, B_k those along the
-    /// derivative's coefficient k, and r the derivative's regressor.
+    /// Rates of the states (2.1-2.3, 3.1-3.4) and of their sensitivities s to each derivative. Let
+    /// A be the slopes of the rates along the states, B_k the slopes along the derivative's
+    /// coefficient k, and r the derivative's regressor. Then ṡ = A s + B_k r.
     fn rates(&self, point: usize, parameters: &[f64], at: &Augmented<NX>) -> Augmented<NX> {
         let c = self.coefficients(point, parameters, &at.x);
         let inputs = E::rate_inputs(self.aircraft, &self.motion[point]);
@@ -149,6 +150,7 @@ impl<'a, const NX: usize, E: Equations<NX>> Reference<'a, NX, E> {
     }
 
     /// Outputs at a sample (2.7-2.9, 3.7, 3.8) and their slopes along the parameters, C s + D_k r.
+    /// C are the slopes of the outputs along the states, and D_k those along the coefficient k.
     fn outputs(
         &self,
         sample: usize,
@@ -178,7 +180,8 @@ impl<'a, const NX: usize, E: Equations<NX>> Reference<'a, NX, E> {
         (y, slopes)
     }
 
-    /// Build-up (2.10-2.13, 3.9-3.13): c = Σ ξ_j r_j.
+    /// Build-up (2.10-2.13, 3.9-3.13): the coefficients c = Σ ξ_j r_j, with derivatives ξ_j and
+    /// regressors r_j.
     fn coefficients(
         &self,
         point: usize,

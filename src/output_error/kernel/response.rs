@@ -23,8 +23,8 @@ pub struct Response {
 /// Resolution of a response.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Detail {
-    /// Steps of about [`COARSE_STEP_S`], compared with the measurements at their ends only: near
-    /// the minimum, at a fraction of the work.
+    /// Steps of about [`COARSE_STEP_S`], compared with the measurements at their ends only. The
+    /// iteration comes near the minimum at a fraction of the work.
     Coarse,
     /// Every sample.
     Whole,
@@ -132,7 +132,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         self.respond_with(Detail::Whole, parameters, response)
     }
 
-    /// Computes the response in some detail; of a coarse one only the sums have a meaning.
+    /// Computes the response in this detail. Only the sums of a coarse response are valid.
     ///
     /// # Errors
     /// [`Diverged`] when the state leaves its bounds or is not a number.
@@ -155,7 +155,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         self.run_pass(parameters, stride, outputs, &mut accumulator)
     }
 
-    /// Returns true if coarse steps are longer than the samples' own.
+    /// Returns `true` if coarse steps are longer than the sampling interval.
     #[must_use]
     pub fn has_coarse(&self) -> bool {
         self.coarse_stride() > 1

@@ -29,8 +29,8 @@ pub(crate) const STATE_BOUND: f64 = 50.0;
 pub(crate) struct StageHistory<const NX: usize> {
     /// States at the samples.
     pub states: [SVector<f64, NX>; CHUNK],
-    /// Factors of the regressors in the first vector of a group: the states they are proportional
-    /// to, else one.
+    /// Factors of the regressors in the first vector of a group: the state to which a regressor is
+    /// proportional, else one.
     pub factors: [[[f64; VECTOR]; CHUNK]; STAGES],
     /// A by stage, rate and state.
     pub a: [[[[f64; CHUNK]; NX]; NX]; STAGES],

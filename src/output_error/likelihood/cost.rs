@@ -1,8 +1,8 @@
-//! The cost J (1.2), its gradient (1.4) and the Gauss-Newton second gradient (1.5), as sums over the
-//! samples that count.
+//! The cost J (1.2), its gradient (1.4) and the Gauss-Newton second gradient (1.5), as sums over
+//! the samples that count.
 //!
-//! The sums lack the printed factor 1/(n_t n_z): they are the likelihood's, and the information
-//! matrix (1.7) is the second gradient without any factor. [`Sums::cost`] is J as printed.
+//! The sums omit the printed factor 1/(n_t n_z), so that the information matrix (1.7) is the second
+//! gradient without any factor. [`Sums::cost`] is J as printed.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -10,7 +10,8 @@ use crate::dynamics::OUTPUTS;
 use crate::output_error::case::Measurements;
 use crate::output_error::kernel::response::Response;
 
-/// Sums Σ w v², Σ Sᵀ W v and Σ Sᵀ W S over the samples that count.
+/// Sums Σ w v², Σ Sᵀ W v and Σ Sᵀ W S over the samples that count, with residuals v, sensitivities
+/// S and weights w.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sums {
     pub weighted_square: f64,
@@ -52,8 +53,8 @@ pub fn sums(response: &Response, weights: &[f64; OUTPUTS]) -> Sums {
     }
 }
 
-/// Variances of the residuals from Σ v² and the number of samples of each output. The parameters'
-/// degrees of freedom are spread evenly over the outputs.
+/// Variances of the residuals v, from Σ v² and the number of samples of each output. The
+/// parameters' degrees of freedom are spread evenly over the outputs.
 #[must_use]
 pub fn residual_variances(outputs: [(f64, usize); OUTPUTS], parameters: usize) -> [f64; OUTPUTS] {
     let total: usize = outputs.iter().map(|(_, used)| used).sum();

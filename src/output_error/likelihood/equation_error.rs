@@ -2,8 +2,8 @@
 //! accelerations imply.
 //!
 //! It needs no integration, so it cannot diverge even if the airframe is unstable. A gust that the
-//! vane measures is no error in it. It therefore serves as a start for output error and, with
-//! bounds, as a second opinion ([`regression`]).
+//! vane measures is not an error of the equation. It therefore serves as a start for output error
+//! and, with bounds, as a second opinion ([`regression`]).
 //!
 //! The regression is in the frequency domain (Morelli; Klein and Morelli 2006, chapter 7). Fourier
 //! sums over the maneuver are linear: the equation between a coefficient and its regressors holds
@@ -26,7 +26,7 @@ use crate::dynamics::motion::slope_reach;
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
 use crate::numerics::harmonics::Harmonics;
 use crate::numerics::symmetric::{scale, scaled};
-use crate::output_error::case::build_up::Term;
+use crate::output_error::case::build_up::BuildUpTerm;
 use crate::output_error::case::{Case, Measurements};
 
 /// Weight of the prior values relative to the data, at unit diagonal: small, but enough to fix
@@ -37,7 +37,7 @@ const BAND_HZ: [f64; 2] = [0.1, 2.5];
 /// Half width of the triangle that smooths the residuals' spectrum. Simulated 95 % intervals cover 2
 /// to 3 points less with 0.2 Hz, and within a point the same from 0.6 to 1 Hz.
 const SMOOTHING_HZ: f64 = 0.6;
-/// Longest gap that counts as bridged: a quarter of the band's shortest period.
+/// Longest gap that counts as bridged, s: a quarter of the band's shortest period.
 const LONGEST_BRIDGE_S: f64 = 0.1;
 /// Ratio of a regressor's range to its size below which it counts as constant.
 const STILL: f64 = 1e-9;
@@ -140,12 +140,14 @@ fn regress_coefficient<const NX: usize, E: Equations<NX>>(
 /// Derivatives by equation error, with the covariance of their errors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Regression {
-    /// In the order of the case's parameters. `None` for biases, initial states and constants,
-    /// which appear in no harmonic; for regressors that do not move; and for a coefficient with
-    /// proportional regressors or too few harmonics.
+    /// Values in the order of the case's parameters; `None` for
+    ///
+    /// - biases, initial states and constants, which appear in no harmonic;
+    /// - regressors that do not move;
+    /// - coefficients with proportional regressors or too few harmonics.
     pub values: Vec<Option<f64>>,
-    /// Zero for parameters without a value. It contains the residuals' spectrum and the uncertainty
-    /// of held values, but no errors of calibration.
+    /// Covariance of the errors; zero for parameters without a value. It includes the residuals'
+    /// spectrum and the uncertainty of held values, but no errors of calibration.
     pub covariance: DMatrix<f64>,
 }
 
@@ -165,7 +167,7 @@ pub fn regression<const NX: usize, E: Equations<NX>>(
         values: vec![None; parameters],
         covariance: DMatrix::zeros(parameters, parameters),
     };
-    let Some(spectra) = Spectra::of(case, wide) else {
+    let Some(spectra) = Spectra::transform(case, wide) else {
         return found;
     };
     for k in 0..COEFFICIENTS {
@@ -200,7 +202,8 @@ pub fn regression<const NX: usize, E: Equations<NX>>(
 
 /// Fourier sums of all terms of a maneuver's equations.
 struct Spectra<'a> {
-    /// Columns: the implied coefficients less their held parts, then the distinct regressors.
+    /// Fourier sums, one column per series: the implied coefficients less their held parts, then
+    /// the distinct regressors.
     sums: DMatrix<f64>,
     /// Column of the regressor of each derivative that acts; `None` if the regressor does not move.
     regressors: BTreeMap<&'a str, Option<usize>>,
@@ -217,7 +220,7 @@ impl<'a> Spectra<'a> {
         clippy::cast_sign_loss,
         reason = "small positive numbers"
     )]
-    fn of<const NX: usize, E: Equations<NX>>(
+    fn transform<const NX: usize, E: Equations<NX>>(
         case: &Case<NX, E>,
         wide: &'a Case<NX, E>,
     ) -> Option<Spectra<'a>> {
@@ -228,7 +231,8 @@ impl<'a> Spectra<'a> {
         let first = (BAND_HZ[0] * duration_s).ceil().max(1.0) as usize;
         let end = ((BAND_HZ[1] * duration_s) as usize + 1).min(samples / 2);
         let kept = kept_samples(&case.measurements, case.step_s);
-        let trend = Trend::of(kept.get(inner.clone())?).filter(|_| first < end)?;
+        let trend =
+            StraightLine::through_samples(kept.get(inner.clone())?).filter(|_| first < end)?;
         let mut series = implied_without_accelerations(case);
         let regressors = add_regressors(wide, &mut series);
         let window = slope_window(reach);
@@ -252,8 +256,8 @@ impl<'a> Spectra<'a> {
     }
 
     /// Regression of a coefficient on the regressors of these columns.
-    fn regress(&self, coefficient: usize, columns: &[usize]) -> Option<whittle::Regression> {
-        let equations = whittle::Equations {
+    fn regress(&self, coefficient: usize, columns: &[usize]) -> Option<whittle::WhittleRegression> {
+        let equations = whittle::SpectralEquations {
             response: &self.sums.column(coefficient).into_owned(),
             regressors: &self.sums.select_columns(columns),
             smoothing: self.smoothing,
@@ -294,14 +298,15 @@ fn add_accelerations<const NX: usize, E: Equations<NX>>(
     }
 }
 
-/// Adds the distinct regressors that move; returns the place of each derivative's.
+/// Adds the distinct regressors that move. Returns the column of each derivative's regressor.
 fn add_regressors<'a, const NX: usize, E: Equations<NX>>(
     wide: &'a Case<NX, E>,
     series: &mut Vec<Vec<f64>>,
 ) -> BTreeMap<&'a str, Option<usize>> {
     let mut places: BTreeMap<&str, Option<usize>> = BTreeMap::new();
     for (j, (name, term)) in wide.names.iter().zip(&wide.terms).enumerate() {
-        let is_same = |other: &Term| (other.column, other.state) == (term.column, term.state);
+        let is_same =
+            |other: &BuildUpTerm| (other.column, other.state) == (term.column, term.state);
         let place = if let Some(other) = wide.terms[..j].iter().position(is_same) {
             places[wide.names[other].as_str()]
         } else {
@@ -331,8 +336,9 @@ fn windowed_means(window: &[f64], series: &[f64]) -> Vec<f64> {
     series.windows(window.len()).map(mean).collect()
 }
 
-/// Window of the slope of a local straight line. The slope Σ d (x(k+d) − x(k−d)) / Σ 2 d² is a
-/// weighted mean of the increments, and an increment is the mean of the derivative at its ends.
+/// Window of the slope of a local straight line. The slope at sample k of a series x is Σ d (x(k+d)
+/// − x(k−d)) / Σ 2 d² over the distances d within reach. It is a weighted mean of the increments,
+/// and an increment is the mean of the derivative at its ends.
 fn slope_window(reach: usize) -> Vec<f64> {
     // Increment i lies between samples i and i+1 of the window. Slopes over a distance d of at
     // least `nearest` contain it.
@@ -369,9 +375,9 @@ fn kept_samples(measurements: &Measurements, step_s: f64) -> Vec<bool> {
     kept
 }
 
-/// Straight line over the samples that count. It is removed from every series alike, so that the
-/// equations still hold; a drift would leak into all harmonics.
-struct Trend<'a> {
+/// Straight line over the samples that count. The line is removed from every series, so that the
+/// equations still hold. A drift would otherwise leak into all harmonics.
+struct StraightLine<'a> {
     kept: &'a [bool],
     samples: f64,
     /// Mean place of the samples, and the sum of squares about it.
@@ -379,10 +385,10 @@ struct Trend<'a> {
     spread: f64,
 }
 
-impl Trend<'_> {
+impl StraightLine<'_> {
     /// `None` for fewer samples than a straight line needs.
-    fn of(kept: &[bool]) -> Option<Trend<'_>> {
-        let mut trend = Trend {
+    fn through_samples(kept: &[bool]) -> Option<StraightLine<'_>> {
+        let mut trend = StraightLine {
             kept,
             samples: 0.0,
             middle: 0.0,
@@ -468,8 +474,10 @@ mod tests {
         let kept: Vec<bool> = (0..50).map(|n| !(20..25).contains(&n)).collect();
         let mut series: Vec<f64> = (0..50).map(|n| 3.0 - 0.2 * f64::from(n)).collect();
         series[22] = 1e6;
-        Trend::of(&kept).unwrap().remove(&mut series);
+        StraightLine::through_samples(&kept)
+            .unwrap()
+            .remove(&mut series);
         assert!(series.iter().all(|x| x.abs() < 1e-12), "{series:?}");
-        assert!(Trend::of(&[true, false]).is_none());
+        assert!(StraightLine::through_samples(&[true, false]).is_none());
     }
 }

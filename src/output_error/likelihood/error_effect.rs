@@ -22,7 +22,7 @@ pub enum SharedError {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ErrorEffect {
     pub error: SharedError,
-    /// Standard deviation of the error: of a held value in its own unit.
+    /// Standard deviation of the error; for a held value, in the unit of the value.
     pub deviation: f64,
     /// Change of each parameter if the true value exceeds the assumed one by one standard
     /// deviation.

@@ -26,7 +26,7 @@ const NAMED_SHARE: f64 = 0.1;
 impl Identification {
     /// Inverts an information matrix, or finds the least determined direction.
     #[must_use]
-    pub fn of(information: &DMatrix<f64>, max_condition_number: f64) -> Identification {
+    pub fn identify(information: &DMatrix<f64>, max_condition_number: f64) -> Identification {
         let unexcited: Vec<usize> = (0..information.nrows())
             .filter(|&i| information[(i, i)] <= 0.0)
             .collect();

@@ -19,20 +19,20 @@ use crate::output_error::kernel::response::{Detail, Response};
 /// Maneuvers with shared derivatives.
 #[derive(Debug)]
 pub struct Joint<'a, const NX: usize, E: Equations<NX>> {
-    pub(crate) members: Vec<Member<'a, NX, E>>,
+    pub(crate) members: Vec<JointMember<'a, NX, E>>,
     parameters: SharedParameters,
 }
 
 /// One of the maneuvers.
 #[derive(Debug)]
-pub(crate) struct Member<'a, const NX: usize, E: Equations<NX>> {
+pub(crate) struct JointMember<'a, const NX: usize, E: Equations<NX>> {
     label: &'a str,
     pub case: &'a Case<NX, E>,
     /// Place of each own parameter among the joint ones.
     pub places: Vec<usize>,
 }
 
-impl<const NX: usize, E: Equations<NX>> Member<'_, NX, E> {
+impl<const NX: usize, E: Equations<NX>> JointMember<'_, NX, E> {
     /// The member's parameters among the joint ones.
     pub fn parameters(&self, joint: &[f64]) -> Vec<f64> {
         values_at(&self.places, joint)
@@ -49,7 +49,7 @@ impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
     /// that each maneuver keeps to itself.
     ///
     /// # Errors
-    /// A sentence that names the maneuver whose free derivatives are not those of the first.
+    /// A sentence that names the maneuver whose free derivatives differ from the first maneuver's.
     pub fn new(
         cases: impl IntoIterator<Item = (&'a str, &'a Case<NX, E>)>,
         is_own: impl Fn(&str) -> bool,
@@ -59,11 +59,14 @@ impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
             .iter()
             .map(|(label, case)| (*label, case.names.as_slice(), case.derivatives()));
         let parameters = SharedParameters::new(named, is_own)?;
-        let members = cases.iter().enumerate().map(|(i, (label, case))| Member {
-            label,
-            case,
-            places: parameters.places(i).to_vec(),
-        });
+        let members = cases
+            .iter()
+            .enumerate()
+            .map(|(i, (label, case))| JointMember {
+                label,
+                case,
+                places: parameters.places(i).to_vec(),
+            });
         Ok(Joint {
             members: members.collect(),
             parameters,
@@ -92,7 +95,7 @@ impl<'a, const NX: usize, E: Equations<NX>> Joint<'a, NX, E> {
     fn respond_each(
         &self,
         response: &mut [Response],
-        respond: impl Fn(&Member<'a, NX, E>, &mut Response) -> Result<(), Diverged>,
+        respond: impl Fn(&JointMember<'a, NX, E>, &mut Response) -> Result<(), Diverged>,
     ) -> Result<(), Diverged> {
         let mut before = 0;
         for (member, response) in self.members.iter().zip(response) {

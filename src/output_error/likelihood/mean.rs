@@ -1,9 +1,9 @@
-//! Mean of several estimates of the same parameters, weighted by their whole covariances:
-//! (Σ C⁻¹)⁻¹ Σ C⁻¹ θ.
+//! Mean of several estimates θ of the same parameters, weighted by their whole covariances C: (Σ
+//! C⁻¹)⁻¹ Σ C⁻¹ θ.
 //!
-//! To first order it is the joint estimate from the same data. Weights by each parameter's own bound
-//! would fail: constant and slope of one maneuver are strongly correlated, and only their sum is well
-//! determined.
+//! To first order the mean equals the joint estimate from the same data. Weights by each
+//! parameter's own bound would fail: constant and slope of one maneuver are strongly correlated,
+//! and only their sum is well determined.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 

@@ -1,8 +1,9 @@
-//! Newton-Raphson with the Gauss-Newton second gradient (1.3-1.5), damped where a full step does not
-//! lower the cost.
+//! Newton-Raphson with the Gauss-Newton second gradient (1.3-1.5), damped where a full step does
+//! not lower the cost.
 //!
-//! Far from the minimum the iteration uses a coarse response, of fewer and longer steps. That only
-//! improves the start: from there on every response is whole, and decides where the iteration ends.
+//! Far from the minimum the iteration uses a coarse response, of fewer and longer steps. The coarse
+//! iteration only improves the start. From there on every response is whole and decides where the
+//! iteration ends.
 
 use nalgebra::{Cholesky, DVector};
 
@@ -60,7 +61,7 @@ pub fn minimise<D: Likelihood>(
     fit
 }
 
-/// End of the coarse iteration.
+/// Result of the coarse iteration.
 struct CoarseFit {
     values: Vec<f64>,
     iterations: usize,
@@ -91,7 +92,7 @@ fn approach<D: Likelihood>(
         let full = full_step(&sums)?;
         fit.iterations += 1;
         if sums.gradient.dot(&full) <= COARSE_TOLERANCE * sums.weighted_square {
-            fit.values = moved(&fit.values, &full);
+            fit.values = stepped_parameters(&fit.values, &full);
             break;
         }
         let Some(better) = search.lower(&fit.values, &sums, response) else {
@@ -174,7 +175,7 @@ impl<'a, D: Likelihood> StepSearch<'a, D> {
     ) -> Option<(Vec<f64>, Sums)> {
         while self.damping < MOST_DAMPING {
             if let Some(step) = damped_step(sums, self.damping) {
-                let next = moved(values, &step);
+                let next = stepped_parameters(values, &step);
                 if self.data.respond(self.detail, &next, trial).is_ok() {
                     let lower = self.data.sums(trial, self.weights);
                     let gain = sums.weighted_square - lower.weighted_square;
@@ -191,7 +192,7 @@ impl<'a, D: Likelihood> StepSearch<'a, D> {
     }
 }
 
-fn moved(values: &[f64], step: &DVector<f64>) -> Vec<f64> {
+fn stepped_parameters(values: &[f64], step: &DVector<f64>) -> Vec<f64> {
     values.iter().zip(step.iter()).map(|(v, d)| v + d).collect()
 }
 
@@ -217,7 +218,8 @@ fn full_step(sums: &Sums) -> Option<DVector<f64>> {
     damped_step(sums, 0.0).or_else(|| damped_step(sums, FIRST_DAMPING))
 }
 
-/// Solves (H + damping · diag H) d = g at unit diagonal.
+/// Solves (H + damping · diag H) d = g for the step d, with the information H scaled to unit
+/// diagonal and the gradient g.
 fn damped_step(sums: &Sums, damping: f64) -> Option<DVector<f64>> {
     let unit = scale(&sums.information);
     let mut h = scaled(&sums.information, &unit);

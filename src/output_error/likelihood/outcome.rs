@@ -13,9 +13,9 @@ pub struct Fit<R = Response> {
     pub outcome: Outcome,
     pub reason: String,
     pub iterations: usize,
-    /// J at the start.
+    /// Cost J at the start.
     pub initial_cost: Option<f64>,
-    /// J at the end.
+    /// Cost J at the end.
     pub final_cost: Option<f64>,
     /// Parameters in the order of the case's names.
     pub values: Vec<f64>,

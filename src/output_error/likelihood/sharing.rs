@@ -16,12 +16,12 @@ pub struct SharedParameters {
 }
 
 impl SharedParameters {
-    /// Places the parameters of maneuvers, each with a label for its own ones, its parameters' names,
-    /// and the number of derivatives, which come first. `is_own` selects the derivatives that each
-    /// maneuver keeps to itself.
+    /// Places the parameters of maneuvers. Each maneuver has a label for its own parameters, the
+    /// names of all its parameters, and the number of derivatives, which come first. `is_own`
+    /// selects the derivatives that each maneuver keeps to itself.
     ///
     /// # Errors
-    /// A sentence that names the maneuver whose free derivatives are not those of the first.
+    /// A sentence that names the maneuver whose free derivatives differ from the first maneuver's.
     pub fn new<'a>(
         members: impl IntoIterator<Item = (&'a str, &'a [String], usize)>,
         is_own: impl Fn(&str) -> bool,
@@ -30,13 +30,13 @@ impl SharedParameters {
         for (label, names, derivatives) in members {
             let derivatives = &names[..derivatives];
             if all.members.is_empty() {
-                all.share(derivatives, &is_own);
+                all.set_shared(derivatives, &is_own);
             } else if *derivatives != all.derivatives {
                 return Err(format!(
                     "{label} has other free derivatives than the maneuvers it is joined with"
                 ));
             }
-            let places = all.place(label, names);
+            let places = all.place_member(label, names);
             all.members.push(places);
         }
         Ok(all)
@@ -53,8 +53,9 @@ impl SharedParameters {
         }
     }
 
-    /// Sets the shared derivatives: those of the first maneuver that no maneuver keeps to itself.
-    fn share(&mut self, derivatives: &[String], is_own: impl Fn(&str) -> bool) {
+    /// Sets the shared derivatives: the first maneuver's, without derivatives that each maneuver
+    /// keeps to itself.
+    fn set_shared(&mut self, derivatives: &[String], is_own: impl Fn(&str) -> bool) {
         self.derivatives = derivatives.to_vec();
         for (j, name) in derivatives.iter().enumerate() {
             if !is_own(name) {
@@ -65,7 +66,7 @@ impl SharedParameters {
     }
 
     /// Places a maneuver's parameters; its own are appended to the joint ones.
-    fn place(&mut self, label: &str, names: &[String]) -> Vec<usize> {
+    fn place_member(&mut self, label: &str, names: &[String]) -> Vec<usize> {
         let mut places = Vec::with_capacity(names.len());
         for (j, name) in names.iter().enumerate() {
             if let Some(place) = self.shared.iter().position(|&s| s == j) {
@@ -96,8 +97,8 @@ impl SharedParameters {
         self.members.get(member).map_or(&[], |places| places)
     }
 
-    /// Joint parameters from the shared derivatives and each maneuver's full set, of which its own
-    /// part is used.
+    /// Joint parameters, from the shared derivatives and all parameters of each maneuver; only a
+    /// maneuver's own parameters are taken from the latter.
     #[must_use]
     pub fn assemble(&self, shared: &[f64], members: &[Vec<f64>]) -> Vec<f64> {
         let mut joint = shared.to_vec();

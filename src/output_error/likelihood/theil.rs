@@ -1,12 +1,20 @@
 //! Agreement of a computed response with the measured one: Theil's inequality coefficient with its
 //! parts, and R².
 //!
-//! U = √(Σ (y−z)²/n) / (√(Σ z²/n) + √(Σ y²/n)), from 0 (perfect) to 1 (no relation). The mean
-//! square in the numerator splits exactly into three parts: the squared difference of the means
-//! (bias), the squared difference of the standard deviations (variance), and 2 (1 − ρ) σ_y σ_z
-//! (covariance). Each part is given as its share (Theil 1966; Klein and Morelli 2006, section 11.3;
-//! Jategaonkar 2015, section 11.4). A good model leaves almost nothing to bias and variance. R² = 1
-//! − Σ (z−y)² / Σ (z−z̄)² is one for a perfect prediction and can be negative.
+//! Let z be the n measured and y the computed values of one output. Theil's coefficient is
+//!
+//! U = √(Σ (y−z)²/n) / (√(Σ z²/n) + √(Σ y²/n)),
+//!
+//! from 0 (perfect) to 1 (no relation). The mean square in the numerator is the sum of three parts,
+//! each published as its share (Theil 1966; Klein and Morelli 2006, section 11.3; Jategaonkar 2015,
+//! section 11.4):
+//!
+//! - bias: squared difference of the means;
+//! - variance: squared difference of the standard deviations σ_y and σ_z;
+//! - covariance: 2 (1 − ρ) σ_y σ_z, with ρ the correlation of y and z.
+//!
+//! A good model leaves almost nothing to bias and variance. R² = 1 − Σ (z−y)² / Σ (z−z̄)² is one
+//! for a perfect prediction and can be negative.
 
 use crate::dynamics::OUTPUTS;
 use crate::output_error::case::Measurements;
@@ -30,14 +38,14 @@ pub struct OutputAgreement {
     square_measured: f64,
     /// Mean square of the computed values about their mean.
     square_computed: f64,
-    /// Mean product of both about their means.
+    /// Mean product of measured and computed values about their means.
     product: f64,
 }
 
 impl OutputAgreement {
     /// Moments of pairs (measured, computed).
     #[must_use]
-    pub fn of(pairs: &[(f64, f64)]) -> OutputAgreement {
+    pub fn of_pairs(pairs: &[(f64, f64)]) -> OutputAgreement {
         let mean_measured = mean(pairs, |z, _| z);
         let mean_computed = mean(pairs, |_, y| y);
         OutputAgreement {
@@ -60,7 +68,7 @@ impl OutputAgreement {
         std::array::from_fn(|o| {
             let counted = samples.clone().filter(|((_, used), _)| used[o]);
             let pairs: Vec<(f64, f64)> = counted.map(|((z, _), y)| (z[o], y[o])).collect();
-            OutputAgreement::of(&pairs)
+            OutputAgreement::of_pairs(&pairs)
         })
     }
 
@@ -148,7 +156,7 @@ mod tests {
     }
 
     fn agreement(z: impl Fn(usize) -> f64, y: impl Fn(usize) -> f64) -> OutputAgreement {
-        OutputAgreement::of(&(0..400).map(|k| (z(k), y(k))).collect::<Vec<_>>())
+        OutputAgreement::of_pairs(&(0..400).map(|k| (z(k), y(k))).collect::<Vec<_>>())
     }
 
     #[test]
@@ -200,7 +208,7 @@ mod tests {
         let pairs: Vec<(f64, f64)> = (0..57)
             .map(|k| (sine(k) + 0.3, 0.7 * cosine(3 * k) - 0.1 * sine(k)))
             .collect();
-        let a = OutputAgreement::of(&pairs);
+        let a = OutputAgreement::of_pairs(&pairs);
         let u = a.theil().unwrap();
         assert_relative_eq!(
             u.bias + u.variance + u.covariance,
@@ -221,7 +229,7 @@ mod tests {
         );
         let both = theil(&[(good, 1.0), (bad, 1.0)]).unwrap();
         assert!(both.coefficient < bad.theil().unwrap().coefficient && both.bias > 0.999);
-        assert_eq!(OutputAgreement::of(&[]).theil(), None);
+        assert_eq!(OutputAgreement::of_pairs(&[]).theil(), None);
         assert_eq!(agreement(|_| 2.0, sine).r_squared(), None);
     }
 }

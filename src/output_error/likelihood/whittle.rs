@@ -1,10 +1,10 @@
 //! Linear regression on Fourier sums, weighted by the spectrum of its own residuals (Whittle).
 //!
-//! Fourier sums of stationary noise at the harmonics of its length are nearly uncorrelated, with
-//! variances along the noise's spectrum. The spectrum is that of the residuals, smoothed over
-//! neighbouring frequencies, and estimated in alternation with the parameters. Each complex equation
-//! is two real ones, its real and its imaginary part, with the same variance (Klein and Morelli
-//! 2006, chapter 7).
+//! Fourier sums of stationary noise at the harmonics of the series' length are nearly uncorrelated,
+//! and their variances follow the noise's spectrum. The spectrum is that of the residuals, smoothed
+//! over neighbouring frequencies, and estimated in alternation with the parameters. Each complex
+//! equation is two real ones, its real and its imaginary part, with the same variance (Klein and
+//! Morelli 2006, chapter 7).
 
 use nalgebra::{DMatrix, DVector};
 
@@ -27,7 +27,7 @@ const MOST_LEVERAGE: f64 = 0.95;
 
 /// Equations at several frequencies: real parts of all, then imaginary parts.
 #[derive(Debug)]
-pub(super) struct Equations<'a> {
+pub(super) struct SpectralEquations<'a> {
     pub response: &'a DVector<f64>,
     pub regressors: &'a DMatrix<f64>,
     /// Half width of the triangle that smooths the spectrum, in frequencies.
@@ -38,7 +38,7 @@ pub(super) struct Equations<'a> {
 
 /// Parameters with their covariance.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Regression {
+pub(super) struct WhittleRegression {
     pub values: DVector<f64>,
     /// Larger of the covariance by the spectrum and the one by the residuals themselves (HC3),
     /// widened by Student's t: ±1.96 standard errors are an interval of 95 %.
@@ -51,9 +51,9 @@ pub(super) struct Regression {
     roots: DVector<f64>,
 }
 
-impl Equations<'_> {
+impl SpectralEquations<'_> {
     /// Parameters of least weighted squares; `None` if the data do not determine them.
-    pub fn solve(&self) -> Option<Regression> {
+    pub fn solve(&self) -> Option<WhittleRegression> {
         let (equations, parameters) = self.regressors.shape();
         let free = self.independent * equations as f64 - parameters as f64;
         if parameters == 0 || free < FEWEST_FREE {
@@ -70,7 +70,7 @@ impl Equations<'_> {
     }
 
     /// Weighted least squares with a spectrum.
-    fn fit(&self, spectrum: &[f64]) -> Option<Regression> {
+    fn fit(&self, spectrum: &[f64]) -> Option<WhittleRegression> {
         let frequencies = spectrum.len();
         let roots = DVector::from_fn(2 * frequencies, |i, _| spectrum[i % frequencies].powf(-0.5));
         let mut weighted = self.regressors.clone();
@@ -79,19 +79,22 @@ impl Equations<'_> {
         }
         let normal = weighted.tr_mul(&weighted);
         let Identification::Determined { inverse, .. } =
-            Identification::of(&normal, MAX_CONDITION_NUMBER)
+            Identification::identify(&normal, MAX_CONDITION_NUMBER)
         else {
             return None;
         };
         let right = weighted.tr_mul(&self.response.component_mul(&roots));
         let values = &inverse * right;
-        values.iter().all(|v| v.is_finite()).then(|| Regression {
-            values,
-            covariance: DMatrix::zeros(normal.nrows(), normal.nrows()),
-            inverse,
-            weighted,
-            roots,
-        })
+        values
+            .iter()
+            .all(|v| v.is_finite())
+            .then(|| WhittleRegression {
+                values,
+                covariance: DMatrix::zeros(normal.nrows(), normal.nrows()),
+                inverse,
+                weighted,
+                roots,
+            })
     }
 
     fn residuals(&self, values: &DVector<f64>) -> DVector<f64> {
@@ -100,7 +103,7 @@ impl Equations<'_> {
 
     /// Variance of an equation's residual at each frequency. A fit reduces the residuals by its
     /// leverage, so their squares are divided by the remaining share.
-    fn smoothed_spectrum(&self, fit: &Regression) -> Vec<f64> {
+    fn smoothed_spectrum(&self, fit: &WhittleRegression) -> Vec<f64> {
         let residuals = self.residuals(&fit.values);
         let leverages = fit.leverages();
         let frequencies = residuals.len() / 2;
@@ -121,8 +124,8 @@ impl Equations<'_> {
     }
 }
 
-impl Regression {
-    /// Share of each equation's own response in its fitted value.
+impl WhittleRegression {
+    /// Leverage of each equation: share of its own response in its fitted value.
     fn leverages(&self) -> DVector<f64> {
         let spread = &self.weighted * &self.inverse;
         DVector::from_fn(self.weighted.nrows(), |i, _| {
@@ -166,8 +169,8 @@ mod tests {
         )
     }
 
-    fn of<'a>(response: &'a DVector<f64>, regressors: &'a DMatrix<f64>) -> Equations<'a> {
-        Equations {
+    fn of<'a>(response: &'a DVector<f64>, regressors: &'a DMatrix<f64>) -> SpectralEquations<'a> {
+        SpectralEquations {
             response,
             regressors,
             smoothing: 10.0,

@@ -3,7 +3,7 @@
 use approx::assert_relative_eq;
 use nalgebra::DVector;
 
-use super::super::calibration_errors::{Calibration, Fitted, Misreading};
+use super::super::calibration_errors::{Calibration, FittedManeuver, Misreading};
 use super::super::cost;
 use super::super::likelihood::information::Identification;
 use super::*;
@@ -44,7 +44,7 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
     /// Predicted change of the estimates.
     fn predicted(&self, error: &Misreading) -> DVector<f64> {
         let model = model(&self.truth);
-        let fitted = Fitted {
+        let fitted = FittedManeuver {
             aircraft: &aircraft(),
             window: &self.window,
             model: &model,
@@ -55,7 +55,7 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
         let shifts = fitted.gradient_shifts(std::slice::from_ref(error)).unwrap();
         let sums = cost::sums(&self.response, &TABLE);
         let Identification::Determined { inverse, .. } =
-            Identification::of(&sums.information, 1e12)
+            Identification::identify(&sums.information, 1e12)
         else {
             panic!()
         };

@@ -77,7 +77,7 @@ impl Fonts {
     }
 
     /// Numbers of a text's glyphs, hexadecimal.
-    pub fn encoded(&self, weight: Weight, text: &str) -> String {
+    pub fn glyph_numbers(&self, weight: Weight, text: &str) -> String {
         let face = self.face(weight);
         text.chars().fold(String::new(), |mut all, c| {
             // Writing into a String cannot fail.

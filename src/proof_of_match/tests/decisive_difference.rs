@@ -10,7 +10,7 @@ use crate::aero::{Axis, WindTunnel};
 use crate::estimate;
 use crate::model::LocalPosterior;
 use crate::numerics::random::RandomStream;
-use crate::proof_of_match::outputs::place;
+use crate::proof_of_match::outputs::output_index;
 use crate::proof_of_match::{ProofInputs, RecordedManeuver, decisive_difference};
 use crate::tables::{MatchedQuantity, ModelSource};
 
@@ -84,7 +84,7 @@ fn its_deviation_is_that_of_drawn_aircraft() {
     let aircraft = &shipped().config.aircraft;
     let record = noisy(&flown, 1);
     let recorded = recording(&flown, &record, aircraft);
-    let output = place(own.quantity).unwrap();
+    let output = output_index(own.quantity).unwrap();
     let about = simulation(&flown, aircraft, &recorded, &mean);
     let start = crate::proof_of_match::start::matched(&about).start;
     let run = about.fly(&start, recorded.samples, 1);

@@ -19,7 +19,7 @@ fn modes(flown: &FlownManeuver, names: &[&str], error_pct: f64) -> LateralModes 
 }
 
 #[test]
-fn with_less_weathercock_stability_the_dutch_roll_is_slower_as_its_root_says() {
+fn with_less_weathercock_stability_the_dutch_roll_is_slower_as_its_root() {
     let flown = flown("PYRS", 10.0);
     let config = &shipped().config;
     let modes = modes(&flown, &[], 0.0);

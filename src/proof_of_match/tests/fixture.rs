@@ -15,7 +15,7 @@ use crate::model::LocalPosterior;
 use crate::proof_of_match::aerodynamics::Aerodynamics;
 use crate::proof_of_match::derivative_table::DerivativeTable;
 use crate::proof_of_match::free_run::Simulation;
-use crate::proof_of_match::recording::Recording;
+use crate::proof_of_match::recording::ManeuverRecording;
 use crate::proof_of_match::{
     Matched, OwnEstimates, ProofInputs, RecordedManeuver, Specification, fly_again,
 };
@@ -144,16 +144,16 @@ pub fn verdict(flown: &FlownManeuver, record: &Record, database: WindTunnel) -> 
 }
 
 /// A maneuver as recorded.
-pub fn recording(flown: &FlownManeuver, record: &Record, aircraft: &Aircraft) -> Recording {
+pub fn recording(flown: &FlownManeuver, record: &Record, aircraft: &Aircraft) -> ManeuverRecording {
     let buildup = &shipped().config.buildup;
-    Recording::new(record, &flown.maneuver, (aircraft, buildup), 1.0).unwrap()
+    ManeuverRecording::new(record, &flown.maneuver, (aircraft, buildup), 1.0).unwrap()
 }
 
 /// A maneuver with the aircraft of a database.
 pub fn simulation<'a>(
     flown: &FlownManeuver,
     aircraft: &'a Aircraft,
-    recording: &'a Recording,
+    recording: &'a ManeuverRecording,
     tunnel: &WindTunnel,
 ) -> Simulation<'a> {
     let condition = Condition {

@@ -71,7 +71,7 @@ fn a_small_disturbance_decays_as_the_short_period_of_the_linear_equations() {
     let truth = truth(&flown, "", 1.0);
     let simulation = simulation(&flown, aircraft, &recording, &truth);
     let start = start::matched(&simulation).start;
-    let disturbed = start.moved(4, 2.0 * RAD);
+    let disturbed = start.with_change(4, 2.0 * RAD);
     let (base, moved) = (
         simulation.fly(&start, 60, 1),
         simulation.fly(&disturbed, 60, 1),

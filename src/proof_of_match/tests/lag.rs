@@ -7,7 +7,7 @@ use crate::lab::simulator::tests::{shipped_campaign, with_lag};
 use crate::proof_of_match::aerodynamics::Aerodynamics;
 use crate::proof_of_match::derivative_table::DerivativeTable;
 use crate::proof_of_match::free_run::Simulation;
-use crate::proof_of_match::recording::Recording;
+use crate::proof_of_match::recording::ManeuverRecording;
 use crate::proof_of_match::start;
 
 /// Place of α among the outputs.
@@ -20,7 +20,8 @@ fn a_lag_is_flown_again() {
     let card = campaign.card("PPSS", 15.0).unwrap();
     let flown: FlownManeuver = campaign.simulator.fly(&card).unwrap();
     let recorded = (&flown.record, &flown.maneuver);
-    let recording = Recording::new(recorded.0, recorded.1, (aircraft, buildup), 1.0).unwrap();
+    let recording =
+        ManeuverRecording::new(recorded.0, recorded.1, (aircraft, buildup), 1.0).unwrap();
     let condition = Condition {
         alpha_deg: flown.maneuver.alpha_deg,
         mach: flown.maneuver.mach,

@@ -10,7 +10,7 @@ use crate::proof_of_match::aerodynamics::Aerodynamics;
 use crate::proof_of_match::derivative_table::DerivativeTable;
 use crate::proof_of_match::free_run::{FreeRun, Simulation, Start};
 use crate::proof_of_match::linear_run::Parameter;
-use crate::proof_of_match::recording::Recording;
+use crate::proof_of_match::recording::ManeuverRecording;
 use crate::proof_of_match::start::{self, PARAMETERS};
 
 /// Samples of a run, and those in a step of it.
@@ -34,7 +34,7 @@ fn moved(
 ) -> FreeRun {
     let (mut simulation, mut start) = (simulation.clone(), start.clone());
     match parameter {
-        Parameter::Start(place) => start = start.moved(place, by),
+        Parameter::Start(place) => start = start.with_change(place, by),
         Parameter::Derivative(place) => {
             let regressor = &buildup.derivatives[place].regressor;
             simulation.aerodynamics.table.raise(place, regressor, by);
@@ -91,7 +91,7 @@ fn slopes_of_an_aircraft_with_a_lag_are_those_of_free_runs() {
     let card = campaign.card("PPSS", 15.0).unwrap();
     let flown: FlownManeuver = campaign.simulator.fly(&card).unwrap();
     let (record, maneuver) = (&flown.record, &flown.maneuver);
-    let recording = Recording::new(record, maneuver, (aircraft, buildup), 1.0).unwrap();
+    let recording = ManeuverRecording::new(record, maneuver, (aircraft, buildup), 1.0).unwrap();
     let condition = Condition {
         alpha_deg: maneuver.alpha_deg,
         mach: maneuver.mach,

@@ -12,7 +12,7 @@ use super::reported::{
 };
 use crate::aero::Axis;
 use crate::aircraft::Aircraft;
-use crate::qualities::linear::{Differentiation, LinearModel, Solved, Vector};
+use crate::qualities::linear::{Differentiation, LinearModel, SolvedEquations, Vector};
 use crate::qualities::trim::Trim;
 use crate::tables::FlyingQuality;
 
@@ -104,7 +104,7 @@ fn the_zeros_and_the_load_factor_are_those_of_the_transfer_functions() {
     // Where the transfer function is zero, the system matrix is singular.
     let zero = -value(FlyingQuality::AttitudeZero);
     let mut system = DMatrix::<f64>::zeros(5, 5);
-    let Solved {
+    let SolvedEquations {
         matrix: a, control, ..
     } = at_one(&equations);
     for i in 0..4 {

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::aero::{Axis, Buildup, Coefficient, Combined, Condition, Derivative, Regressor};
 use crate::aircraft::{Aircraft, Position, Sensors, Vane, VaneModel};
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
-use crate::qualities::linear::{Controls, Flight, LinearModel};
+use crate::qualities::linear::{Controls, LinearModel, SteadyFlight};
 use crate::qualities::specification::Specification;
 use crate::qualities::trim::Trim;
 
@@ -186,7 +186,7 @@ pub fn linear_of(
 ) -> LinearModel {
     let (buildup, trim) = (buildup(), trim());
     let pitch = BTreeMap::from([("de_deg".to_owned(), 1.0)]);
-    let flight = Flight {
+    let flight = SteadyFlight {
         aircraft,
         buildup: &buildup,
         trim: &trim,

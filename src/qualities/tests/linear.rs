@@ -10,7 +10,7 @@ use crate::aero::{Axis, Buildup, Coefficient, Derivative, Regressor};
 use crate::aircraft::{Aircraft, ThrustLine};
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
 use crate::qualities::linear::{
-    AxisStates, Controls, Differentiation, Effect, Flight, Lag, LinearModel, Matrix, Vector,
+    AxisStates, Controls, Differentiation, Effect, Lag, LinearModel, Matrix, SteadyFlight, Vector,
 };
 use crate::tables::FlyingQuality;
 use crate::units::DEG;
@@ -191,7 +191,7 @@ fn effect(regressor: &str) -> Effect {
         feedback: &[],
     };
     let pitch = BTreeMap::from([("de_deg".to_owned(), 1.0)]);
-    let flight = Flight {
+    let flight = SteadyFlight {
         aircraft: &aircraft,
         buildup: &buildup,
         trim: &trim,

@@ -6,7 +6,9 @@ use nalgebra::{DVector, SMatrix, Vector3};
 use crate::aero::{Axis, Condition};
 use crate::aircraft::{Aircraft, Position};
 use crate::numerics::dual::Dual;
-use crate::qualities::linear::{Differentiation, Lag, LinearModel, Matrix, Solved, Vector};
+use crate::qualities::linear::{
+    Differentiation, Lag, LinearModel, Matrix, SolvedEquations, Vector,
+};
 use crate::qualities::modes::{Modes, Pair};
 use crate::qualities::trim::Trim;
 use crate::qualities::{lateral, longitudinal};
@@ -81,7 +83,7 @@ impl Reported {
     pub fn lateral_modes(&self, by_state: ByState) -> Modes {
         let rates = lateral::rates(&self.aircraft, &self.trim);
         let matrix = rates.by_state + rates.by_coefficient * by_state;
-        Modes::of(Axis::Lateral, &matrix, &[]).unwrap()
+        Modes::of_matrix(Axis::Lateral, &matrix, &[]).unwrap()
     }
 }
 
@@ -109,13 +111,13 @@ pub fn level(alpha_deg: f64) -> Trim {
 }
 
 /// Equations solved for the states' rates.
-pub fn at_one(equations: &LinearModel) -> Solved {
+pub fn at_one(equations: &LinearModel) -> SolvedEquations {
     let one = DVector::from_element(1, 1.0);
     equations.solved(&one, Differentiation::ValuesAlone)
 }
 
 pub fn longitudinal_modes(equations: &LinearModel) -> Modes {
-    Modes::of(Axis::Longitudinal, &at_one(equations).matrix, &[]).unwrap()
+    Modes::of_matrix(Axis::Longitudinal, &at_one(equations).matrix, &[]).unwrap()
 }
 
 /// Asserts the frequency within 0.5 % and the damping within 1.5 %.

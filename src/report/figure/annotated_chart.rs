@@ -74,7 +74,7 @@ const LINE: f64 = 18.0;
 const EDGE: f64 = 10.0;
 /// Height of the row of maneuvers, and of each lane.
 const LANE: f64 = 19.0;
-/// Name of the row of maneuvers.
+/// Name at the left of the row of maneuvers.
 const WINDOWS_NAME: &str = "maneuvers";
 /// Width of a key in the legend, with the gap to its word.
 const KEY_WIDTH: f64 = 26.0;
@@ -248,7 +248,8 @@ fn upright_labels(svg: &mut SvgWriter, chart: &Chart, column: &StripColumn, y: f
     bottom + LEADER
 }
 
-/// Moves ascending places apart to at least a pitch, none beyond an end.
+/// Moves ascending places apart, so that neighbours are at least `pitch` apart and none is beyond
+/// `end`.
 fn spread(places: &[f64], pitch: f64, end: f64) -> Vec<f64> {
     let mut spread = places.to_vec();
     let mut last = f64::NEG_INFINITY;

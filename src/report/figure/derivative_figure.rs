@@ -3,7 +3,7 @@
 //!
 //! The plotting crate draws paper, axes, lines and band. Markers and bars of the estimates are one
 //! path per class in the crate's scene: the crate would draw bars over hollow markers, and give
-//! each of them its own element.
+//! each mark its own element.
 
 use std::fmt::Write;
 use std::sync::Arc;
@@ -31,7 +31,7 @@ const HEIGHT: f64 = 350.0;
 const MARGINS: (f64, f64) = (9.0, 44.0);
 const TEXT: u32 = 14;
 
-/// With more points the tunnel's line has no markers, which would hide it.
+/// Number of points above which the tunnel's line has no markers, which would hide it.
 const MOST_TUNNEL_MARKERS: usize = 25;
 
 /// Content of the figure.

@@ -16,7 +16,7 @@ const STEPS: f64 = 5.0;
 
 /// Distance of outliers from the middle 80 % of the estimates, in widths of that interval.
 const FENCE: f64 = 1.0;
-/// Fewer estimates have no quantiles worth the name.
+/// Least number of estimates for which quantiles are computed.
 const LEAST_FOR_FENCE: usize = 5;
 /// Share of the range by which ends of bars and band may extend it.
 const LARGEST_EXTENSION: f64 = 0.35;
@@ -54,7 +54,7 @@ impl Scale {
         (self.min..=self.max).contains(&value)
     }
 
-    /// Number of decimals of its tick labels.
+    /// Number of decimals of the tick labels.
     #[must_use]
     pub fn decimals(&self) -> usize {
         // A step of 0.1 may be 0.099999…: its power of ten is that of the rounded number.
@@ -74,8 +74,8 @@ pub struct ValueRange {
 }
 
 impl ValueRange {
-    /// Scale that covers all lines, the estimates without outliers, and those ends of bars and
-    /// band that do not dwarf them.
+    /// Scale that covers all lines, the estimates without outliers, and ends of bars and band
+    /// unless they would extend it too far.
     #[must_use]
     pub fn scale(&self) -> Scale {
         let values: Vec<f64> = self

@@ -1,7 +1,7 @@
 //! Renderer of strip charts: signals under each other over one time axis.
 //!
-//! A report of five hundred maneuvers has five hundred such drawings. So everything alike in a
-//! drawing is one path, and texts that are alike share their attributes.
+//! A report of five hundred maneuvers has five hundred such drawings. To keep the file small, marks
+//! of one appearance are one path, and texts of one appearance share their attributes.
 
 use std::fmt::Write;
 
@@ -405,7 +405,7 @@ pub const MISSING_STYLE: PathStyle<'static> = PathStyle {
     fill_opacity: None,
 };
 
-/// Narrower marks would not be seen.
+/// Least width of a mark that can be seen.
 const LEAST_MARK_WIDTH: f64 = 1.6;
 
 /// Path data of the mark of bridged samples.
@@ -430,13 +430,13 @@ pub fn missing_mark((left, right): (f64, f64), bottom: f64) -> String {
 
 /// Multiples of the step within a scale, with their labels.
 fn ticks(scale: Scale) -> impl Iterator<Item = (f64, String)> {
-    /// Guards against a step that is tiny beside the range.
-    const MOST: i32 = 50;
+    /// Limit for a step that is tiny beside the range.
+    const MOST_TICKS: i32 = 50;
     let digits = Digits::of_ticks(scale.decimals());
     let first = (scale.min / scale.step - 1e-6).ceil();
     let last = scale.max / scale.step + 1e-6;
     let is_finite = first.is_finite() && last.is_finite();
-    (0..MOST)
+    (0..MOST_TICKS)
         .map(move |i| first + f64::from(i))
         .take_while(move |n| is_finite && *n <= last)
         .map(move |n| (n * scale.step, digits.write(Some(n * scale.step))))

@@ -7,7 +7,7 @@ pub const INK: &str = "#111111";
 /// Colour of secondary text and thin lines.
 pub const FAINT: &str = "#555555";
 pub const TUNNEL_COLOUR: &str = "#a50026";
-/// Pale, so that the computed response is seen over it.
+/// Colour of measured signals: pale, so that the computed response is seen over them.
 pub const MEASURED_COLOUR: &str = "#4f9bd9";
 /// Colour of samples that are excluded from the cost or flagged by ingest.
 pub const EXCLUDED_COLOUR: &str = "#c44e00";

@@ -51,7 +51,7 @@ pub struct TextStyle<'a> {
     /// Height, where it is not that of the drawing.
     pub size: Option<f64>,
     pub is_bold: bool,
-    /// Written upwards.
+    /// `true` for a text written upwards.
     pub is_vertical: bool,
 }
 
@@ -68,7 +68,7 @@ impl<'a> TextStyle<'a> {
     }
 }
 
-/// Point of a text that its coordinates give.
+/// Point of a text at which its coordinates are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Anchor {
     #[default]
@@ -238,8 +238,9 @@ impl SvgWriter {
 /// Coordinates of [`polyline`] in a unit of the drawing.
 const QUARTERS: f64 = 4.0;
 
-/// Path data of a line through points for [`SvgWriter::lines`], relative from each to the next. Points are
-/// left out where the line stays within [`TOLERANCE`] of them; the sum of the steps stays true to the others.
+/// Path data of a line through points for [`SvgWriter::lines`], relative from each to the next. A
+/// point is left out if the line stays within [`TOLERANCE`] of it. Steps are rounded so that their
+/// sum stays true.
 #[must_use]
 pub fn polyline(points: impl Iterator<Item = (f64, f64)>) -> String {
     let quarters = |value: f64| rounded(QUARTERS * value);
@@ -271,7 +272,7 @@ fn separator(number: i64) -> &'static str {
 /// pixel, and half of the thinnest line.
 const TOLERANCE: f64 = 1.0;
 
-/// The first and the last point, and those that the line between two kept ones would miss by more
+/// First and last point, and every point that the line between two kept points would miss by more
 /// than [`TOLERANCE`] (Ramer, Douglas and Peucker).
 fn simplified(points: &[(i64, i64)]) -> Vec<(i64, i64)> {
     let Some(last) = points.len().checked_sub(1) else {

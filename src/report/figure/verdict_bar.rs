@@ -6,7 +6,7 @@ use crate::tables::TunnelVerdict;
 
 /// A part of the bar with one verdict.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Segment {
+pub struct BarSegment {
     pub verdict: TunnelVerdict,
     pub from_deg: f64,
     pub to_deg: f64,
@@ -29,7 +29,7 @@ fn style(verdict: TunnelVerdict) -> (f64, f64, &'static str) {
 
 /// Draws the segments as SVG; empty if there are none or the range of angle of attack is.
 #[must_use]
-pub fn draw(segments: &[Segment], (from_deg, to_deg): (f64, f64), width: u32) -> String {
+pub fn draw(segments: &[BarSegment], (from_deg, to_deg): (f64, f64), width: u32) -> String {
     let scale = f64::from(width) / (to_deg - from_deg);
     if segments.is_empty() || !scale.is_finite() || scale <= 0.0 {
         return String::new();
@@ -59,7 +59,7 @@ mod tests {
 
     #[test]
     fn segments_fill_the_bar_to_scale() {
-        let segment = |verdict, from_deg, to_deg| Segment {
+        let segment = |verdict, from_deg, to_deg| BarSegment {
             verdict,
             from_deg,
             to_deg,

@@ -17,7 +17,7 @@ const MARGINS: [f64; 4] = [52.0, 8.0, 10.0, 36.0];
 /// Half of the side of a point's mark.
 const MARK: f64 = 2.2;
 
-/// An axis.
+/// Axis of a chart, linear or logarithmic.
 #[derive(Clone, Debug)]
 pub struct ChartAxis {
     pub label: String,
@@ -51,7 +51,7 @@ pub struct ChartSeries {
     pub is_joined: bool,
 }
 
-/// The chart.
+/// Chart of one quantity over another.
 #[derive(Clone, Debug)]
 pub struct XyChart<'a> {
     /// Id, unique in the page.
@@ -61,7 +61,7 @@ pub struct XyChart<'a> {
     pub description: &'a str,
     pub x: ChartAxis,
     pub y: ChartAxis,
-    /// From the outermost inwards.
+    /// Boxes of levels, from the outermost inwards.
     pub boxes: Vec<LevelBox>,
     pub series: Vec<ChartSeries>,
 }
@@ -161,7 +161,7 @@ impl Pen<'_> {
         Some(MARGINS[1] + (1.0 - self.chart.y.share(value)?) * height)
     }
 
-    fn place(&self, (x, y): (f64, f64)) -> Option<(f64, f64)> {
+    fn point_in_frame(&self, (x, y): (f64, f64)) -> Option<(f64, f64)> {
         Some((self.x(x)?, self.y(y)?))
     }
 
@@ -266,10 +266,13 @@ impl Pen<'_> {
         let mut outlines = String::new();
         let (mut line, mut marks) = (String::new(), String::new());
         for point in &series.points {
-            let Some((x, y)) = self.place(point.at) else {
+            let Some((x, y)) = self.point_in_frame(point.at) else {
                 continue;
             };
-            let places = point.outline.iter().filter_map(|at| self.place(*at));
+            let places = point
+                .outline
+                .iter()
+                .filter_map(|at| self.point_in_frame(*at));
             for (i, (x, y)) in places.enumerate() {
                 let command = if i == 0 { 'M' } else { 'L' };
                 let _ = write!(outlines, "{command}{} {}", coordinate(x), coordinate(y));
@@ -292,7 +295,7 @@ impl Pen<'_> {
         }
         svg.path(&marks, PathStyle::filled(series.colour));
         for point in series.points.iter().filter(|p| !p.label.is_empty()) {
-            if let Some((x, y)) = self.place(point.at) {
+            if let Some((x, y)) = self.point_in_frame(point.at) {
                 let style = TextStyle::coloured(series.colour);
                 svg.text((x + 4.0, y - 4.0), &point.label, style);
             }

@@ -306,7 +306,7 @@ fn rate_figure(
             "Measured {name} of a representative maneuver of each class, on one scale. {caption}"
         ),
         width: WIDTH,
-        time: history::until(longest_s),
+        time: history::scale_until(longest_s),
         columns: vec![strips],
     };
     ClassFigure {
@@ -320,7 +320,7 @@ fn rate_figure(
     }
 }
 
-/// A rate as measured in those histories that have it.
+/// Rate as measured, from the histories that contain it.
 fn measured_rates<'a>(label: &str, histories: &[&'a History]) -> Vec<(&'a History, Points)> {
     histories
         .iter()

@@ -9,7 +9,7 @@ use crate::aero::Axis;
 use crate::maneuver::Maneuver;
 use crate::report::contents::Contents;
 use crate::report::figure::scale::extent;
-use crate::report::notation::{NOTHING, OUTCOMES, fixed};
+use crate::report::notation::{DASH, OUTCOMES, fixed};
 use crate::tables::FitRow;
 
 /// One row of the table.
@@ -95,7 +95,7 @@ fn count_outcomes(maneuvers: &[&Maneuver], fits: &BTreeMap<&str, &FitRow>) -> Ve
 
 fn alpha_range(maneuvers: &[&Maneuver]) -> String {
     extent(maneuvers.iter().map(|m| m.alpha_deg)).map_or_else(
-        || NOTHING.to_owned(),
+        || DASH.to_owned(),
         |(low, high)| format!("{}\u{2013}{}°", fixed(low, 0), fixed(high, 0)),
     )
 }

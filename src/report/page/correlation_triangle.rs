@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::report::contents::{Contents, group_by};
 use crate::report::history;
-use crate::report::notation::{NOTHING, angle, fixed, without_unit};
+use crate::report::notation::{DASH, angle, fixed, without_unit};
 use crate::tables::{CorrelationKind, CorrelationRow, History};
 
 /// Correlations of one maneuver below the diagonal: a row per regressor but the first, a column per
@@ -111,7 +111,7 @@ fn regressors<'a>(pairs: &[&'a CorrelationRow]) -> Vec<&'a str> {
 fn cell(correlation: Option<f64>, limit: f64) -> TriangleCell {
     let Some(correlation) = correlation else {
         return TriangleCell {
-            text: NOTHING.to_owned(),
+            text: DASH.to_owned(),
             shade: "",
         };
     };

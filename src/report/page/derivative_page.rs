@@ -14,7 +14,7 @@ use crate::report::figure::derivative_figure::{self, ClassEstimates, DerivativeF
 use crate::report::figure::legend::{LegendView, key, line};
 use crate::report::figure::scale::{Scale, ValueRange, extent};
 use crate::report::figure::style::{INK, TUNNEL_COLOUR};
-use crate::report::notation::{self, Digits, NOTHING, angle, count, fixed, number};
+use crate::report::notation::{self, DASH, Digits, angle, count, fixed, number};
 use crate::report::table_view::TableView;
 use crate::tables::{ComparisonRow, PosteriorRow, TrendRow};
 
@@ -78,7 +78,7 @@ pub fn groups(
     groups
 }
 
-/// Scale of angle of attack that all figures share, so that they can be laid side by side.
+/// Scale of angle of attack for all figures, so that they can be laid side by side.
 fn alpha_scale(derivatives: &[DerivativeResults]) -> Scale {
     let points = derivatives
         .iter()
@@ -346,7 +346,7 @@ fn comparison_table(derivative: &DerivativeResults) -> TableView {
         .iter()
         .flat_map(|c| [Some(c.flight), c.tunnel.wind_tunnel])
         .flatten();
-    let digits = Digits::of(values, 4);
+    let digits = Digits::for_values(values, 4);
     let row = |c: &&ComparisonRow| {
         vec![
             angle(c.alpha_deg),
@@ -356,10 +356,8 @@ fn comparison_table(derivative: &DerivativeResults) -> TableView {
             digits.write(c.tunnel.difference),
             c.tunnel
                 .difference_pct
-                .map_or_else(|| NOTHING.to_owned(), |p| fixed(p, 1)),
-            c.tunnel
-                .z
-                .map_or_else(|| NOTHING.to_owned(), |z| fixed(z, 1)),
+                .map_or_else(|| DASH.to_owned(), |p| fixed(p, 1)),
+            c.tunnel.z.map_or_else(|| DASH.to_owned(), |z| fixed(z, 1)),
             c.tunnel.verdict.to_string(),
         ]
     };

@@ -204,8 +204,8 @@ impl<'a> DerivativeRows<'a, '_> {
             .unwrap_or("-")
     }
 
-    /// Tunnel values of the comparison, or those that the estimation used where a derivative is not
-    /// compared.
+    /// Tunnel values of the comparison. For a derivative that is not compared, the tunnel values
+    /// used in the estimation.
     fn tunnel(&self) -> Vec<(f64, f64)> {
         let compared = self
             .comparison

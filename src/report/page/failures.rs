@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use crate::error::Problem;
 use crate::maneuver::Maneuver;
 use crate::report::contents::Contents;
-use crate::report::notation::{NOTHING, angle, fixed, number, outcome_in_words};
+use crate::report::notation::{DASH, angle, fixed, number, outcome_in_words};
 use crate::report::table_view::TableView;
 use crate::schema::Words;
 use crate::tables::{
@@ -75,7 +75,7 @@ fn failed_fit(fit: &FitRow, maneuver: Option<&Maneuver>) -> Vec<String> {
     vec![
         fit.maneuver_id.clone(),
         fit.class.clone(),
-        maneuver.map_or_else(|| NOTHING.to_owned(), |m| angle(m.alpha_deg)),
+        maneuver.map_or_else(|| DASH.to_owned(), |m| angle(m.alpha_deg)),
         outcome_in_words(fit.outcome).to_owned(),
         fit.reason.clone(),
     ]
@@ -111,10 +111,10 @@ fn events(contents: &Contents) -> TableView {
 }
 
 fn event(event: &EventRow) -> Vec<String> {
-    let class = |class: &Option<String>| class.clone().unwrap_or_else(|| NOTHING.to_owned());
+    let class = |class: &Option<String>| class.clone().unwrap_or_else(|| DASH.to_owned());
     let times = |start: Option<f64>, end: Option<f64>| match (start, end) {
         (Some(start), Some(end)) => format!("{}\u{2013}{} s", fixed(start, 1), fixed(end, 1)),
-        _ => NOTHING.to_owned(),
+        _ => DASH.to_owned(),
     };
     vec![
         event.flight_id.clone(),
@@ -185,7 +185,7 @@ fn flights(contents: &Contents) -> TableView {
 }
 
 fn gust(rms_ft_s: Option<f64>) -> String {
-    rms_ft_s.map_or_else(|| NOTHING.to_owned(), |rms| fixed(rms, 1))
+    rms_ft_s.map_or_else(|| DASH.to_owned(), |rms| fixed(rms, 1))
 }
 
 /// Calibration errors of the instruments, summarised over the flights.
@@ -252,7 +252,7 @@ fn instrument_trends(contents: &Contents) -> TableView {
             t.common.to_string(),
             t.far_flights.clone(),
             t.verdict.to_string(),
-            t.since.clone().unwrap_or_else(|| NOTHING.to_owned()),
+            t.since.clone().unwrap_or_else(|| DASH.to_owned()),
         ]
     };
     let judged = contents.instrument_trends.iter();
@@ -290,7 +290,7 @@ fn range(values: impl Iterator<Item = f64> + Clone, decimals: usize) -> String {
             fixed(least, decimals),
             fixed(most, decimals)
         ),
-        _ => NOTHING.to_owned(),
+        _ => DASH.to_owned(),
     }
 }
 

@@ -15,9 +15,9 @@ const WIDTH: f64 = 800.0;
 const OUTPUT_HEIGHT: f64 = 48.0;
 const RESIDUAL_HEIGHT: f64 = 18.0;
 const INPUT_HEIGHT: f64 = 42.0;
-/// Inputs that move less than this share of the most moved one are not drawn.
+/// Share of the largest movement below which an input is not drawn.
 const SMALLEST_SHARE: f64 = 0.1;
-/// More inputs would make their column longer than that of the outputs.
+/// Largest number of inputs: more would make their column longer than the column of the outputs.
 const MOST_INPUTS: usize = 9;
 
 /// Draws a maneuver: outputs with residuals on the left, inputs on the right.

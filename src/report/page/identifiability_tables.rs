@@ -8,7 +8,7 @@ use crate::maneuver::Status;
 use crate::numerics::order_statistics::quantile;
 use crate::report::contents::Contents;
 use crate::report::figure::scale::extent;
-use crate::report::notation::{NOTHING, fixed};
+use crate::report::notation::{DASH, fixed};
 use crate::report::table_view::TableView;
 use crate::tables::CorrelationKind;
 
@@ -222,13 +222,13 @@ fn rows_by_class(
 }
 
 fn median(values: &[f64]) -> String {
-    quantile(values.iter().copied(), 0.5).map_or_else(|| NOTHING.to_owned(), |v| fixed(v, 0))
+    quantile(values.iter().copied(), 0.5).map_or_else(|| DASH.to_owned(), |v| fixed(v, 0))
 }
 
 /// Smallest to largest value: the sign of a correlation may differ between maneuvers.
 fn range(values: &[f64]) -> String {
     match extent(values.iter().copied()).map(|(low, high)| (fixed(low, 2), fixed(high, 2))) {
-        None => NOTHING.to_owned(),
+        None => DASH.to_owned(),
         Some((low, high)) if low == high => low,
         Some((low, high)) => format!("{low} to {high}"),
     }
@@ -247,7 +247,7 @@ fn class_name(contents: &Contents, position: usize) -> String {
     contents
         .classes
         .get(position)
-        .map_or_else(|| NOTHING.to_owned(), |c| c.name.clone())
+        .map_or_else(|| DASH.to_owned(), |c| c.name.clone())
 }
 
 #[cfg(test)]

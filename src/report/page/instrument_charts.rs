@@ -1,5 +1,5 @@
-//! Charts of instruments whose errors change over the flights, are wrong in every flight, or are far from
-//! the others' in some.
+//! Charts of instruments whose errors change over the flights, are large in every flight, or are
+//! far from the others in some flights.
 
 use super::quality_charts::QualityChart;
 use crate::numerics::student::NORMAL_95;
@@ -50,7 +50,7 @@ fn chart(contents: &Contents, number: usize, trend: &InstrumentTrendRow) -> Opti
             y: (Some(mean - half), Some(mean + half)),
         }
     });
-    Some(QualityChart::of(&XyChart {
+    Some(QualityChart::from_chart(&XyChart {
         id: &id,
         title: &title,
         description: &caption,

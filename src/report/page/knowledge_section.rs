@@ -1,5 +1,5 @@
-//! Knowledge that flights have added: posterior standard deviations over those before flight, the basis for
-//! what to fly next.
+//! Information added by the flights: posterior standard deviations over the prior ones, the basis
+//! for what to fly next.
 
 use std::collections::BTreeMap;
 
@@ -18,7 +18,7 @@ use crate::tables::PosteriorRow;
 /// Number of derivatives that the answer names.
 const NAMED: usize = 5;
 
-/// The answer with its picture.
+/// Answer in sentences, with its charts.
 #[derive(Clone, Debug, Serialize)]
 pub struct KnowledgeSection {
     pub answer: String,
@@ -59,7 +59,7 @@ pub fn section(contents: &Contents) -> Option<KnowledgeSection> {
     })
 }
 
-/// Posterior standard deviation, percent of that before flight.
+/// Posterior standard deviation, percent of the prior one.
 fn left_pct(row: &PosteriorRow) -> Option<f64> {
     let left = 100.0 * row.standard_deviation / row.prior_deviation;
     left.is_finite().then_some(left)
@@ -78,7 +78,8 @@ fn medians(rows: &[(&PosteriorRow, f64)], axis: Axis) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Median of all, angle of attack at which flights taught least, and the derivatives of which they taught least.
+/// Answer in sentences: median over all derivatives, angle of attack with the largest remaining
+/// uncertainty, and derivatives with the largest remaining uncertainty.
 fn answer(
     contents: &Contents,
     rows: &[(&PosteriorRow, f64)],
@@ -141,7 +142,7 @@ fn chart(rows: &[(&PosteriorRow, f64)], axes: &[AxisMedians]) -> Option<QualityC
         points: marks.collect(),
         is_joined: false,
     };
-    Some(QualityChart::of(&XyChart {
+    Some(QualityChart::from_chart(&XyChart {
         id: "knowledge",
         title: "Uncertainty that flights have left",
         description: caption,

@@ -12,9 +12,7 @@ use crate::maneuver::{Maneuver, Status};
 use crate::proof_of_match::Matched;
 use crate::report::contents::{Contents, group_by};
 use crate::report::figure::legend::{self, LegendView};
-use crate::report::notation::{
-    self, Digits, NOTHING, angle, count, fixed, number, outcome_in_words,
-};
+use crate::report::notation::{self, DASH, Digits, angle, count, fixed, number, outcome_in_words};
 use crate::report::table_view::TableView;
 use crate::tables::{AgreementRow, EstimateRow, FitRow, History, MatchVerdict};
 
@@ -254,7 +252,7 @@ fn estimates(rows: &[&EstimateRow]) -> TableView {
 }
 
 fn estimate(row: &EstimateRow) -> Vec<String> {
-    let digits = Digits::of([row.value, row.wind_tunnel].into_iter().flatten(), 4);
+    let digits = Digits::for_values([row.value, row.wind_tunnel].into_iter().flatten(), 4);
     vec![
         row.derivative.clone(),
         notation::unit(&row.unit),
@@ -266,7 +264,7 @@ fn estimate(row: &EstimateRow) -> Vec<String> {
         second_opinion(row, &digits),
         number(row.variance_inflation, 2),
         row.contribution_pct
-            .map_or_else(|| NOTHING.to_owned(), |v| fixed(v, 0)),
+            .map_or_else(|| DASH.to_owned(), |v| fixed(v, 0)),
     ]
 }
 

@@ -6,7 +6,7 @@ use super::class_markers::ClassMarkers;
 use super::maneuver_page;
 use crate::maneuver::Maneuver;
 use crate::report::contents::Contents;
-use crate::report::notation::{NOTHING, fixed, number, outcome_in_words};
+use crate::report::notation::{DASH, fixed, number, outcome_in_words};
 use crate::report::table_view::TableView;
 use crate::tables::{FitRow, Outcome};
 
@@ -71,7 +71,7 @@ fn row(maneuver: &Maneuver, fits: &BTreeMap<&str, &FitRow>) -> Vec<String> {
         None => cells.extend(
             ["no fit"]
                 .into_iter()
-                .chain([NOTHING; 5])
+                .chain([DASH; 5])
                 .chain([""])
                 .map(str::to_owned),
         ),
@@ -93,7 +93,7 @@ fn fit_cells(fit: &FitRow) -> [String; 7] {
         number(fit.final_cost, 3),
         number(fit.condition_number, 3),
         fit.left_out
-            .map_or_else(|| NOTHING.to_owned(), |share| fixed(100.0 * share, 2)),
+            .map_or_else(|| DASH.to_owned(), |share| fixed(100.0 * share, 2)),
         reason,
     ]
 }

@@ -30,7 +30,7 @@ pub fn chart(contents: &Contents, model: ModelSource) -> Option<QualityChart> {
     let title = format!("Margin over angle of attack, {}", model.name());
     let caption = "One mark for each maneuver. 1 is a perfect match, 0 the limit; the shaded maneuvers \
                    are inside. Marks on the lower edge are at twice their tolerance or beyond.";
-    Some(QualityChart::of(&XyChart {
+    Some(QualityChart::from_chart(&XyChart {
         id: &id,
         title: &title,
         description: caption,

@@ -9,11 +9,11 @@ use super::maneuver_page;
 use super::match_charts;
 use super::quality_charts::QualityChart;
 use crate::report::contents::Contents;
-use crate::report::notation::{NOTHING, angle, count, fixed, number};
+use crate::report::notation::{DASH, angle, count, fixed, number};
 use crate::report::table_view::TableView;
 use crate::tables::{MatchRow, MatchVerdict, MatchVerdictRow, ModelSource};
 
-/// The section.
+/// Values of the section.
 #[derive(Clone, Debug, Serialize)]
 pub struct MatchSection {
     pub note: String,
@@ -23,7 +23,7 @@ pub struct MatchSection {
     pub tables: Vec<TableView>,
 }
 
-/// The section; `None` without tolerances or maneuvers.
+/// Makes the section; `None` without tolerances or maneuvers.
 #[must_use]
 pub fn section(contents: &Contents, markers: &ClassMarkers) -> Option<MatchSection> {
     let specification = contents.tolerances?;
@@ -60,7 +60,7 @@ fn flown_by<'a>(contents: &Contents<'a>, model: ModelSource) -> Vec<&'a MatchVer
     all.filter(is_flown).collect()
 }
 
-/// Words of a model.
+/// Name of a model in the report.
 fn words(model: ModelSource) -> &'static str {
     match model {
         ModelSource::Posterior => "the posterior",
@@ -70,7 +70,8 @@ fn words(model: ModelSource) -> &'static str {
     }
 }
 
-/// Number of maneuvers that a model reproduces now and if flown once more, and the farthest from it.
+/// Answer in sentences: number of maneuvers that a model reproduces, number expected if they were
+/// flown once more, and the maneuver farthest outside.
 fn answer(contents: &Contents, model: ModelSource) -> String {
     let flown = flown_by(contents, model);
     let inside = flown
@@ -129,7 +130,7 @@ fn closed_loop(flown: &[&MatchVerdictRow]) -> Option<String> {
     ))
 }
 
-/// Margin for comparison; that of a departure is the smallest.
+/// Margin for comparison; a departure has the smallest.
 fn size(margin: Option<f64>) -> f64 {
     margin.unwrap_or(f64::NEG_INFINITY)
 }
@@ -252,7 +253,7 @@ fn maneuver_row(
     } else {
         first.verdict.to_string()
     };
-    let nothing = || NOTHING.to_owned();
+    let nothing = || DASH.to_owned();
     let excess = decisive.and_then(|row| {
         Some(format!(
             "{} {}",
@@ -263,7 +264,7 @@ fn maneuver_row(
     let loop_ = match first.closed_loop {
         Some(1) => "closed",
         Some(_) => "open",
-        None => NOTHING,
+        None => DASH,
     };
     [
         first.maneuver_id.clone(),

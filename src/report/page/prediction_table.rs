@@ -3,7 +3,7 @@
 use crate::aero::Output;
 use crate::numerics::order_statistics::quantile;
 use crate::report::contents::Contents;
-use crate::report::notation::{NOTHING, fixed, number};
+use crate::report::notation::{DASH, fixed, number};
 use crate::report::table_view::TableView;
 use crate::tables::AgreementRow;
 
@@ -62,7 +62,7 @@ fn cells(class: &str, output: Output, predictions: &[&AgreementRow]) -> Vec<Stri
         number(median(predictions, |p| p.theil), 2),
         percent(median(predictions, |p| p.theil_bias)),
         percent(median(predictions, |p| p.theil_variance)),
-        median(predictions, |p| p.r_squared).map_or_else(|| NOTHING.to_owned(), |r| fixed(r, 3)),
+        median(predictions, |p| p.r_squared).map_or_else(|| DASH.to_owned(), |r| fixed(r, 3)),
         number(worst.map(|(u, _)| u), 2),
         worst.map_or_else(String::new, |(_, p)| {
             format!("{} (α {}°)", p.maneuver_id, fixed(p.alpha_deg, 0))
@@ -75,10 +75,7 @@ fn median(predictions: &[&AgreementRow], value: fn(&AgreementRow) -> Option<f64>
 }
 
 fn percent(share: Option<f64>) -> String {
-    share.map_or_else(
-        || NOTHING.to_owned(),
-        |s| format!("{} %", fixed(100.0 * s, 0)),
-    )
+    share.map_or_else(|| DASH.to_owned(), |s| format!("{} %", fixed(100.0 * s, 0)))
 }
 
 #[cfg(test)]

@@ -6,11 +6,11 @@ use super::quality_charts::{self, ALL, QualityChart};
 use crate::aero::Axis;
 use crate::qualities::{Qualities, Specification};
 use crate::report::contents::Contents;
-use crate::report::notation::{NOTHING, angle, fixed, number};
+use crate::report::notation::{DASH, angle, fixed, number};
 use crate::report::table_view::TableView;
 use crate::tables::{Airframe, FlyingQuality, Level, LevelRow, QualityRow};
 
-/// The section.
+/// Values of the section.
 #[derive(Clone, Debug, Serialize)]
 pub struct QualitiesSection {
     pub note: String,
@@ -52,7 +52,7 @@ const LATERAL: [(FlyingQuality, &str); 6] = [
     (FlyingQuality::RollSpiralDecay, "ζω of roll and spiral, 1/s"),
 ];
 
-/// The section; `None` without a specification or flown conditions.
+/// Makes the section; `None` without a specification or flown conditions.
 #[must_use]
 pub fn section(contents: &Contents) -> Option<QualitiesSection> {
     let specification = contents.specification?;
@@ -102,7 +102,7 @@ fn view(qualities: &Qualities, specification: &Specification, airframe: Airframe
     }
 }
 
-/// Angles of attack at multiples of the tables' spacing; all where there is none.
+/// Angles of attack at multiples of the tables' spacing; all angles if no multiple was judged.
 fn spaced(levels: &[&LevelRow]) -> Vec<f64> {
     let mut all: Vec<f64> = levels.iter().map(|row| row.alpha_deg).collect();
     all.dedup();
@@ -118,7 +118,8 @@ fn is_at(a: f64, b: f64) -> bool {
     (a - b).abs() < 1e-9
 }
 
-/// Level 1 with certainty, the most certain level elsewhere, and the paragraphs that fail most.
+/// Answer in sentences: angles of attack with Level 1 for certain, most probable level elsewhere,
+/// and the paragraph that fails most.
 fn answer(levels: &[&LevelRow]) -> String {
     let all: Vec<&&LevelRow> = levels.iter().filter(|row| row.paragraph == ALL).collect();
     let certain = |row: &&&&LevelRow, most: Level| {
@@ -175,7 +176,7 @@ fn level_table(levels: &[&LevelRow], alphas: &[f64]) -> TableView {
             let own = levels
                 .iter()
                 .find(|row| is_at(row.alpha_deg, *alpha) && row.paragraph == paragraph.paragraph);
-            own.map_or_else(|| NOTHING.to_owned(), |row| level_cell(row))
+            own.map_or_else(|| DASH.to_owned(), |row| level_cell(row))
         };
         let cells = paragraphs.iter().map(cell);
         std::iter::once(angle(*alpha)).chain(cells).collect()
@@ -241,7 +242,7 @@ fn mode_table(
 
 fn mode_cell(row: Option<&&QualityRow>) -> String {
     let Some(value) = row.and_then(|row| row.value) else {
-        return NOTHING.to_owned();
+        return DASH.to_owned();
     };
     let deviation = row.and_then(|row| row.standard_deviation);
     format!("{} ± {}", number(Some(value), 3), number(deviation, 2))

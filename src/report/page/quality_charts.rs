@@ -24,7 +24,7 @@ pub struct QualityChart {
 
 impl QualityChart {
     /// Draws a chart; its description is the caption.
-    pub fn of(chart: &XyChart) -> QualityChart {
+    pub fn from_chart(chart: &XyChart) -> QualityChart {
         QualityChart {
             anchor: format!("chart-{}", chart.id),
             title: chart.title.to_owned(),
@@ -104,7 +104,7 @@ fn probabilities(levels: &[&LevelRow], airframe: Airframe) -> Option<QualityChar
     let title = "Probability of a level or better";
     let caption = "Probability that every paragraph is met at Level 1, at Level 2 or better (2), at Level 3 or \
                    better (3).";
-    Some(QualityChart::of(&XyChart {
+    Some(QualityChart::from_chart(&XyChart {
         id: &id,
         title,
         description: caption,
@@ -195,7 +195,7 @@ impl PairChart {
         let id = format!("{}-{airframe}", self.id);
         let caption =
             "One point for each angle of attack, with its 95 % ellipse; boxes are levels.";
-        Some(QualityChart::of(&XyChart {
+        Some(QualityChart::from_chart(&XyChart {
             id: &id,
             title: self.title,
             description: caption,
@@ -333,7 +333,7 @@ fn locus(roots: &[&RootRow], axis: Axis, airframe: Airframe) -> Option<QualityCh
         },
         outline: vec![],
     };
-    Some(QualityChart::of(&XyChart {
+    Some(QualityChart::from_chart(&XyChart {
         id: &id,
         title,
         description: &caption,

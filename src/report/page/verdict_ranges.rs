@@ -1,6 +1,6 @@
 //! Verdicts of one derivative over angle of attack: neighbours with the same verdict as a range.
 
-use crate::report::figure::verdict_bar::Segment;
+use crate::report::figure::verdict_bar::BarSegment;
 use crate::report::notation::angle;
 use crate::tables::{ComparisonRow, TunnelVerdict};
 
@@ -64,10 +64,10 @@ pub fn ranges(rows: &[&ComparisonRow]) -> Vec<VerdictRange> {
 
 /// Segments of the bar that shows the ranges.
 #[must_use]
-pub fn bar_segments(ranges: &[VerdictRange]) -> Vec<Segment> {
+pub fn bar_segments(ranges: &[VerdictRange]) -> Vec<BarSegment> {
     ranges
         .iter()
-        .map(|range| Segment {
+        .map(|range| BarSegment {
             verdict: range.verdict,
             from_deg: range.left_deg,
             to_deg: range.right_deg,
@@ -75,7 +75,7 @@ pub fn bar_segments(ranges: &[VerdictRange]) -> Vec<Segment> {
         .collect()
 }
 
-/// More ranges than these are ordered by verdict, which is easier to read.
+/// Number of ranges above which they are ordered by verdict, which is easier to read.
 const MOST_RANGES: usize = 4;
 
 /// Ranges in words: `agrees 5°–25°, flight lower 30°–60°`.

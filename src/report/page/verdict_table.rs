@@ -10,12 +10,12 @@ use crate::aero::Axis;
 use crate::numerics::order_statistics::quantile;
 use crate::report::figure::scale::extent;
 use crate::report::figure::verdict_bar;
-use crate::report::notation::{self, NOTHING, angle, number};
+use crate::report::notation::{self, DASH, angle, number};
 
 /// Width of the bar of verdicts over angle of attack, px.
 const BAR_WIDTH: u32 = 130;
 
-/// Larger percentages are not printed: the reference value is close to zero.
+/// Largest percentage that is printed; beyond it the reference value is close to zero.
 pub const LARGEST_PERCENTAGE: f64 = 999.5;
 
 /// One row of the table.
@@ -111,7 +111,7 @@ fn largest_difference(derivative: &DerivativeResults) -> String {
         .filter_map(|row| Some((row, row.tunnel.difference.filter(|d| d.is_finite())?)));
     let largest = differences.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
     let Some((row, difference)) = largest else {
-        return NOTHING.to_owned();
+        return DASH.to_owned();
     };
     let percentage = row
         .tunnel
@@ -138,7 +138,7 @@ fn typical_bound(derivative: &DerivativeResults) -> String {
     let bounds: Vec<f64> = derivative.points.iter().map(|p| p.bound).collect();
     let sizes: Vec<f64> = derivative.points.iter().map(|p| p.value.abs()).collect();
     let (Some(bound), Some(size)) = (quantile(bounds, 0.5), quantile(sizes, 0.5)) else {
-        return NOTHING.to_owned();
+        return DASH.to_owned();
     };
     let percentage = 100.0 * bound / size;
     let percentage = if percentage < LARGEST_PERCENTAGE {

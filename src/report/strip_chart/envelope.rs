@@ -28,7 +28,7 @@ impl Columns {
         clippy::cast_sign_loss,
         reason = "between 0 and the number of columns"
     )]
-    fn at(self, time_s: f64) -> Option<usize> {
+    fn column_at(self, time_s: f64) -> Option<usize> {
         let share = (time_s - self.from_s) / (self.to_s - self.from_s);
         let last = self.count.checked_sub(1)?;
         (0.0..=1.0)
@@ -90,7 +90,7 @@ pub fn envelope(signal: SampledSignal, columns: Columns) -> Vec<Vec<(f64, f64)>>
     let mut gap = false;
     for (k, &value) in signal.values.iter().enumerate() {
         let time_s = signal.start_s + k as f64 * signal.step_s;
-        let Some(column) = columns.at(time_s) else {
+        let Some(column) = columns.column_at(time_s) else {
             continue;
         };
         if !value.is_finite() {
@@ -138,7 +138,7 @@ pub fn flagged_spans(
     let marked = series.marks.iter().enumerate().filter(|(_, m)| **m == mark);
     let times = marked
         .map(|(k, _)| start_s + k as f64 * step_s)
-        .filter(|t| columns.at(*t).is_some());
+        .filter(|t| columns.column_at(*t).is_some());
     let mut spans: Vec<(f64, f64)> = Vec::new();
     for time_s in times {
         match spans.last_mut() {
@@ -236,7 +236,7 @@ mod tests {
             let drawn = envelope(signal, COLUMNS).concat();
             for column in 0..COLUMNS.count {
                 let time = |k: usize| k as f64 * signal.step_s;
-                let inside = |t: f64| COLUMNS.at(t) == Some(column);
+                let inside = |t: f64| COLUMNS.column_at(t) == Some(column);
                 let of_signal = (0..values.len()).filter(|k| inside(time(*k)) && values[*k].is_finite()).map(|k| values[k]);
                 let of_line: Vec<f64> = drawn.iter().filter(|p| inside(p.0)).map(|p| p.1).collect();
                 prop_assert!(of_line.len() <= 2);

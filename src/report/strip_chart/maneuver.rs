@@ -17,10 +17,10 @@ use crate::units::Unit;
 /// Time shown before and after a maneuver, s: the trimmed flight that it starts from, and the decay
 /// after it.
 const AROUND_S: f64 = 4.0;
-/// An input that moves less than this share of its smallest step is not drawn.
+/// Share of an input's smallest step below which its movement is not drawn.
 const SMALLEST_SHARE_OF_STEP: f64 = 0.5;
-/// An input without a smallest step is not drawn if it moves less than this share of the most moved
-/// one in the same unit.
+/// Share of the largest movement in the same unit below which an input without a smallest step is
+/// not drawn.
 const SMALLEST_SHARE_OF_LARGEST: f64 = 0.1;
 
 /// A maneuver with its estimation.

@@ -49,7 +49,7 @@ const OUTPUT: StripStyle = StripStyle {
     steps: 3.0,
     ..INPUT
 };
-/// Wide, so that it is seen behind the computed response.
+/// Style of a measured signal: wide, so that it is seen behind the computed response.
 const MEASURED: StripStyle = StripStyle {
     colour: MEASURED_COLOUR,
     width: 2.6,
