@@ -6,10 +6,11 @@ use super::assignment::{Assignment, Candidates, Search};
 use super::certainty::verdict;
 use super::clock::{ClockColumn, find_clock};
 use super::grid::Grid;
-use super::inputs::{InputColumn, inputs, kind_of, moves, rate, step_size};
+use super::inputs::{InputColumn, inputs, kind_of, rate};
 use super::plausible::{ColumnFacts, candidates, facts};
 use super::quantity::Quantity;
 use super::recording::Recording;
+use super::steps::{Excursions, Step, steps};
 use super::vocabulary::meanings;
 use crate::flight::signal;
 use crate::units::{self, Unit};
@@ -48,7 +49,7 @@ pub struct Channel {
     pub range: (f64, f64),
     /// `true` for an input that moves in the recording.
     pub moves: bool,
-    /// Size of a step of an input, in the signal's unit.
+    /// Size of a step of an input, in the signal's unit; `None` if it only follows feedback.
     pub step: Option<f64>,
 }
 
@@ -184,48 +185,61 @@ impl Findings<'_> {
     }
 
     fn add_inputs(&mut self, inputs: &[InputColumn], grid: &Grid) {
-        for input in inputs {
+        let free = inputs.iter().filter_map(|input| {
             let own = self.facts.iter().find(|c| c.name == input.column);
-            let Some(facts) = own.filter(|c| self.is_free(c)) else {
-                continue;
-            };
-            let (unit, stated) = input_unit(facts, input);
-            let kept = if unit.quantity == units::Quantity::Number {
-                ""
-            } else {
-                suffix(unit)
-            };
-            let signal = self.free_name(&facts.spelling.words.join("_"), kept);
-            let factor = unit.factor_to(Unit::of_signal(&signal)).unwrap_or(1.0);
-            let step = step_size(grid, &facts.name).map(|step| rounded(step * factor));
-            let evidence = if stated {
-                input.evidence.clone()
-            } else {
-                format!("{}; its unit follows from its range alone", input.evidence)
-            };
-            let rate = rate(input.acts).signal();
-            let is_rate = |c: &&Channel| c.signal == rate;
-            let rate_is_sure = self
-                .channels
-                .iter()
-                .find(is_rate)
-                .is_some_and(|c| c.is_sure);
-            let evidence = if input.is_sure && !rate_is_sure {
-                format!("{evidence}; but {rate} is not sure")
-            } else {
-                evidence
-            };
-            let is_sure = input.is_sure && stated && rate_is_sure;
-            let (is_sure, evidence) = unless_unknown_unit(facts, is_sure, evidence);
-            self.channels.push(Channel {
-                unit: unit.name.to_owned(),
-                sign: input.sign,
-                is_sure,
-                evidence,
-                step,
-                moves: moves(grid, facts, input.kind),
-                ..Findings::plain(facts, signal, Role::Input(input.clone()))
-            });
+            Some((input, own.filter(|c| self.is_free(c))?))
+        });
+        let free: Vec<(&InputColumn, &ColumnFacts)> = free.collect();
+        let excursions = free.iter().map(|(input, facts)| {
+            let (unit, _) = input_unit(facts, input);
+            Excursions::of(grid, &input.column, input.kind, unit)
+        });
+        let excursions: Vec<Excursions> = excursions.collect();
+        let steps = steps(&excursions);
+        for (((input, facts), excursions), step) in free.into_iter().zip(&excursions).zip(&steps) {
+            let channel = self.input_channel(input, facts, (excursions.moves(), step));
+            self.channels.push(channel);
+        }
+    }
+
+    /// Channel of an input, which moves or not and has a step or not.
+    fn input_channel(
+        &self,
+        input: &InputColumn,
+        facts: &ColumnFacts,
+        (moves, step): (bool, &Step),
+    ) -> Channel {
+        let (unit, stated) = input_unit(facts, input);
+        let kept = if unit.quantity == units::Quantity::Number {
+            ""
+        } else {
+            suffix(unit)
+        };
+        let signal = self.free_name(&facts.spelling.words.join("_"), kept);
+        let factor = unit.factor_to(Unit::of_signal(&signal)).unwrap_or(1.0);
+        let mut evidence = input.evidence.clone();
+        if !stated {
+            evidence += "; its unit follows from its range alone";
+        }
+        let rate = rate(input.acts).signal();
+        let own_rate = self.channels.iter().find(|c| c.signal == rate);
+        let rate_is_sure = own_rate.is_some_and(|c| c.is_sure);
+        if input.is_sure && !rate_is_sure {
+            evidence = format!("{evidence}; but {rate} is not sure");
+        }
+        if let Some(why) = step.why_it_rests().filter(|_| moves) {
+            evidence = format!("{evidence}; {why}");
+        }
+        let is_sure = input.is_sure && stated && rate_is_sure;
+        let (is_sure, evidence) = unless_unknown_unit(facts, is_sure, evidence);
+        Channel {
+            unit: unit.name.to_owned(),
+            sign: input.sign,
+            is_sure,
+            evidence,
+            step: step.size().map(|size| rounded(size * factor)),
+            moves,
+            ..Findings::plain(facts, signal, Role::Input(input.clone()))
         }
     }
 
