@@ -659,3 +659,34 @@ fn recordings_of_one_axis_have_classes_of_this_axis_alone() {
         "{found:?}"
     );
 }
+
+#[test]
+fn a_required_signal_that_no_column_gives_is_a_question() {
+    let copy = Copy::new().without(&["altitude", "qbar", "alpha_vane"]);
+    let (inspection, _, _) = copy.judged();
+    let files = draft::files(&Draft {
+        name: "mine",
+        archive: "flights",
+        inspection: &inspection,
+    });
+    let aircraft = files
+        .iter()
+        .find(|file| file.path == "aircraft.yaml")
+        .unwrap();
+    for line in [
+        "\n  altitude_ft: FILL_IN # no column was found; density",
+        "\n  alpha_vane_deg: FILL_IN #",
+    ] {
+        assert!(
+            aircraft.text.contains(line),
+            "`{line}` is not in\n{}",
+            aircraft.text
+        );
+    }
+    // The airspeed and that altitude give the dynamic pressure.
+    assert!(
+        !aircraft.text.contains("qbar_psf: FILL_IN"),
+        "{}",
+        aircraft.text
+    );
+}
