@@ -690,3 +690,24 @@ fn a_required_signal_that_no_column_gives_is_a_question() {
         aircraft.text
     );
 }
+
+#[test]
+fn recordings_of_another_format_are_answered_with_the_command_that_imports_them() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("recordings")).unwrap();
+    fs::write(folder.path().join("recordings/x.csv"), "t,q\n0,1\n0.1,2\n").unwrap();
+    for place in ["recordings/x.csv", "recordings"] {
+        let mut command = harvest();
+        command
+            .current_dir(folder.path())
+            .args(["init", "mine", "--from", place]);
+        let outcome = run(&mut command);
+        assert_eq!(outcome.code, Some(1));
+        for words in [
+            format!("`harvest import {place} --to data/mine/flights`"),
+            "`harvest init mine --from data/mine/flights`".to_owned(),
+        ] {
+            assert!(outcome.stderr.contains(&words), "{}", outcome.stderr);
+        }
+    }
+}
