@@ -13,9 +13,14 @@ fn signals(config: &Config) -> impl Iterator<Item = &str> + Clone {
         .chain(config.constants.keys().map(String::as_str))
 }
 
+/// `true` for a signal of a channel or a constant.
+pub(super) fn is_given(config: &Config, name: &str) -> bool {
+    signals(config).any(|signal| signal == name)
+}
+
 /// Refuses a signal that neither a channel nor a constant gives; `user` names what needs it.
 pub(super) fn known_signal(config: &Config, source: &Source, name: &str, user: &str) -> Result<()> {
-    if signals(config).any(|s| s == name) {
+    if is_given(config, name) {
         return Ok(());
     }
     let near = did_you_mean(name, signals(config));
