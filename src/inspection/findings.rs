@@ -29,7 +29,7 @@ pub enum Role {
     Input(InputColumn),
     /// Column with no values but zero and one.
     Flag,
-    /// Mass, inertias, centre of gravity, engines.
+    /// Mass, inertias, centre of gravity, engines, temperature of the air.
     Constant,
 }
 
@@ -259,22 +259,25 @@ impl Findings<'_> {
         let others = signal::REQUIRED
             .iter()
             .filter(|name| Quantity::of_signal(name).is_none());
-        for name in others {
+        for name in others.chain([&signal::AIR_TEMPERATURE]) {
             let weight = |facts: &ColumnFacts| {
                 let meanings = meanings(&facts.spelling);
                 meanings.into_iter().find(|m| m.0 == *name).map(|m| m.1)
             };
             let target = Unit::of_signal(name);
             let converts =
-                |facts: &&ColumnFacts| facts.unit.is_none_or(|u| u.factor_to(target).is_some());
+                |facts: &&ColumnFacts| facts.unit.is_none_or(|u| u.conversion_to(target).is_some());
             let free = self
                 .facts
                 .iter()
                 .filter(|c| self.is_free(c) && c.range.is_some());
             let named = free.filter(converts).filter_map(|c| Some((weight(c)?, c)));
-            if let Some((_, facts)) = named.max_by(|a, b| a.0.total_cmp(&b.0)) {
-                self.channels.push(constant_channel(facts, name));
-            }
+            let named = named.max_by(|a, b| a.0.total_cmp(&b.0));
+            let channel = named.and_then(|(_, facts)| match *name {
+                signal::AIR_TEMPERATURE => temperature_channel(facts),
+                name => Some(constant_channel(facts, name)),
+            });
+            self.channels.extend(channel);
         }
     }
 
@@ -369,6 +372,9 @@ fn reason(facts: &ColumnFacts, candidates: &Candidates, assignment: &Assignment)
             format!("it may be {signal}, but is constant")
         }
         (None, Some(signal)) => format!("it may be {signal}, but its range or unit does not fit"),
+        (None, None) if facts.spelling.has("fuel") && !facts.spelling.has("flow") => {
+            "with the empty mass it gives mass_slug by a formula (docs/recorder.md)".to_owned()
+        }
         (None, None) if kind_of(facts).is_some() => {
             "an input; nothing can be inferred from it".to_owned()
         }
@@ -401,6 +407,44 @@ fn constant_channel(facts: &ColumnFacts, name: &str) -> Channel {
         evidence,
         ..Findings::plain(facts, name.to_owned(), Role::Constant)
     }
+}
+
+/// Temperatures of the air from the ground to the stratosphere, K.
+const AIR_KELVIN: std::ops::Range<f64> = 180.0..335.0;
+
+/// Channel of the temperature of the air; `None` for values that no air has. Without a stated unit it is
+/// the unit that fits.
+fn temperature_channel(facts: &ColumnFacts) -> Option<Channel> {
+    let (low, high) = facts.range?;
+    let kelvin = Unit::of_signal(signal::AIR_TEMPERATURE);
+    let is_of_air = |unit: &Unit| {
+        let conversion = unit.conversion_to(kelvin);
+        conversion.is_some_and(|to| [low, high].iter().all(|v| AIR_KELVIN.contains(&to.of(*v))))
+    };
+    let usual = ["K", "degC"]
+        .into_iter()
+        .filter_map(|name| Unit::parse(name).ok());
+    let unit = facts
+        .unit
+        .into_iter()
+        .chain(usual.filter(|_| facts.unit.is_none()))
+        .find(is_of_air)?;
+    let is_static = facts.spelling.joined() == "sat" || facts.spelling.joined().contains("static");
+    let (is_sure, evidence) = match (facts.unit.is_some(), is_static) {
+        (true, true) => (true, "its name and its stated unit"),
+        (true, false) => (
+            false,
+            "its name and its stated unit; a probe may read the total temperature",
+        ),
+        (false, _) => (false, "its name; its unit follows from its range alone"),
+    };
+    let (is_sure, evidence) = unless_unknown_unit(facts, is_sure, evidence.to_owned());
+    Some(Channel {
+        unit: unit.name.to_owned(),
+        is_sure,
+        evidence,
+        ..Findings::plain(facts, signal::AIR_TEMPERATURE.to_owned(), Role::Constant)
+    })
 }
 
 /// A verdict, marked as unsure if the file states a unit that harvest does not have.

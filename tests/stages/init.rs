@@ -595,6 +595,8 @@ fn surfaces_without_units_are_inputs_and_check_asks_for_what_no_recording_has() 
     assert!(open.stderr.contains("12 lines have"), "{}", open.stderr);
     let aircraft = pipeline.join("aircraft.yaml");
     let text = fs::read_to_string(&aircraft).unwrap();
+    let air = "\n  OAT: { signal: air_kelvin, unit: degC } # unsure:";
+    assert!(text.contains(air), "{text}");
     let text = text.replace("wing_area_ft2: FILL_IN", "wing_area_ft2: 80");
     fs::write(&aircraft, text.replace("FILL_IN", "10")).unwrap();
     let right = command(&["check", "nv"]);
