@@ -215,11 +215,27 @@ fn factor(written: &str) -> Result<Regressor, String> {
     part(written)
 }
 
+/// Spelling of the square or the magnitude that another spelling means.
+fn meant(written: &str) -> Option<String> {
+    let is_name = |name: &&str| {
+        let all = |c: char| c.is_alphanumeric() || c == '_';
+        !name.is_empty() && name.chars().all(all)
+    };
+    let square = ["^2", "²"].iter().find_map(|end| written.strip_suffix(end));
+    let square = square.map(str::trim).filter(is_name);
+    let inner = written.strip_prefix('|').and_then(|w| w.strip_suffix('|'));
+    let magnitude = inner.map(str::trim).filter(is_name);
+    let square = square.map(|name| format!("{name} * {name}"));
+    square.or_else(|| magnitude.map(|name| format!("abs({name})")))
+}
+
 fn part(written: &str) -> Result<Regressor, String> {
     let is_name = |c: char| c.is_alphanumeric() || c == '_';
     if written.is_empty() || !written.chars().all(is_name) {
+        let meant = meant(written).map(|meant| format!("; did you mean `{meant}`?"));
         return Err(format!(
-            "`{written}` is no regressor; a factor is a name or `abs(name)`"
+            "`{written}` is no regressor; a factor is a name or `abs(name)`{}",
+            meant.unwrap_or_default()
         ));
     }
     Ok(match written {

@@ -59,6 +59,9 @@ pub fn check(options: &Options) -> anyhow::Result<ExitCode> {
     for absence in config.absences() {
         out!("without    {absence}");
     }
+    for column in &config.unused_columns {
+        out!("note       channel `{column}`: it has no `signal`, and no formula uses it");
+    }
     let of_hold = config.estimate.hold.warning().map(str::to_owned);
     for warning in of_hold.into_iter().chain(config.buildup.lag_warning()) {
         out!("note       {warning}");

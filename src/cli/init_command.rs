@@ -63,10 +63,12 @@ pub fn init(options: &InitOptions) -> anyhow::Result<ExitCode> {
     for column in &inspection.unused {
         out!("no signal  {}: {}", column.column, column.reason);
     }
-    let has_input = |channel: &Channel| matches!(channel.role, Role::Input(_)) && channel.moves;
+    let has_input = |channel: &Channel| {
+        matches!(channel.role, Role::Input(_)) && channel.moves && channel.step.is_some()
+    };
     if !inspection.channels.iter().any(has_input) {
         out!(
-            "no input   no surface or control that moves was found, so there is no maneuver class: give the columns names \
+            "no input   no surface or control that steps was found, so there is no maneuver class: give the columns names \
              such as elevator, aileron, rudder, and start again, or write the lines and classes yourself, as in \
              pipelines/navion"
         );

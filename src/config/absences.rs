@@ -43,15 +43,25 @@ impl Config {
         ))
     }
 
+    /// One line for all absent signals that cost the same.
     fn absent_signals(&self) -> Vec<String> {
         let required = signal::REQUIRED.iter().copied();
         let lacking = required.filter(|signal| !self.has_signal(signal));
-        let line = |signal: &str| {
-            let stand_in = StandIn::of(signal, |other| self.has_signal(other))?;
-            let (words, cost) = (stand_in.in_words(), cost(signal));
-            Some(format!("no `{signal}`: it {words}; {cost}"))
-        };
-        let mut lines: Vec<String> = lacking.filter_map(line).collect();
+        // Without a rotor's inertia its speed has no effect.
+        let has_rotors = self.aircraft.engine_inertia_slug_ft2 > 0.0;
+        let is_rotor = |signal: &str| [signal::RPM_LEFT, signal::RPM_RIGHT].contains(&signal);
+        let mut costs: Vec<(&str, Vec<(&str, String)>)> = Vec::new();
+        for signal in lacking.filter(|signal| has_rotors || !is_rotor(signal)) {
+            let Some(stand_in) = StandIn::of(signal, |other| self.has_signal(other)) else {
+                continue;
+            };
+            let (own, absent) = (cost(signal), (signal, stand_in.in_words()));
+            match costs.iter_mut().find(|(cost, _)| *cost == own) {
+                Some((_, signals)) => signals.push(absent),
+                None => costs.push((own, vec![absent])),
+            }
+        }
+        let mut lines: Vec<String> = costs.iter().map(|(cost, s)| absence(s, cost)).collect();
         if !self.has_signal(signal::PSI) {
             lines.push(format!("no `{}`: {}", signal::PSI, cost(signal::PSI)));
         }
@@ -93,5 +103,56 @@ impl Config {
              flying with steps may be taken for a maneuver"
                 .to_owned()
         })
+    }
+}
+
+/// Line of absent signals, each with its stand-in in words, that cost the same.
+fn absence(signals: &[(&str, String)], cost: &str) -> String {
+    let names: Vec<String> = signals
+        .iter()
+        .map(|(name, _)| format!("`{name}`"))
+        .collect();
+    let stand_ins = match signals {
+        [(_, words)] => format!("it {words}"),
+        [(_, first), others @ ..] if others.iter().all(|(_, words)| words == first) => {
+            format!("each {first}")
+        }
+        _ => {
+            let own = signals
+                .iter()
+                .map(|(name, words)| format!("`{name}` {words}"));
+            own.collect::<Vec<_>>().join(", ")
+        }
+    };
+    format!("no {}: {stand_ins}; {cost}", names.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn signals_that_cost_the_same_share_a_line() {
+        let absent = |name, words: &str| (name, words.to_owned());
+        let (p, r) = (
+            absent("p_deg_s", "is taken as 0"),
+            absent("r_deg_s", "is taken as 0"),
+        );
+        assert_eq!(
+            absence(std::slice::from_ref(&p), "much"),
+            "no `p_deg_s`: it is taken as 0; much"
+        );
+        assert_eq!(
+            absence(&[p, r], "much"),
+            "no `p_deg_s`, `r_deg_s`: each is taken as 0; much"
+        );
+        let others = [
+            absent("q_deg_s", "is taken as 0"),
+            absent("an_g", "is taken as 1"),
+        ];
+        assert_eq!(
+            absence(&others, "much"),
+            "no `q_deg_s`, `an_g`: `q_deg_s` is taken as 0, `an_g` is taken as 1; much"
+        );
     }
 }

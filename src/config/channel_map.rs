@@ -24,7 +24,6 @@ pub fn channels(
             channels.insert(name.clone(), channel);
         }
     }
-    map.find_unused(&channels)?;
     Ok(channels)
 }
 
@@ -115,17 +114,19 @@ impl ChannelMap<'_> {
             factor: sign * scale,
         })
     }
+}
 
-    /// Refuses a column without a signal that no formula uses.
-    fn find_unused(&self, channels: &BTreeMap<String, Channel>) -> Result<()> {
-        let formulas = channels.values().filter_map(|c| c.formula.as_ref());
-        let operands = formulas.flat_map(Formula::operands);
-        let used: BTreeSet<&str> = operands.map(|operand| operand.column.as_str()).collect();
-        let mut lines = self.lines.iter();
-        let unused =
-            lines.find(|(name, line)| line.signal.is_none() && !used.contains(name.as_str()));
-        unused.map_or(Ok(()), |(name, _)| {
-            Err(self.error(name, "it has no `signal`, and no formula uses it"))
-        })
-    }
+/// Columns without a signal that no formula of the channels uses.
+pub fn unused(
+    lines: &BTreeMap<String, ChannelLine>,
+    channels: &BTreeMap<String, Channel>,
+) -> Vec<String> {
+    let formulas = channels.values().filter_map(|c| c.formula.as_ref());
+    let operands = formulas.flat_map(Formula::operands);
+    let used: BTreeSet<&str> = operands.map(|operand| operand.column.as_str()).collect();
+    let is_unused = |(name, line): &(&String, &ChannelLine)| {
+        line.signal.is_none() && !used.contains(name.as_str())
+    };
+    let unused = lines.iter().filter(is_unused);
+    unused.map(|(name, _)| name.clone()).collect()
 }

@@ -34,6 +34,8 @@ pub struct Config {
     pub reports: PathBuf,
     pub aircraft: Aircraft,
     pub channels: BTreeMap<String, Channel>,
+    /// Columns of the channel map that give no signal, and that no formula uses.
+    pub unused_columns: Vec<String>,
     pub constants: BTreeMap<String, f64>,
     pub buildup: Buildup,
     pub tunnel: WindTunnel,

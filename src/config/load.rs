@@ -90,6 +90,7 @@ impl Config {
         let proof = files.proof_of_match()?;
         let match_database = proof.as_ref().and_then(|proof| proof.database.as_deref());
         let match_database = read_tables(match_database)?;
+        let channels = channel_map::channels(&aircraft.channels, &files.aircraft)?;
         let config = Config {
             tunnel,
             held_at_nothing,
@@ -102,7 +103,8 @@ impl Config {
             reports: places::in_folder(reports, "reports are published in a folder")?,
             name,
             aircraft: aircraft.aircraft,
-            channels: channel_map::channels(&aircraft.channels, &files.aircraft)?,
+            unused_columns: channel_map::unused(&aircraft.channels, &channels),
+            channels,
             constants: aircraft.constants,
             buildup,
             classes,

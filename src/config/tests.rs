@@ -396,11 +396,6 @@ fn a_formula_is_checked_for_columns_and_units() {
             "a formula has no `unit`",
         ),
         (
-            "  RHO: { unit: kg/m3 }\n  qbar: { signal: qbar_psf, unit: lbf/ft2 }",
-            0,
-            "channel `RHO`: it has no `signal`, and no formula uses it",
-        ),
-        (
             "  RHO: { unit: kg/m3, sign: -2 }\n  qbar: { signal: qbar_psf, formula: RHO * V^2 }",
             1,
             "`RHO`: sign is 1 or -1, and scale is greater than zero",
@@ -471,6 +466,61 @@ fn a_constant_is_a_source_too() {
     let e = copy.error();
     assert!(e.starts_with("aircraft.yaml:"), "{e}");
     assert!(e.ends_with(": signal `mass_slug` has two sources"), "{e}");
+}
+
+#[test]
+fn a_column_that_nothing_uses_is_listed() {
+    let copy = Copy::new();
+    let qbar = "  qbar: { signal: qbar_psf, unit: lbf/ft2 }";
+    copy.spoil(
+        "aircraft.yaml",
+        qbar,
+        &format!("  OAT: {{ unit: degC }}\n{qbar}"),
+    );
+    let config = copy.load(Overrides::default()).unwrap();
+    assert_eq!(config.unused_columns, ["OAT"]);
+}
+
+#[test]
+fn a_regressor_in_another_spelling_is_answered_with_harvest_s() {
+    for (written, meant) in [
+        ("alpha^2", "alpha * alpha"),
+        ("\"|alpha|\"", "abs(alpha)"),
+        ("V", "velocity_ft_s"),
+    ] {
+        let copy = Copy::new();
+        copy.spoil(
+            "model.yaml",
+            "name: CN_dlef,   coefficient: CN, regressor: dlef_deg",
+            &format!("name: CN_dlef,   coefficient: CN, regressor: {written}"),
+        );
+        let error = copy.error();
+        assert!(
+            error.ends_with(&format!("did you mean `{meant}`?")),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn a_required_signal_without_a_source_has_its_remedies() {
+    let copy = Copy::new();
+    let lines = [
+        "  an: { signal: an_g, unit: g }\n",
+        "  phi: { signal: phi_deg, unit: deg }\n",
+    ];
+    for line in lines {
+        copy.spoil("aircraft.yaml", line, "");
+    }
+    let error = copy.error();
+    for words in [
+        "gives the signal `phi_deg`: give a line",
+        "formula",
+        "all of `q_deg_s`",
+    ] {
+        assert!(error.contains(words), "`{words}` is not in {error}");
+    }
+    assert!(!error.contains("did you mean"), "{error}");
 }
 
 #[test]

@@ -6,10 +6,11 @@ use super::assignment::{Assignment, Candidates, Search};
 use super::certainty::verdict;
 use super::clock::{ClockColumn, find_clock};
 use super::grid::Grid;
-use super::inputs::{InputColumn, inputs, kind_of, moves, rate, step_size};
+use super::inputs::{InputColumn, inputs, kind_of, rate};
 use super::plausible::{ColumnFacts, candidates, facts};
 use super::quantity::Quantity;
 use super::recording::Recording;
+use super::steps::{Excursions, Step, steps};
 use super::vocabulary::meanings;
 use crate::flight::signal;
 use crate::units::{self, Unit};
@@ -28,7 +29,7 @@ pub enum Role {
     Input(InputColumn),
     /// Column with no values but zero and one.
     Flag,
-    /// Mass, inertias, centre of gravity, engines.
+    /// Mass, inertias, centre of gravity, engines, temperature of the air.
     Constant,
 }
 
@@ -48,7 +49,7 @@ pub struct Channel {
     pub range: (f64, f64),
     /// `true` for an input that moves in the recording.
     pub moves: bool,
-    /// Size of a step of an input, in the signal's unit.
+    /// Size of a step of an input, in the signal's unit; `None` if it only follows feedback.
     pub step: Option<f64>,
 }
 
@@ -184,48 +185,61 @@ impl Findings<'_> {
     }
 
     fn add_inputs(&mut self, inputs: &[InputColumn], grid: &Grid) {
-        for input in inputs {
+        let free = inputs.iter().filter_map(|input| {
             let own = self.facts.iter().find(|c| c.name == input.column);
-            let Some(facts) = own.filter(|c| self.is_free(c)) else {
-                continue;
-            };
-            let (unit, stated) = input_unit(facts, input);
-            let kept = if unit.quantity == units::Quantity::Number {
-                ""
-            } else {
-                suffix(unit)
-            };
-            let signal = self.free_name(&facts.spelling.words.join("_"), kept);
-            let factor = unit.factor_to(Unit::of_signal(&signal)).unwrap_or(1.0);
-            let step = step_size(grid, &facts.name).map(|step| rounded(step * factor));
-            let evidence = if stated {
-                input.evidence.clone()
-            } else {
-                format!("{}; its unit follows from its range alone", input.evidence)
-            };
-            let rate = rate(input.acts).signal();
-            let is_rate = |c: &&Channel| c.signal == rate;
-            let rate_is_sure = self
-                .channels
-                .iter()
-                .find(is_rate)
-                .is_some_and(|c| c.is_sure);
-            let evidence = if input.is_sure && !rate_is_sure {
-                format!("{evidence}; but {rate} is not sure")
-            } else {
-                evidence
-            };
-            let is_sure = input.is_sure && stated && rate_is_sure;
-            let (is_sure, evidence) = unless_unknown_unit(facts, is_sure, evidence);
-            self.channels.push(Channel {
-                unit: unit.name.to_owned(),
-                sign: input.sign,
-                is_sure,
-                evidence,
-                step,
-                moves: moves(grid, facts, input.kind),
-                ..Findings::plain(facts, signal, Role::Input(input.clone()))
-            });
+            Some((input, own.filter(|c| self.is_free(c))?))
+        });
+        let free: Vec<(&InputColumn, &ColumnFacts)> = free.collect();
+        let excursions = free.iter().map(|(input, facts)| {
+            let (unit, _) = input_unit(facts, input);
+            Excursions::of(grid, &input.column, input.kind, unit)
+        });
+        let excursions: Vec<Excursions> = excursions.collect();
+        let steps = steps(&excursions);
+        for (((input, facts), excursions), step) in free.into_iter().zip(&excursions).zip(&steps) {
+            let channel = self.input_channel(input, facts, (excursions.moves(), step));
+            self.channels.push(channel);
+        }
+    }
+
+    /// Channel of an input, which moves or not and has a step or not.
+    fn input_channel(
+        &self,
+        input: &InputColumn,
+        facts: &ColumnFacts,
+        (moves, step): (bool, &Step),
+    ) -> Channel {
+        let (unit, stated) = input_unit(facts, input);
+        let kept = if unit.quantity == units::Quantity::Number {
+            ""
+        } else {
+            suffix(unit)
+        };
+        let signal = self.free_name(&facts.spelling.words.join("_"), kept);
+        let factor = unit.factor_to(Unit::of_signal(&signal)).unwrap_or(1.0);
+        let mut evidence = input.evidence.clone();
+        if !stated {
+            evidence += "; its unit follows from its range alone";
+        }
+        let rate = rate(input.acts).signal();
+        let own_rate = self.channels.iter().find(|c| c.signal == rate);
+        let rate_is_sure = own_rate.is_some_and(|c| c.is_sure);
+        if input.is_sure && !rate_is_sure {
+            evidence = format!("{evidence}; but {rate} is not sure");
+        }
+        if let Some(why) = step.why_it_rests().filter(|_| moves) {
+            evidence = format!("{evidence}; {why}");
+        }
+        let is_sure = input.is_sure && stated && rate_is_sure;
+        let (is_sure, evidence) = unless_unknown_unit(facts, is_sure, evidence);
+        Channel {
+            unit: unit.name.to_owned(),
+            sign: input.sign,
+            is_sure,
+            evidence,
+            step: step.size().map(|size| rounded(size * factor)),
+            moves,
+            ..Findings::plain(facts, signal, Role::Input(input.clone()))
         }
     }
 
@@ -245,22 +259,25 @@ impl Findings<'_> {
         let others = signal::REQUIRED
             .iter()
             .filter(|name| Quantity::of_signal(name).is_none());
-        for name in others {
+        for name in others.chain([&signal::AIR_TEMPERATURE]) {
             let weight = |facts: &ColumnFacts| {
                 let meanings = meanings(&facts.spelling);
                 meanings.into_iter().find(|m| m.0 == *name).map(|m| m.1)
             };
             let target = Unit::of_signal(name);
             let converts =
-                |facts: &&ColumnFacts| facts.unit.is_none_or(|u| u.factor_to(target).is_some());
+                |facts: &&ColumnFacts| facts.unit.is_none_or(|u| u.conversion_to(target).is_some());
             let free = self
                 .facts
                 .iter()
                 .filter(|c| self.is_free(c) && c.range.is_some());
             let named = free.filter(converts).filter_map(|c| Some((weight(c)?, c)));
-            if let Some((_, facts)) = named.max_by(|a, b| a.0.total_cmp(&b.0)) {
-                self.channels.push(constant_channel(facts, name));
-            }
+            let named = named.max_by(|a, b| a.0.total_cmp(&b.0));
+            let channel = named.and_then(|(_, facts)| match *name {
+                signal::AIR_TEMPERATURE => temperature_channel(facts),
+                name => Some(constant_channel(facts, name)),
+            });
+            self.channels.extend(channel);
         }
     }
 
@@ -355,6 +372,9 @@ fn reason(facts: &ColumnFacts, candidates: &Candidates, assignment: &Assignment)
             format!("it may be {signal}, but is constant")
         }
         (None, Some(signal)) => format!("it may be {signal}, but its range or unit does not fit"),
+        (None, None) if facts.spelling.has("fuel") && !facts.spelling.has("flow") => {
+            "with the empty mass it gives mass_slug by a formula (docs/recorder.md)".to_owned()
+        }
         (None, None) if kind_of(facts).is_some() => {
             "an input; nothing can be inferred from it".to_owned()
         }
@@ -387,6 +407,44 @@ fn constant_channel(facts: &ColumnFacts, name: &str) -> Channel {
         evidence,
         ..Findings::plain(facts, name.to_owned(), Role::Constant)
     }
+}
+
+/// Temperatures of the air from the ground to the stratosphere, K.
+const AIR_KELVIN: std::ops::Range<f64> = 180.0..335.0;
+
+/// Channel of the temperature of the air; `None` for values that no air has. Without a stated unit it is
+/// the unit that fits.
+fn temperature_channel(facts: &ColumnFacts) -> Option<Channel> {
+    let (low, high) = facts.range?;
+    let kelvin = Unit::of_signal(signal::AIR_TEMPERATURE);
+    let is_of_air = |unit: &Unit| {
+        let conversion = unit.conversion_to(kelvin);
+        conversion.is_some_and(|to| [low, high].iter().all(|v| AIR_KELVIN.contains(&to.of(*v))))
+    };
+    let usual = ["K", "degC"]
+        .into_iter()
+        .filter_map(|name| Unit::parse(name).ok());
+    let unit = facts
+        .unit
+        .into_iter()
+        .chain(usual.filter(|_| facts.unit.is_none()))
+        .find(is_of_air)?;
+    let is_static = facts.spelling.joined() == "sat" || facts.spelling.joined().contains("static");
+    let (is_sure, evidence) = match (facts.unit.is_some(), is_static) {
+        (true, true) => (true, "its name and its stated unit"),
+        (true, false) => (
+            false,
+            "its name and its stated unit; a probe may read the total temperature",
+        ),
+        (false, _) => (false, "its name; its unit follows from its range alone"),
+    };
+    let (is_sure, evidence) = unless_unknown_unit(facts, is_sure, evidence.to_owned());
+    Some(Channel {
+        unit: unit.name.to_owned(),
+        is_sure,
+        evidence,
+        ..Findings::plain(facts, signal::AIR_TEMPERATURE.to_owned(), Role::Constant)
+    })
 }
 
 /// A verdict, marked as unsure if the file states a unit that harvest does not have.

@@ -1,21 +1,16 @@
 //! Surfaces, pilot controls and flags of a recording: their signs from the motion that they cause.
 
-use std::ops::Range;
-
 use super::assignment::Assignment;
 use super::effects::{Effect, Regression, effects};
 use super::grid::Grid;
 use super::plausible::ColumnFacts;
 use super::quantity::Quantity;
 use super::vocabulary::{Input, input, is_derived, meanings};
-use crate::numerics::order_statistics::quantile;
 use crate::units;
 
 /// Least significance of an effect that determines a sign. Residuals are coloured, so the standard
 /// errors are several times too small.
 const TELLS_SIGN: f64 = 12.0;
-/// Range of a surface that moves, deg.
-const MOVES_DEG: f64 = 0.5;
 /// Time over which a pilot control acts, in steps of the grid.
 const CONTROL_STEPS: usize = 3;
 
@@ -330,55 +325,6 @@ fn slopes(grid: &Grid, values: &[f64], steps: usize) -> Vec<f64> {
     slopes
 }
 
-/// Share of the samples beyond an input's range, and of the changes beyond its quickest one, that
-/// are ignored.
-const RARELY: f64 = 0.002;
-/// Longest time that is ignored as rare, s: in hours of recording a single maneuver moves its
-/// surfaces for longer.
-const RARELY_S: f64 = 0.5;
-
-/// Share of the samples of a grid that are rare.
-fn rare_share(grid: &Grid) -> f64 {
-    let samples: usize = grid.stretches.iter().map(Range::len).sum();
-    let duration_s = samples as f64 * grid.step_s;
-    RARELY.min(RARELY_S / duration_s)
-}
-
-/// `true` for a surface or a control that moves.
-#[must_use]
-pub fn moves(grid: &Grid, facts: &ColumnFacts, kind: Input) -> bool {
-    let values = || grid.columns.get(&facts.name).into_iter().flatten().copied();
-    let rarely = rare_share(grid);
-    let range = quantile(values(), 1.0 - rarely).zip(quantile(values(), rarely));
-    let is_in_radians = facts.unit.is_some_and(|unit| unit.name == "rad");
-    let least = match (kind.is_surface(), is_in_radians) {
-        (true, true) => MOVES_DEG.to_radians(),
-        (true, false) => MOVES_DEG,
-        (false, _) => 0.0,
-    };
-    range.is_some_and(|(high, low)| high - low > least)
-}
-
-/// Size of a step relative to the quickest change, so that the smallest of several inputs counts as
-/// well.
-const STEP_SHARE: f64 = 0.2;
-/// Steps of the grid in which a step happens.
-const STEP_TIME: usize = 3;
-
-/// Size of a step of an input in the unit recorded, to two digits.
-#[must_use]
-pub fn step_size(grid: &Grid, column: &str) -> Option<f64> {
-    let values = grid.columns.get(column)?;
-    let changes = grid.stretches.iter().flat_map(|stretch| {
-        let values = values.get(stretch.clone()).unwrap_or_default();
-        values
-            .windows(STEP_TIME + 1)
-            .map(|w| (w[STEP_TIME] - w[0]).abs())
-    });
-    let size = STEP_SHARE * quantile(changes, 1.0 - rare_share(grid))?;
-    (size > 0.0).then_some(size)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -423,20 +369,6 @@ mod tests {
         };
         let facts = facts(&[recording]).pop().expect("a column");
         (grid(&[("dsa", values)]), facts)
-    }
-
-    #[test]
-    fn a_surface_that_one_maneuver_of_a_campaign_steps_is_a_surface_that_moves() {
-        let (grid, dsa) = of_surface(surface(6.0));
-        assert!(moves(&grid, &dsa, Input::OtherSurface));
-        let step = step_size(&grid, "dsa").expect("a step");
-        assert!((0.7..=1.7).contains(&step), "{step}");
-    }
-
-    #[test]
-    fn a_surface_that_leaves_its_place_for_a_moment_rests() {
-        let (grid, dsa) = of_surface(surface(0.4));
-        assert!(!moves(&grid, &dsa, Input::OtherSurface));
     }
 
     #[test]

@@ -8,8 +8,8 @@
 //!
 //! In the order of use: `recording` (the input), `words` and `vocabulary` (names), `quantity`,
 //! `clock`, `grid` (one step for all columns), `plausible` (candidates), `equations`, `assignment`
-//! (the search, over `signs`), `certainty`, `effects` and `inputs` (surfaces and controls),
-//! `findings`, and `draft` (YAML).
+//! (the search, over `signs`), `certainty`, `effects` and `inputs` (surfaces and controls), `steps`
+//! (which of them step), `findings`, and `draft` (YAML).
 
 mod assignment;
 mod certainty;
@@ -24,6 +24,7 @@ mod plausible;
 mod quantity;
 mod recording;
 mod signs;
+mod steps;
 mod vocabulary;
 mod words;
 

@@ -173,6 +173,12 @@ const ENTRIES: &[Entry] = &[
             &["press", "din"], &["pressione", "dinamica"], &["presion", "dinamica"]],
     },
     Entry {
+        signal: signal::AIR_TEMPERATURE,
+        names: &["oat", "sat", "tstatic", "tair", "tamb", "tinf", "airtemperature", "airtemp", "outsideairtemperature",
+            "outsideairtemp", "staticairtemperature", "staticairtemp", "ambienttemperature", "aussentemperatur"],
+        words: &[&["oat"], &["static", "temperature"], &["static", "temp"], &["temperature", "statique"]],
+    },
+    Entry {
         signal: signal::THRUST,
         names: &["thrust", "netthrust", "totalthrust", "fn", "fnet", "thr"],
         words: &[&["thrust"], &["fnet"], &["schub"], &["poussee"], &["poussée"], &["spinta"], &["empuje"]],
@@ -363,6 +369,8 @@ mod tests {
             ("dynamic_pressure_pa", signal::QBAR),
             ("Altitude_m", signal::ALTITUDE),
             ("Ixx", signal::IX),
+            ("OAT", signal::AIR_TEMPERATURE),
+            ("T_static [K]", signal::AIR_TEMPERATURE),
             ("Time", signal::TIME),
         ] {
             assert_eq!(best(name), Some(signal), "{name}");
@@ -378,6 +386,8 @@ mod tests {
             "ground_velocity",
             "alpha_dot",
             "KIAS",
+            "TAT",
+            "total_air_temperature",
         ] {
             assert_eq!(best(name), None, "{name}");
         }

@@ -7,7 +7,7 @@ use crate::inspection::draft::{self, Draft};
 use crate::inspection::{Inspection, inspect};
 use crate::report::recording_page;
 use crate::store::archive::{self, FlightFiles};
-use crate::store::{atomic, files, recording};
+use crate::store::{atomic, files, import, recording};
 
 /// Largest number of rows that are read of a file: half an hour at 200 Hz.
 const MOST_ROWS: usize = 360_000;
@@ -38,7 +38,7 @@ pub fn write(name: &str, from: &[String]) -> Result<Drafted> {
     }
     let mut flights: Vec<FlightFiles> = Vec::new();
     for place in from {
-        flights.extend(archive::find(place)?);
+        flights.extend(flights_in(place, name)?);
     }
     let (mut recordings, mut found) = (Vec::new(), 0);
     for flight in &flights {
@@ -69,6 +69,32 @@ pub fn write(name: &str, from: &[String]) -> Result<Drafted> {
         page,
         inspection,
         files: (read, found),
+    })
+}
+
+/// Flights in a place. The error for recordings of another format names the command that imports
+/// them.
+fn flights_in(place: &str, name: &str) -> Result<Vec<FlightFiles>> {
+    let found = archive::find(place);
+    let files: Vec<PathBuf> = match &found {
+        Ok(flights) => flights
+            .iter()
+            .flat_map(|flight| flight.files.clone())
+            .collect(),
+        Err(_) => import::sources(Path::new(place)).unwrap_or_default(),
+    };
+    let is_foreign = files.iter().any(|file| import::is_foreign(file));
+    if !is_foreign {
+        return found;
+    }
+    let to = format!("data/{name}/flights");
+    let what = format!(
+        "no Parquet, but recordings that `harvest import` reads: first `harvest import {place} --to {to}`, then `harvest init \
+         {name} --from {to}`"
+    );
+    Err(Error::Archive {
+        place: place.into(),
+        what,
     })
 }
 

@@ -6,6 +6,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::OnceLock;
 
+use harvest::inspection::draft::{self, Draft};
 use harvest::inspection::{Column, Inspection, Recording, inspect};
 use harvest::store::{archive, recording};
 
@@ -570,4 +571,145 @@ fn a_drafted_class_takes_doublets_of_several_surfaces_for_one_maneuver() {
     assert_eq!(of_flaps.count(), 1, "{found}");
     let unknown = fs::read_to_string(folder.path().join("reports/mine/unknown.csv")).unwrap();
     assert_eq!(unknown.lines().count(), 1, "{unknown}");
+}
+
+#[test]
+fn surfaces_without_units_are_inputs_and_check_asks_for_what_no_recording_has() {
+    let folder = tempfile::tempdir().unwrap();
+    let flights = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/navion/flights");
+    let command = |words: &[&str]| {
+        let mut command = harvest();
+        command.current_dir(folder.path()).args(words);
+        run(&mut command)
+    };
+    let outcome = command(&["init", "nv", "--from", &flights.display().to_string()]);
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    assert!(!outcome.stdout.contains("no input"), "{}", outcome.stdout);
+    let pipeline = folder.path().join("pipelines/nv");
+    for class in ["pitch_surface", "roll_surface", "yaw_surface"] {
+        let file = pipeline.join(format!("maneuvers/{class}.yaml"));
+        assert!(file.is_file(), "{class}: {}", outcome.stdout);
+    }
+    // Three lengths, five sensors, mass and three moments of inertia.
+    let open = command(&["check", "nv"]);
+    assert!(open.stderr.contains("12 lines have"), "{}", open.stderr);
+    let aircraft = pipeline.join("aircraft.yaml");
+    let text = fs::read_to_string(&aircraft).unwrap();
+    let air = "\n  OAT: { signal: air_kelvin, unit: degC } # unsure:";
+    assert!(text.contains(air), "{text}");
+    let text = text.replace("wing_area_ft2: FILL_IN", "wing_area_ft2: 80");
+    fs::write(&aircraft, text.replace("FILL_IN", "10")).unwrap();
+    let right = command(&["check", "nv"]);
+    assert_eq!(right.code, Some(0), "{}", right.stderr);
+}
+
+/// Classes that are drafted for recordings of single maneuvers: flight of the demonstration, first and
+/// last input.
+fn classes_of(maneuvers: &[(usize, f64, f64)]) -> Vec<String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/demo/flights");
+    let flights = archive::find(&root.display().to_string()).unwrap();
+    let cut = |(flight, from_s, to_s): &(usize, f64, f64)| {
+        let mut recording = recording::first_rows(&flights[*flight], 60_000)
+            .unwrap()
+            .remove(0);
+        let times = recording.column("time").unwrap().values.clone();
+        let start = times.iter().position(|t| *t >= from_s - 1.2).unwrap();
+        let end = times.iter().position(|t| *t > to_s + 1.0).unwrap();
+        for column in &mut recording.columns {
+            column.values = column.values[start..end].to_vec();
+        }
+        recording
+    };
+    let recordings: Vec<Recording> = maneuvers.iter().map(cut).collect();
+    let inspection = inspect(&recordings).unwrap();
+    let files = draft::files(&Draft {
+        name: "one_axis",
+        archive: "flights",
+        inspection: &inspection,
+    });
+    let paths = files.into_iter().map(|file| file.path);
+    paths.filter(|p| p.starts_with("maneuvers/")).collect()
+}
+
+#[test]
+fn recordings_of_one_axis_have_classes_of_this_axis_alone() {
+    let pitch = [
+        (0, 119.8, 130.0),
+        (0, 234.2, 239.7),
+        (0, 581.7, 592.0),
+        (1, 222.9, 232.6),
+        (1, 563.2, 576.1),
+    ];
+    let found = classes_of(&pitch);
+    assert!(
+        found.contains(&"maneuvers/pitch_surface.yaml".to_owned())
+            && found
+                .iter()
+                .all(|class| class.starts_with("maneuvers/pitch")),
+        "{found:?}"
+    );
+    let lateral = [
+        (0, 398.9, 423.3),
+        (1, 112.2, 126.3),
+        (1, 313.8, 324.4),
+        (1, 412.0, 428.8),
+    ];
+    let found = classes_of(&lateral);
+    assert!(
+        found.contains(&"maneuvers/roll_yaw_surface.yaml".to_owned())
+            && found.iter().all(|class| !class.contains("pitch")),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn a_required_signal_that_no_column_gives_is_a_question() {
+    let copy = Copy::new().without(&["altitude", "qbar", "alpha_vane"]);
+    let (inspection, _, _) = copy.judged();
+    let files = draft::files(&Draft {
+        name: "mine",
+        archive: "flights",
+        inspection: &inspection,
+    });
+    let aircraft = files
+        .iter()
+        .find(|file| file.path == "aircraft.yaml")
+        .unwrap();
+    for line in [
+        "\n  altitude_ft: FILL_IN # no column was found; density",
+        "\n  alpha_vane_deg: FILL_IN #",
+    ] {
+        assert!(
+            aircraft.text.contains(line),
+            "`{line}` is not in\n{}",
+            aircraft.text
+        );
+    }
+    // The airspeed and that altitude give the dynamic pressure.
+    assert!(
+        !aircraft.text.contains("qbar_psf: FILL_IN"),
+        "{}",
+        aircraft.text
+    );
+}
+
+#[test]
+fn recordings_of_another_format_are_answered_with_the_command_that_imports_them() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("recordings")).unwrap();
+    fs::write(folder.path().join("recordings/x.csv"), "t,q\n0,1\n0.1,2\n").unwrap();
+    for place in ["recordings/x.csv", "recordings"] {
+        let mut command = harvest();
+        command
+            .current_dir(folder.path())
+            .args(["init", "mine", "--from", place]);
+        let outcome = run(&mut command);
+        assert_eq!(outcome.code, Some(1));
+        for words in [
+            format!("`harvest import {place} --to data/mine/flights`"),
+            "`harvest init mine --from data/mine/flights`".to_owned(),
+        ] {
+            assert!(outcome.stderr.contains(&words), "{}", outcome.stderr);
+        }
+    }
 }

@@ -9,7 +9,8 @@ use crate::config::checked::Config;
 use crate::config::instruments::InstrumentErrors;
 use crate::config::source::Source;
 use crate::config::tunnel_tables::MISSPELT;
-use crate::error::{Result, did_you_mean, similarity};
+use crate::error::{Result, similarity};
+use crate::flight::stand_in::{LATERAL, LONGITUDINAL};
 use crate::flight::{Channel, StandIn, signal};
 use crate::ingest;
 use crate::units::Unit;
@@ -77,10 +78,15 @@ pub(super) fn channels(config: &Config, source: &Source) -> Result<()> {
     }
     for required in std::iter::once(&"time_s").chain(signal::REQUIRED) {
         let has = |name: &str| signals.contains(&name);
-        let is_needed = StandIn::of(required, has).is_none() || is_misspelt(required, &signals);
+        let is_needed =
+            StandIn::of(required, has).is_none() || misspelt(required, &signals).is_some();
         if !has(required) && is_needed {
-            let near = did_you_mean(required, signals.iter().copied());
-            let what = format!("no channel or constant gives the signal `{required}`{near}");
+            let near = misspelt(required, &signals);
+            let near = near.map(|name| format!("; did you mean `{required}` by `{name}`?"));
+            let what = format!(
+                "no channel or constant gives the signal `{required}`{}",
+                near.unwrap_or_else(|| remedies(required))
+            );
             return Err(source.error("channels", what));
         }
     }
@@ -123,12 +129,70 @@ fn mistake(column: &str, channel: &Channel) -> Option<String> {
         .then(|| format!("channel `{column}`: scale must be greater than zero; a sign is `sign`"))
 }
 
-/// `true` if a signal of the channel map is probably this required one, misspelt.
-fn is_misspelt(required: &str, signals: &[&str]) -> bool {
-    let mut others = signals
-        .iter()
-        .filter(|name| !signal::REQUIRED.contains(name));
-    others.any(|name| similarity(name, required) >= MISSPELT)
+/// Signal of the channel map that is probably this required one, misspelt. Signals that harvest has
+/// are not.
+fn misspelt<'a>(required: &str, signals: &[&'a str]) -> Option<&'a str> {
+    let is_other = |name: &&str| {
+        let known = [signal::TIME, signal::PSI];
+        !signal::REQUIRED.contains(name) && !known.contains(name)
+    };
+    let others = signals.iter().copied().filter(is_other);
+    let near = others.filter(|name| similarity(name, required) >= MISSPELT);
+    near.max_by(|a, b| similarity(a, required).total_cmp(&similarity(b, required)))
+}
+
+/// Places where the source of a required signal may stand, in words.
+fn remedies(required: &str) -> String {
+    let constant = match required {
+        signal::TIME => {
+            return ": give the column that counts time its line under `channels`".to_owned();
+        }
+        signal::ALTITUDE => Some("26000"),
+        signal::ALPHA_VANE => Some("5"),
+        signal::VELOCITY => Some("400"),
+        signal::QBAR => Some("90"),
+        signal::MASS => Some("1000"),
+        signal::IX | signal::IY | signal::IZ => Some("20000"),
+        signal::X_CG | signal::Y_CG | signal::Z_CG => Some("0"),
+        _ => None,
+    };
+    let mut remedies = vec![format!(
+        ": give a line under `channels` to its column, or to a formula of several (`{{ signal: {required}, formula: … }}`)"
+    )];
+    if let Some(example) = constant {
+        remedies.push(format!(
+            "or its value under `constants` (`{required}: {example}`)"
+        ));
+    }
+    let otherwise = match required {
+        signal::ALTITUDE => format!("`{}` and `{}` are given", signal::VELOCITY, signal::QBAR),
+        signal::VELOCITY => format!(
+            "`{}` is given with `{}` or `{}`",
+            signal::ALTITUDE,
+            signal::MACH,
+            signal::QBAR
+        ),
+        signal::QBAR => format!(
+            "`{}` is given with `{}` or `{}`",
+            signal::ALTITUDE,
+            signal::VELOCITY,
+            signal::MACH
+        ),
+        signal::MACH => format!("`{}` or `{}` is given", signal::VELOCITY, signal::QBAR),
+        _ if LATERAL.contains(&required) => {
+            format!("all of {} are given", list(&LONGITUDINAL))
+        }
+        _ if LONGITUDINAL.contains(&required) => format!("all of {} are given", list(&LATERAL)),
+        _ => return remedies.join("; "),
+    };
+    remedies.push(format!("harvest does without it where {otherwise}"));
+    remedies.join("; ")
+}
+
+/// Names of signals in a list.
+fn list(signals: &[&str]) -> String {
+    let names: Vec<String> = signals.iter().map(|name| format!("`{name}`")).collect();
+    names.join(", ")
 }
 
 /// Sizes of instrument errors: known signals, no negative sizes.

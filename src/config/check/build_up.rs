@@ -1,10 +1,11 @@
 //! Checks of `model.yaml`: names are unique and resolve, and the kernel has room for the products.
 
-use super::names::known_signal;
+use super::names::{is_given, known_signal};
 use crate::aero::{Axis, Regressor};
 use crate::config::checked::Config;
 use crate::config::source::Source;
 use crate::error::{Result, did_you_mean};
+use crate::flight::signal;
 use crate::output_error::MOST_PRODUCTS;
 
 /// Checks the derivatives, biases and sums of the model.
@@ -20,8 +21,15 @@ pub(super) fn buildup(config: &Config, source: &Source) -> Result<()> {
         return Err(source.error(twice[0], format!("`{}` is defined twice", twice[0])));
     }
     for derivative in &buildup.derivatives {
-        for signal in derivative.regressor.signals() {
-            known_signal(config, source, signal, &derivative.name)?;
+        for name in derivative.regressor.signals() {
+            if let Some(meant) = of_the_flow(name).filter(|_| !is_given(config, name)) {
+                let what = format!(
+                    "{}: no channel gives the signal `{name}`; did you mean `{meant}`?",
+                    derivative.name
+                );
+                return Err(source.error(&derivative.name, what));
+            }
+            known_signal(config, source, name, &derivative.name)?;
         }
     }
     few_products(config, source)?;
@@ -37,6 +45,15 @@ pub(super) fn buildup(config: &Config, source: &Source) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Signal of the airspeed or the Mach number that a symbol stands for.
+fn of_the_flow(symbol: &str) -> Option<&'static str> {
+    match symbol {
+        "V" | "v" | "TAS" | "tas" | "airspeed" | "velocity" => Some(signal::VELOCITY),
+        "M" | "Ma" | "Mach" => Some(signal::MACH),
+        _ => None,
+    }
 }
 
 /// Checks that the kernel has room for the products that contain states.

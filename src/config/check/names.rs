@@ -3,6 +3,7 @@
 use crate::config::checked::Config;
 use crate::config::source::Source;
 use crate::error::{Result, did_you_mean};
+use crate::flight::signal;
 
 /// Names of all signals of the channel map and the constants.
 fn signals(config: &Config) -> impl Iterator<Item = &str> + Clone {
@@ -13,12 +14,23 @@ fn signals(config: &Config) -> impl Iterator<Item = &str> + Clone {
         .chain(config.constants.keys().map(String::as_str))
 }
 
+/// `true` for a signal of a channel or a constant.
+pub(super) fn is_given(config: &Config, name: &str) -> bool {
+    signals(config).any(|given| given == name)
+}
+
 /// Refuses a signal that neither a channel nor a constant gives; `user` names what needs it.
 pub(super) fn known_signal(config: &Config, source: &Source, name: &str, user: &str) -> Result<()> {
-    if signals(config).any(|s| s == name) {
+    if is_given(config, name) {
         return Ok(());
     }
-    let near = did_you_mean(name, signals(config));
+    // A signal of harvest's own is not another one misspelt.
+    let is_own = signal::REQUIRED.contains(&name) || name == signal::PSI;
+    let near = if is_own {
+        String::new()
+    } else {
+        did_you_mean(name, signals(config))
+    };
     let what = format!("{user}: no channel gives the signal `{name}`{near}");
     Err(source.error(name, what))
 }

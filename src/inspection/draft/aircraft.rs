@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::contents::{Draft, OPEN, UNSURE, comment, scalar};
-use crate::flight::signal;
+use crate::flight::{StandIn, signal};
 use crate::inspection::findings::Channel;
 use crate::inspection::quantity::Quantity;
 
@@ -146,12 +146,52 @@ const NOT_RECORDED: [(&str, &str, &str); 7] = [
     (signal::Z_CG, "0", "as x"),
 ];
 
+/// Required signals that neither a column gives nor a stand-in, each with the place where it matters.
+/// An altitude that is asked for makes the stand-ins of other air data possible.
+fn asked(draft: &Draft) -> Vec<(&'static str, &'static str)> {
+    let is_given = |name: &str| NOT_RECORDED.iter().any(|(given, _, _)| *given == name);
+    let others = signal::REQUIRED
+        .iter()
+        .filter(|name| **name != signal::ALTITUDE);
+    let mut asked: Vec<(&str, &str)> = Vec::new();
+    for name in std::iter::once(&signal::ALTITUDE).chain(others) {
+        let has = |other: &str| {
+            draft.has(other) || is_given(other) || asked.iter().any(|(name, _)| *name == other)
+        };
+        if !has(name) && StandIn::of(name, has).is_none() {
+            asked.push((name, question(name)));
+        }
+    }
+    asked
+}
+
+/// Place where a signal matters that no column gives.
+fn question(signal: &str) -> &'static str {
+    match signal {
+        signal::ALTITUDE => {
+            "density and speed of sound follow from it: the mean altitude of the flights, 1,000 ft are 3 % of density"
+        }
+        signal::ALPHA_VANE => {
+            "give its column a line under channels in place of this one; with a constant there are no longitudinal derivatives"
+        }
+        signal::VELOCITY | signal::QBAR => {
+            "every coefficient is divided by the dynamic pressure: better a column, or a formula of others, under channels"
+        }
+        _ => {
+            "give its column a line under channels in place of this one: no axis is complete without it"
+        }
+    }
+}
+
 fn constants(draft: &Draft) -> String {
     let mut lines = String::new();
     for (name, value, effect) in NOT_RECORDED {
         if !draft.has(name) {
             let _ = writeln!(lines, "  {name}: {value} # {effect}");
         }
+    }
+    for (name, effect) in asked(draft) {
+        let _ = writeln!(lines, "  {name}: {OPEN} # no column was found; {effect}");
     }
     let missing = Quantity::ALL
         .into_iter()

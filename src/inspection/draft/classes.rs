@@ -38,27 +38,30 @@ pub fn classes(draft: &Draft) -> Vec<DraftClass> {
     classes
 }
 
-/// Inputs of one kind that have steps.
+/// Surfaces that move, or controls.
 struct Inputs<'a> {
     inputs: Vec<(&'a Channel, &'a InputColumn)>,
 }
 
 impl<'a> Inputs<'a> {
     fn of(draft: &'a Draft, is_wanted: impl Fn(Input) -> bool) -> Inputs<'a> {
-        let inputs = draft.inputs();
-        let wanted =
-            inputs.filter(|(channel, input)| channel.step.is_some() && is_wanted(input.kind));
+        let wanted = draft.inputs().filter(|(_, input)| is_wanted(input.kind));
         Inputs {
             inputs: wanted.collect(),
         }
     }
 
-    /// Inputs of an axis: the main one first, where there is one, then flaps, vanes and the like.
+    /// Inputs of an axis that step: the main one first, where there is one, then flaps, vanes and the
+    /// like. Beside main ones that only follow feedback the others are no maneuver of the axis.
     fn of_axis(&self, acts: Acts) -> Vec<String> {
         let of_axis = self.inputs.iter().filter(|(_, input)| input.acts == acts);
         let (main, others): (Vec<_>, Vec<_>) =
             of_axis.partition(|(_, input)| input.kind != Input::OtherSurface);
-        let all = main.into_iter().chain(others);
+        let steps = |(channel, _): &&&(&Channel, &InputColumn)| channel.step.is_some();
+        if !main.is_empty() && !main.iter().any(|input| steps(&input)) {
+            return Vec::new();
+        }
+        let all = main.iter().chain(&others).filter(|input| steps(input));
         all.map(|(channel, _)| channel.signal.clone()).collect()
     }
 

@@ -80,5 +80,14 @@ segment:
     for (channel, _, step) in steps {
         let _ = writeln!(text, "    {}: {step}", channel.signal);
     }
+    let resting = draft.inputs().filter(|(channel, _)| channel.step.is_none());
+    let resting: Vec<&str> = resting.map(|(c, _)| c.signal.as_str()).collect();
+    if !resting.is_empty() {
+        let _ = writeln!(
+            text,
+            "    # no step: {}. They change as little as feedback or noise does: give one a size, and a class in maneuvers/, if\n    # it is flown.",
+            resting.join(", ")
+        );
+    }
     text
 }

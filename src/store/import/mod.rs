@@ -38,12 +38,8 @@ pub fn sources(place: &Path) -> Result<Vec<PathBuf>> {
         return Ok(vec![place.to_owned()]);
     }
     let entries = std::fs::read_dir(place).map_err(Error::io(place, "cannot list the folder"))?;
-    let is_recording = |path: &PathBuf| {
-        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        extension.is_some_and(|e| EXTENSIONS.contains(&e.as_str()))
-    };
     let paths = entries.flatten().map(|entry| entry.path());
-    let mut files: Vec<PathBuf> = paths.filter(is_recording).collect();
+    let mut files: Vec<PathBuf> = paths.filter(|path| has_known_name(path)).collect();
     files.sort();
     if files.is_empty() {
         let what = format!(
@@ -53,6 +49,21 @@ pub fn sources(place: &Path) -> Result<Vec<PathBuf>> {
         return Err(Error::not_found(place, what));
     }
     Ok(files)
+}
+
+/// `true` for a file that is no Parquet, and whose name is that of a recording.
+#[must_use]
+pub fn is_foreign(source: &Path) -> bool {
+    let is_parquet = || Format::of(source).is_ok_and(|format| format == Format::Parquet);
+    let is_named_parquet = source
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
+    source.is_file() && has_known_name(source) && !is_named_parquet && !is_parquet()
+}
+
+fn has_known_name(path: &Path) -> bool {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    extension.is_some_and(|e| EXTENSIONS.contains(&e.as_str()))
 }
 
 /// File of the archive that a source becomes.
