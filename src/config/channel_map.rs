@@ -46,7 +46,11 @@ impl ChannelMap<'_> {
         let Some(unit) = &line.unit else {
             return Err(self.error(name, "it has no `unit`"));
         };
-        Unit::parse(unit).map_err(|what| self.error(name, &what))?;
+        let parsed = match &line.signal {
+            Some(signal) => Unit::parse_for(unit, Unit::of_signal(signal)),
+            None => Unit::parse(unit),
+        };
+        parsed.map_err(|what| self.error(name, &what))?;
         Ok(line.signal.as_ref().map(|signal| Channel {
             sign: line.sign.unwrap_or(1.0),
             scale: line.scale.unwrap_or(1.0),

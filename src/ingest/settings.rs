@@ -10,7 +10,8 @@ settings! {
     pub struct Settings {
         /// Longest gap of a channel that is bridged by a straight line, s. The default is short
         /// against the short period and the Dutch roll of a fighter. Larger: fewer maneuvers are
-        /// lost to gaps, and more samples are invented.
+        /// lost to gaps, and more samples are invented. Signals that change slowly have longer bridges,
+        /// see `docs/ingest.md`, and none if this is 0.
         pub longest_bridge_s: f64 = 0.25,
         /// Longest gap of the clock that is kept as missing samples, s. After a longer one the flight
         /// goes on as another stretch: `flight_001.2`. No maneuver lasts as long as the default.

@@ -1001,6 +1001,8 @@ fn an_event_that_touches_the_ends_is_taken_and_explains_what_was_unknown() {
     );
     assert_abs_diff_eq!(whole.maneuvers[0].start_s, 0.0);
     assert_abs_diff_eq!(whole.maneuvers[0].end_s, 20.0);
+    let rounded = taken(event(-0.5, 20.5));
+    assert_eq!(rounded.maneuvers, whole.maneuvers);
     assert_eq!(taken(event(-3.0, 20.0)).maneuvers, []);
     assert_eq!(taken(event(20.5, 20.9)).maneuvers, []);
 }

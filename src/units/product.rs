@@ -1,7 +1,7 @@
 //! Products of units with exponents: `N m-1 s`, `m2/s2/K`.
 
 use super::quantity::{BASE_NAMES, Dimensions};
-use super::unit::{UNITS, Unit, plain};
+use super::unit::{UNITS, Unit, is_multiplication_dot, plain, superscript};
 
 /// Product of units with exponents: its dimensions, and the factor to the product of the base units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,7 +18,9 @@ impl UnitProduct {
         let (mut dimensions, mut factor) = ([0; 6], 1.0);
         for (n, part) in text.split('/').enumerate() {
             let side = if n == 0 { 1 } else { -1 };
-            let words = part.split([' ', '*', '·', '.', '(', ')']);
+            let is_between =
+                |c: char| matches!(c, ' ' | '*' | '.' | '(' | ')') || is_multiplication_dot(c);
+            let words = part.split(is_between);
             let mut words = words.filter(|word| !word.is_empty()).peekable();
             words.peek()?;
             for word in words {
@@ -55,7 +57,7 @@ fn power(word: &str) -> Option<(Unit, i32)> {
         return Some((Unit::of_signal(""), 1));
     }
     let end = word
-        .find(|c: char| c.is_ascii_digit() || "^-+²³".contains(c))
+        .find(|c: char| c.is_ascii_digit() || "^-+".contains(c) || superscript(c).is_some())
         .unwrap_or(word.len());
     let (name, exponent) = word.split_at(end);
     let exponent = plain(exponent);

@@ -52,6 +52,66 @@ fn factors_are_those_of_the_definitions() {
 }
 
 #[test]
+fn units_agree_with_relations_that_do_not_define_them() {
+    for (one, factor_of_one, other, signal) in [
+        // The standard atmosphere, and an inch.
+        (1.013_25, "bar", (760.0, "mmHg"), "qbar_psf"),
+        (1.013_25, "bar", (2_116.216_6, "psf"), "qbar_psf"),
+        (1_013.25, "MBAR", (14.695_949, "psia"), "qbar_psf"),
+        (25.4, "mmHg", (1.0, "inHg"), "qbar_psf"),
+        // Weights of masses in standard gravity.
+        (1.0, "kgf", (9.806_65, "kg m/s2"), "thrust_lbf"),
+        (1.0, "kgf", (2.204_622_6, "lbf"), "thrust_lbf"),
+        (0.980_665, "daN", (1.0, "kp"), "thrust_lbf"),
+        (1.0, "lb", (0.453_592_37, "kgf"), "thrust_lbf"),
+        (1.0, "t", (2_204.622_6, "lb"), "mass_slug"),
+        (1.0, "tonne", (68.521_766, "slug"), "mass_slug"),
+        (60.0, "mph", (88.0, "ft/s"), "velocity_ft_s"),
+        (1.0, "mph", (0.868_976_24, "KTAS"), "velocity_ft_s"),
+        (1.852, "km/h", (1.0, "Kt"), "velocity_ft_s"),
+        (36.089_239, "kft", (11.0, "km"), "altitude_ft"),
+        (
+            1_000.0 * std::f64::consts::PI,
+            "mrad",
+            (180.0, "Grad"),
+            "theta_deg",
+        ),
+        (17.453_292_5, "mrad/s", (1.0, "Grad/s"), "q_deg_s"),
+        (9.806_65, "m·s⁻²", (1.0, "G"), "an_g"),
+        (1.0, "m⋅s⁻¹", (3.6, "km/h"), "velocity_ft_s"),
+        (1.0, "kg·m²", (1.0, "N·m·s²"), "iy_slug_ft2"),
+        (1.0, "kg·m⁻³", (1.0, "KG/M3"), "density_slug_ft3"),
+        (1.8, "°R", (1.0, "Kelvin"), "air_kelvin"),
+        (1.0, "FT/SEC", (0.304_8, "M/S"), "velocity_ft_s"),
+        (60.0, "Sek", (1.0, "MIN"), "time_s"),
+    ] {
+        let (other, factor_of_other) = other;
+        let [a, b] = [factor_of_one, factor_of_other].map(|u| factor(u, signal).expect(u));
+        assert_relative_eq!(one * a, other * b, max_relative = 1e-6);
+    }
+}
+
+#[test]
+fn what_is_ambiguous_or_unknown_is_refused_with_the_nearest_unit() {
+    for (unit, signal, words) in [
+        ("KCAS", "velocity_ft_s", "calibrated airspeed"),
+        ("KIAS", "velocity_ft_s", "indicated airspeed"),
+        ("psig", "qbar_psf", "above the ambient one"),
+        ("ton", "mass_slug", "907, 1000 or 1016 kg"),
+        ("hPas", "qbar_psf", "did you mean `hPa`?"),
+        ("knt", "velocity_ft_s", "did you mean `kt`?"),
+        ("furlong", "altitude_ft", "are ft, in, m, cm, mm, km, kft,"),
+    ] {
+        let what = Unit::parse_for(unit, Unit::of_signal(signal)).unwrap_err();
+        assert!(what.contains(words), "{what}");
+        assert!(Unit::parse(unit).is_err(), "{unit}");
+    }
+    for other in ["grad", "T", "N s", "M", "k"] {
+        assert!(Unit::parse(other).is_err(), "{other}");
+    }
+}
+
+#[test]
 fn the_longest_suffix_names_the_unit() {
     assert_eq!(Unit::of_signal("q_deg_s").name, "deg/s");
     assert_eq!(Unit::of_signal("velocity_ft_s").name, "ft/s");

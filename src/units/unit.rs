@@ -84,11 +84,17 @@ const SLUG: f64 = 1.0 / 14.593_902_937_206;
 const PSF: f64 = LBF * M_PER_FT * M_PER_FT;
 /// Pascals in an inch of mercury (conventional, NIST SP 811).
 const INCH_OF_MERCURY_PA: f64 = 3386.389;
+/// Pascals in a millimetre of mercury (conventional, NIST SP 811): 13,595.1 kg/m³ times standard
+/// gravity times a millimetre.
+const MILLIMETRE_OF_MERCURY_PA: f64 = 133.322_387_415;
+/// Newtons in a kilogram-force: standard gravity.
+const KILOGRAM_FORCE_N: f64 = 9.806_65;
 
 /// All units. Signals are kept in the first unit of a quantity.
 pub(super) const UNITS: &[Unit] = &[
     unit("deg", Some("_deg"), Quantity::Angle, 1.0),
     unit("rad", None, Quantity::Angle, DEG),
+    rare("mrad", Quantity::Angle, 1e-3 * DEG),
     unit("deg/s", Some("_deg_s"), Quantity::AngularRate, 1.0),
     unit("rad/s", None, Quantity::AngularRate, DEG),
     unit(
@@ -105,27 +111,34 @@ pub(super) const UNITS: &[Unit] = &[
     unit("m/s", None, Quantity::Velocity, FT),
     unit("kt", None, Quantity::Velocity, 1852.0 / 3600.0 * FT),
     rare("km/h", Quantity::Velocity, FT / 3.6),
+    rare("mph", Quantity::Velocity, 5280.0 / 3600.0),
     unit("ft", Some("_ft"), Quantity::Length, 1.0),
     unit("in", Some("_in"), Quantity::Length, 1.0 / 12.0),
     unit("m", None, Quantity::Length, FT),
     rare("cm", Quantity::Length, 0.01 * FT),
     rare("mm", Quantity::Length, 0.001 * FT),
     rare("km", Quantity::Length, 1000.0 * FT),
+    rare("kft", Quantity::Length, 1000.0),
     unit("lbf/ft2", Some("_psf"), Quantity::Pressure, 1.0),
     unit("psf", None, Quantity::Pressure, 1.0),
     rare("psi", Quantity::Pressure, 144.0),
     unit("Pa", None, Quantity::Pressure, PSF),
     rare("hPa", Quantity::Pressure, 100.0 * PSF),
     rare("mbar", Quantity::Pressure, 100.0 * PSF),
+    rare("bar", Quantity::Pressure, 1e5 * PSF),
     rare("kPa", Quantity::Pressure, 1000.0 * PSF),
     rare("inHg", Quantity::Pressure, INCH_OF_MERCURY_PA * PSF),
+    rare("mmHg", Quantity::Pressure, MILLIMETRE_OF_MERCURY_PA * PSF),
     unit("lbf", Some("_lbf"), Quantity::Force, 1.0),
     rare("klbf", Quantity::Force, 1000.0),
     unit("N", None, Quantity::Force, LBF),
     rare("kN", Quantity::Force, 1000.0 * LBF),
+    rare("daN", Quantity::Force, 10.0 * LBF),
+    rare("kgf", Quantity::Force, KILOGRAM_FORCE_N * LBF),
     unit("slug", Some("_slug"), Quantity::Mass, 1.0),
     unit("lb", None, Quantity::Mass, 1.0 / G0_FT_S2),
     unit("kg", None, Quantity::Mass, SLUG),
+    rare("t", Quantity::Mass, 1000.0 * SLUG),
     unit("slug ft2", Some("_slug_ft2"), Quantity::Inertia, 1.0),
     unit("lb ft2", None, Quantity::Inertia, 1.0 / G0_FT_S2),
     unit("kg m2", None, Quantity::Inertia, SLUG * FT * FT),
@@ -146,8 +159,23 @@ pub(super) const UNITS: &[Unit] = &[
     unit("%", None, Quantity::Number, 0.01),
 ];
 
+/// Spellings of which the case matters: `grad` may be a gon, `T` a tesla.
+const CASED_SPELLINGS: &[(&str, &str)] = &[
+    ("G", "g"),
+    ("Grad", "deg"),
+    ("Grad/s", "deg/s"),
+    ("Grad/sec", "deg/s"),
+    ("Grad/s2", "deg/s2"),
+    ("°R", "degR"),
+    ("Kt", "kt"),
+    ("KT", "kt"),
+];
+
+/// Units that are other units in another case: `Ns` is an impulse, `Ms` a million seconds.
+const CASED: &[&str] = &["ms", "us", "ns"];
+
 /// Other spellings of units, in lower case and without signs.
-const SPELLINGS: &[(&str, &str)] = &[
+pub(super) const SPELLINGS: &[(&str, &str)] = &[
     ("degree", "deg"),
     ("degrees", "deg"),
     ("°", "deg"),
@@ -171,10 +199,13 @@ const SPELLINGS: &[(&str, &str)] = &[
     ("ft/sec2", "ft/s2"),
     ("m/sec2", "m/s2"),
     ("kts", "kt"),
+    ("ktas", "kt"),
+    ("knoten", "kt"),
     ("kn", "kt"),
     ("knot", "kt"),
     ("knots", "kt"),
     ("kmh", "km/h"),
+    ("mi/h", "mph"),
     ("kph", "km/h"),
     ("feet", "ft"),
     ("foot", "ft"),
@@ -187,16 +218,23 @@ const SPELLINGS: &[(&str, &str)] = &[
     ("lb/ft2", "lbf/ft2"),
     ("lbs/ft2", "lbf/ft2"),
     ("lbf/in2", "psi"),
+    ("psia", "psi"),
+    ("psid", "psi"),
     ("pascal", "Pa"),
     ("n/m2", "Pa"),
     ("millibar", "mbar"),
     ("mb", "mbar"),
     ("newton", "N"),
     ("kip", "klbf"),
+    ("kp", "kgf"),
+    ("kilopond", "kgf"),
     ("slugs", "slug"),
     ("lbm", "lb"),
     ("lbs", "lb"),
     ("kilogram", "kg"),
+    ("kilograms", "kg"),
+    ("tonne", "t"),
+    ("tonnes", "t"),
     ("kelvin", "K"),
     ("rankine", "degR"),
     ("celsius", "degC"),
@@ -206,6 +244,9 @@ const SPELLINGS: &[(&str, &str)] = &[
     ("rev/min", "rpm"),
     ("1/min", "rpm"),
     ("sec", "s"),
+    ("sek", "s"),
+    ("sekunde", "s"),
+    ("sekunden", "s"),
     ("second", "s"),
     ("seconds", "s"),
     ("msec", "ms"),
@@ -218,21 +259,32 @@ const SPELLINGS: &[(&str, &str)] = &[
     ("unitless", "-"),
     ("bool", "0/1"),
     ("boolean", "0/1"),
+    ("u/min", "rpm"),
     ("percent", "%"),
     ("pct", "%"),
 ];
 
 impl Unit {
-    /// Unit of this name or another spelling of it.
+    /// Unit of this name or another spelling of it. Capitals do not matter in a name of two letters
+    /// or more, unless they make another unit of it.
     pub(super) fn named(text: &str) -> Option<Unit> {
         let written = plain(text);
         let of_name = |name: &str| UNITS.iter().find(|u| plain(u.name) == name).copied();
-        let spelling = || {
-            let lower = written.to_lowercase();
-            let spelling = SPELLINGS.iter().find(|(other, _)| *other == lower);
+        let listed = |spellings: &[(&str, &str)], text: &str| {
+            let spelling = spellings.iter().find(|(other, _)| *other == text);
             spelling.and_then(|(_, name)| of_name(&plain(name)))
         };
-        of_name(&written).or_else(spelling)
+        let lower = written.to_lowercase();
+        let is_sign = |c: char| matches!(c, ' ' | '*' | '.') || is_multiplication_dot(c);
+        let is_one_word = written.chars().count() > 1 && !text.trim().contains(is_sign);
+        let in_capitals = || {
+            let is_same = |u: &&Unit| !CASED.contains(&u.name) && u.name.to_lowercase() == lower;
+            UNITS.iter().find(is_same).copied()
+        };
+        of_name(&written)
+            .or_else(|| listed(CASED_SPELLINGS, &written))
+            .or_else(|| listed(SPELLINGS, &lower))
+            .or_else(|| is_one_word.then(in_capitals).flatten())
     }
 
     /// Exponents of degree, foot, slug, second, kelvin and revolution.
@@ -290,24 +342,42 @@ impl Unit {
         (conversion.offset == 0.0).then_some(conversion.factor)
     }
 
-    /// Conversion from values in this unit to values in `target`; `None` for another quantity.
+    /// Conversion from values in this unit to values in `target`; `None` for another quantity. A
+    /// pound of a force is a pound-force.
     #[must_use]
     pub fn conversion_to(self, target: Unit) -> Option<Conversion> {
-        let factor = self.factor / target.factor;
-        (self.quantity == target.quantity).then_some(Conversion {
+        let own = self.as_force_of(target);
+        let factor = own.factor / target.factor;
+        (own.quantity == target.quantity).then_some(Conversion {
             factor,
-            offset: self.offset * factor - target.offset,
+            offset: own.offset * factor - target.offset,
         })
+    }
+
+    /// The pound-force for a pound where the target is a force; any other unit as it is.
+    fn as_force_of(self, target: Unit) -> Unit {
+        if self.name == "lb" && target.quantity == Quantity::Force {
+            unit("lb", None, Quantity::Force, 1.0)
+        } else {
+            self
+        }
     }
 }
 
-/// A text without the characters that are ignored in a unit.
+/// A text without the characters that are ignored in a unit, with its exponents as digits.
 pub(super) fn plain(text: &str) -> String {
-    let is_sign = |c: &char| matches!(c, ' ' | '^' | '·' | '*' | '.');
-    let digit = |c: char| match c {
-        '²' => '2',
-        '³' => '3',
-        c => c,
-    };
-    text.chars().filter(|c| !is_sign(c)).map(digit).collect()
+    let is_sign = |c: &char| matches!(c, ' ' | '^' | '*' | '.') || is_multiplication_dot(*c);
+    let text = text.chars().filter(|c| !is_sign(c));
+    text.map(|c| superscript(c).unwrap_or(c)).collect()
+}
+
+/// `true` for a dot in the middle of the line: of these, ISO 80000 has the first.
+pub(super) fn is_multiplication_dot(c: char) -> bool {
+    matches!(c, '\u{22c5}' | '\u{b7}' | '\u{2219}' | '\u{2022}')
+}
+
+/// Digit or sign that a raised one stands for.
+pub(super) fn superscript(c: char) -> Option<char> {
+    let place = "⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺".chars().position(|raised| raised == c)?;
+    "0123456789-+".chars().nth(place)
 }

@@ -95,6 +95,62 @@ fn text_with_decimal_commas_and_a_row_of_units_comes_back_to_the_bit() {
 }
 
 #[test]
+fn units_that_harvest_does_not_have_are_kept_and_reported() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "Zeit;q;alpha\ns;Grd/s;Grad\n0,1;1,5;2\n0,2;1,75;3\n";
+    fs::write(folder.path().join("f.csv"), text).unwrap();
+    let outcome = import(folder.path(), "f.csv");
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let note = "this unit is unknown to harvest and kept as text: `Grd/s` of q";
+    assert!(outcome.stdout.contains(note), "{}", outcome.stdout);
+    let recording = imported(folder.path());
+    check(&recording, "Zeit", Some("s"), &[0.1, 0.2]);
+    check(&recording, "q", Some("Grd/s"), &[1.5, 1.75]);
+    check(&recording, "alpha", Some("Grad"), &[2.0, 3.0]);
+}
+
+#[test]
+fn packed_text_with_calendar_times_is_read_as_seconds_from_the_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "time,q [deg/s]\n2024-05-01T23:59:59.75Z,1.5\n2024-05-02T00:00:00.25Z,2.5\n";
+    let file = fs::File::create(folder.path().join("f.csv.gz")).unwrap();
+    let mut encoder = flate2::write::GzEncoder::new(file, flate2::Compression::default());
+    encoder.write_all(text.as_bytes()).unwrap();
+    encoder.finish().unwrap();
+    let outcome = import(folder.path(), "f.csv.gz");
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let recording = imported(folder.path());
+    check(&recording, "time", Some("s"), &[0.0, 0.5]);
+    check(&recording, "q", Some("deg/s"), &[1.5, 2.5]);
+    let files = fs::read_dir(folder.path().join("flights")).unwrap();
+    let mut names: Vec<String> = files
+        .map(|file| file.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    assert_eq!(names, ["f.parquet", "import.json"]);
+}
+
+#[test]
+fn tall_text_becomes_one_column_a_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let columns = columns(3_000);
+    let mut text = b"time;name;value;unit\n".to_vec();
+    for (k, time) in columns[0].2.iter().enumerate() {
+        for (name, unit, values) in &columns[1..] {
+            writeln!(text, "{time:?};{name};{:?};{unit}", values[k]).unwrap();
+        }
+    }
+    fs::write(folder.path().join("f.csv"), text).unwrap();
+    let outcome = import(folder.path(), "f.csv");
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let recording = imported(folder.path());
+    check(&recording, "time", None, &columns[0].2);
+    check(&recording, "q", Some("rad/s"), &columns[1].2);
+    check(&recording, "de", Some("deg"), &columns[2].2);
+    assert_eq!(recording.columns.len(), 3);
+}
+
+#[test]
 fn a_tall_file_in_any_order_becomes_one_column_a_name() {
     let columns = columns(20_000);
     let time = &columns[0].2;
@@ -185,6 +241,30 @@ fn compressed(variable: &[u8]) -> Vec<u8> {
     let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::default());
     encoder.write_all(variable).unwrap();
     element(15, &encoder.finish().unwrap())
+}
+
+#[test]
+fn a_struct_that_holds_all_columns_is_left_out_of_their_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let columns = columns(500);
+    let fields = [
+        element(5, &8_i32.to_le_bytes()),
+        element(1, b"time\0\0\0\0q\0\0\0\0\0\0\0"),
+        doubles("", [500, 1], &columns[0].2),
+        doubles("", [500, 1], &columns[1].2),
+    ];
+    let variables = [
+        matrix(2, [1, 1], "rec", &fields.concat()),
+        characters("aircraft", "DR400"),
+    ];
+    matlab(folder.path(), &variables);
+    let outcome = import(folder.path(), "f.mat");
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let note = "all names begin with `rec.`";
+    assert!(outcome.stdout.contains(note), "{}", outcome.stdout);
+    let recording = imported(folder.path());
+    check(&recording, "time", None, &columns[0].2);
+    check(&recording, "q", None, &columns[1].2);
 }
 
 #[test]

@@ -132,8 +132,10 @@ fn stated_unit(
 
 fn same_unit(stated: &str, mapped: &str) -> bool {
     match (Unit::parse(stated), Unit::parse(mapped)) {
+        // A pound becomes a pound-force, not the reverse.
         (Ok(a), Ok(b)) => a
             .factor_to(b)
+            .or(b.factor_to(a))
             .is_some_and(|f| (f - 1.0).abs() < SAME_FACTOR),
         _ => stated == mapped,
     }

@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 use std::ops::Range;
 
 use super::character::{Character, SPELL};
-use super::gaps::{Bridge, bridge_gaps};
+use super::gaps::{Bridge, Reach, bridge_gaps};
 use super::repeats::long_runs;
 use super::spikes;
 use super::unwrap::Unwrapper;
@@ -18,7 +18,6 @@ use crate::flight::record::Series;
 use crate::flight::{Channel, Mark};
 use crate::ingest::settings::Settings;
 use crate::numerics::order_statistics::{upper_median_in_place, upper_median_of_counts};
-use crate::numerics::sample_count::whole_steps;
 use crate::units::Conversion;
 
 /// Unit of a 0/1 channel, whose values are never smoothed or interpolated.
@@ -97,6 +96,7 @@ pub struct Conditioner {
     /// Conversion of the recorder's numbers to the signal's unit.
     conversion: Conversion,
     is_flag: bool,
+    reach: Reach,
     unwrapper: Option<Unwrapper>,
     /// Converted values from sample `first` on.
     values: Vec<f64>,
@@ -189,6 +189,7 @@ impl Conditioner {
                 ..conversion
             },
             is_flag: channel.unit == FLAG_UNIT,
+            reach: Reach::of(&channel.signal, settings.longest_bridge_s, step_s),
             unwrapper: Unwrapper::of(channel, step_s, LONGEST_PERIOD, settings),
             values: Vec::new(),
             first: 0,
@@ -315,6 +316,7 @@ impl Conditioner {
         };
         let mut marks = self.bridge(&mut values, from);
         for range in stuck {
+            values[range.clone()].fill(f64::NAN);
             marks[range].fill(Mark::Stuck);
         }
         for k in despiked {
@@ -410,14 +412,13 @@ impl Conditioner {
     }
 
     fn bridge(&self, values: &mut [f64], from: usize) -> Vec<Mark> {
-        let longest = whole_steps(self.settings.longest_bridge_s, self.step_s);
         let bridge = if self.is_flag {
             Bridge::Held
         } else {
             Bridge::Line
         };
         let period = |k: usize| self.characters.at(from + k).rate.period;
-        bridge_gaps(values, longest, bridge, period)
+        bridge_gaps(values, self.reach, bridge, period)
     }
 
     /// Ends the channel and returns its statistics.

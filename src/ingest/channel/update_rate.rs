@@ -15,6 +15,13 @@ const LONGEST_BETWEEN_NULLS: usize = 200;
 /// Least number of distances from which a period is inferred where all of them agree.
 const FEW_DISTANCES: usize = 4;
 
+/// Updates in the longest distance that counts as one with lost updates.
+const MOST_UPDATES: usize = 4;
+
+/// Shortest period of which lost updates are recognised: its multiples are more than the clock's
+/// two samples apart.
+const SHORTEST_WITH_LOSSES: usize = 8;
+
 /// Share of the distances between recorded samples, or of the changes of a held value, that must
 /// fit a period: frames are lost and clocks slip now and then.
 const FITTING_SHARE: f64 = 0.95;
@@ -133,32 +140,69 @@ fn changes(values: &[f64], first: usize) -> Vec<usize> {
 }
 
 /// Distance between the finite values of a channel that has few of them: equal for all within one
-/// sample, and more than one. Such is a slow channel in a short record.
+/// sample, save lost updates, and more than one. Such is a slow channel in a short record.
 fn period_of_few(values: &[f64]) -> Option<usize> {
     let distances = distances(values);
     let total: usize = distances.iter().sum();
     let finite = values.iter().filter(|v| v.is_finite()).count();
-    let (period, most) = distances.iter().enumerate().max_by_key(|(_, n)| **n)?;
-    let near: usize = distances
-        .iter()
-        .skip(period.saturating_sub(1))
-        .take(3)
-        .sum();
-    let agree = near == total && total + 1 == finite && 2 * most > total;
-    (period > 1 && total >= FEW_DISTANCES && agree).then_some(period)
+    let fit = Fit::of(&distances)?;
+    let agree = fit.all() == total && total + 1 == finite && 2 * fit.exact > total;
+    (fit.period > 1 && total >= FEW_DISTANCES && agree && fit.has_few_losses())
+        .then_some(fit.period)
 }
 
-/// Distance that nearly all finite values have, if it is more than one. If the channel has its own
-/// clock, it is one more or less now and then.
+/// Distance that nearly all finite values have, or a multiple of it where updates are lost, if it is
+/// more than one. If the channel has its own clock, it is one more or less now and then.
 fn period_between_nulls(distances: &[usize]) -> Option<usize> {
     let total: usize = distances.iter().sum();
-    let (period, _) = distances.iter().enumerate().max_by_key(|(_, n)| **n)?;
-    let near = distances.iter().skip(period.saturating_sub(1)).take(3);
-    let near: usize = near.sum();
-    let fits = near as f64 >= FITTING_SHARE * total as f64 && total >= LEAST_CHANGES;
+    let fit = Fit::of(distances)?;
+    let fits = fit.all() as f64 >= FITTING_SHARE * total as f64 && total >= LEAST_CHANGES;
     // Beside a full-rate channel's distance of one, two is a lost sample.
     let is_full_rate = 2 * distances.get(1).copied().unwrap_or_default() >= total;
-    (period > 1 && fits && !is_full_rate).then_some(period)
+    (fit.period > 1 && fits && !is_full_rate && fit.has_few_losses()).then_some(fit.period)
+}
+
+/// Distances that fit the most frequent one.
+struct Fit {
+    period: usize,
+    /// Number of distances of the period.
+    exact: usize,
+    /// Number of distances within one sample of the period.
+    near: usize,
+    /// Number of longer distances within one sample of a multiple of the period.
+    with_losses: usize,
+}
+
+impl Fit {
+    fn of(distances: &[usize]) -> Option<Fit> {
+        let (period, exact) = distances.iter().enumerate().max_by_key(|(_, n)| **n)?;
+        let near = |multiple: usize| -> usize {
+            let around = distances.iter().skip(multiple.saturating_sub(1));
+            around.take(3).sum()
+        };
+        let multiples = (2..=MOST_UPDATES).map(|n| n * period);
+        // Of a period of a few samples, every distance is near a multiple.
+        let is_distinct = period >= SHORTEST_WITH_LOSSES;
+        Some(Fit {
+            period,
+            exact: *exact,
+            near: near(period),
+            with_losses: if is_distinct {
+                multiples.map(near).sum()
+            } else {
+                0
+            },
+        })
+    }
+
+    fn all(&self) -> usize {
+        self.near + self.with_losses
+    }
+
+    /// `true` if at least three of four distances have no lost update in them.
+    fn has_few_losses(&self) -> bool {
+        3 * self.with_losses <= self.near
+    }
 }
 
 /// `true` if a span of samples has room for this number of changes in one phase of a period.
@@ -182,4 +226,33 @@ fn held_with_period(period: usize, changes: &[usize]) -> Option<UpdateRate> {
         period,
         held_phase: Some(phase),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Period of a channel with a value every `period` samples, of which some updates are lost.
+    fn period(period: usize, updates: usize, is_lost: impl Fn(usize) -> bool) -> Option<usize> {
+        let value = |k: usize| {
+            let is_update = k.is_multiple_of(period) && !is_lost(k / period);
+            if is_update {
+                (k as f64).sin()
+            } else {
+                f64::NAN
+            }
+        };
+        let values: Vec<f64> = (0..period * updates).map(value).collect();
+        UpdateRate::infer(&values, 0).map(|rate| rate.period)
+    }
+
+    #[test]
+    fn lost_updates_do_not_hide_a_slow_rate() {
+        assert_eq!(period(20, 16, |_| false), Some(20));
+        assert_eq!(period(20, 16, |n| n == 7), Some(20));
+        assert_eq!(period(20, 16, |n| n == 7 || n == 8), Some(20));
+        assert_eq!(period(20, 60, |n| n % 10 == 3), Some(20));
+        assert_eq!(period(20, 60, |n| n % 2 == 1), Some(40));
+        assert_ne!(period(20, 16, |n| n % 3 == 1), Some(20));
+    }
 }

@@ -268,7 +268,9 @@ fn probable_unit(stated: &str, lift: f64) -> Option<&'static str> {
         let factor = unit.factor_to(stated).unwrap_or(f64::NAN);
         (lift * factor / TYPICAL_LIFT).ln().abs()
     };
-    let other = stated.alike().filter(|unit| unit.name != stated.name);
+    let other = stated
+        .alike()
+        .filter(|unit| unit.name != stated.name && !unit.is_rare);
     other
         .min_by(|a, b| strangeness(a).total_cmp(&strangeness(b)))
         .filter(|unit| strangeness(unit) < (lift / TYPICAL_LIFT).ln().abs())

@@ -1,20 +1,22 @@
 //! Delimited text: any delimiter, a row of units, decimal commas, comments before the header.
 
+use std::collections::BTreeSet;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufReader, Read};
 use std::path::Path;
 
+use super::calendar_time::CalendarTime;
+use super::delimited::{
+    Delimiter, Failures, HEAD_ROWS, fields, is_missing, is_number, name_and_unit, next_line,
+    number, plain_unit,
+};
 use super::flight_file::{FlightWriter, batch_rows};
 use super::imported_contents::{ImportedColumn, ImportedContents, refused};
+use super::tall_text::TallLayout;
 use crate::error::{Error, Result};
 
 /// Bytes at the beginning from which the layout follows.
 const HEAD_BYTES: u64 = 1 << 18;
-/// Rows at the beginning that must hold a number for a column to be one of numbers.
-const HEAD_ROWS: usize = 500;
-/// Longest line: far more than any recorder's.
-const LONGEST_LINE: u64 = 1 << 20;
-
 /// Layout of a text.
 #[derive(Clone, Debug, PartialEq)]
 struct Layout {
@@ -22,18 +24,20 @@ struct Layout {
     decimal_comma: bool,
     /// Lines before the first row of numbers.
     skipped: usize,
-    /// Columns of numbers, with their places in a row.
-    columns: Vec<(usize, ImportedColumn)>,
+    /// Columns of numbers.
+    columns: Vec<NumberColumn>,
     /// Columns of text.
     dropped: Vec<String>,
 }
 
-/// Separator of fields.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Delimiter {
-    Character(char),
-    /// One or more spaces or tabs.
-    Space,
+/// Column of numbers.
+#[derive(Clone, Debug, PartialEq)]
+struct NumberColumn {
+    /// Its place in a row.
+    at: usize,
+    head: ImportedColumn,
+    /// First of its values, if these are calendar times.
+    origin: Option<CalendarTime>,
 }
 
 /// Imports a delimited text.
@@ -49,11 +53,14 @@ pub fn import(source: &Path, file: &Path) -> Result<ImportedContents> {
         return Err(refused(source, what));
     }
     let head = String::from_utf8_lossy(&head).into_owned();
+    if let Some(tall) = TallLayout::of(&whole_lines(&head)) {
+        return tall.import(source, file);
+    }
     let layout = Layout::of(&head).map_err(|what| refused(source, &what))?;
     let columns: Vec<ImportedColumn> = layout
         .columns
         .iter()
-        .map(|(_, column)| column.clone())
+        .map(|column| column.head.clone())
         .collect();
     let mut reader = BufReader::new(opened()?);
     let mut failures = Failures::default();
@@ -62,15 +69,7 @@ pub fn import(source: &Path, file: &Path) -> Result<ImportedContents> {
     let at_once = batch_rows(columns.len());
     let mut line = Vec::new();
     let mut number = 0;
-    loop {
-        line.clear();
-        let read = (&mut reader)
-            .take(LONGEST_LINE)
-            .read_until(b'\n', &mut line)
-            .map_err(unreadable)?;
-        if read == 0 {
-            break;
-        }
+    while next_line(&mut reader, &mut line).map_err(unreadable)? {
         number += 1;
         let text = String::from_utf8_lossy(&line);
         if number > layout.skipped && !text.trim().is_empty() {
@@ -90,12 +89,29 @@ pub fn import(source: &Path, file: &Path) -> Result<ImportedContents> {
             layout.dropped.join(", ")
         ));
     }
+    let calendar = layout.columns.iter().filter(|c| c.origin.is_some());
+    let calendar: Vec<&str> = calendar.map(|c| c.head.name.as_str()).collect();
+    if !calendar.is_empty() {
+        notes.push(format!(
+            "calendar times are seconds from the first row's: {}",
+            calendar.join(", ")
+        ));
+    }
     Ok(ImportedContents {
         rows,
         columns,
         notes,
         folder: None,
     })
+}
+
+/// Lines of the beginning of a text, without one that may be cut off.
+fn whole_lines(head: &str) -> Vec<&str> {
+    let mut lines: Vec<&str> = head.lines().collect();
+    if head.len() as u64 >= HEAD_BYTES {
+        lines.pop();
+    }
+    lines
 }
 
 /// Kind of a text whose lines cannot be read, in words.
@@ -108,46 +124,10 @@ fn other_text(head: &[u8]) -> Option<&'static str> {
         .then_some("its lines end with carriage returns alone; save it with line feeds")
 }
 
-/// Fields in rows of numbers that are no numbers.
-#[derive(Debug, Default)]
-struct Failures {
-    fields: usize,
-    first: Option<(usize, String)>,
-    short_rows: usize,
-}
-
-impl Failures {
-    fn notes(&self) -> Vec<String> {
-        let mut notes = Vec::new();
-        if let Some((line, field)) = &self.first {
-            notes.push(format!(
-                "{} fields that are no numbers are missing values, the first on line {line}: `{field}`",
-                self.fields
-            ));
-        }
-        if self.short_rows > 0 {
-            notes.push(format!(
-                "{} rows have fewer fields than the header",
-                self.short_rows
-            ));
-        }
-        notes
-    }
-}
-
-/// Words that recorders write for a missing value.
-const MISSING: [&str; 8] = ["", "nan", "na", "n/a", "null", "none", "-", "inf"];
-
 impl Layout {
     /// Layout that the beginning of a text has.
     fn of(head: &str) -> std::result::Result<Layout, String> {
-        let lines: Vec<&str> = head.lines().collect();
-        let usable = if head.len() as u64 >= HEAD_BYTES {
-            lines.len().saturating_sub(1)
-        } else {
-            lines.len()
-        };
-        let lines = &lines[..usable];
+        let lines = &whole_lines(head)[..];
         let delimiters = ['\t', ';', ',', '|'].map(Delimiter::Character);
         let layouts = delimiters
             .into_iter()
@@ -176,7 +156,10 @@ impl Layout {
     /// more numbers.
     fn with(lines: &[&str], delimiter: Delimiter, decimal_comma: bool) -> Option<(usize, Layout)> {
         let fields = |line: &str| fields(line, delimiter);
-        let value = |field: &String| number(field, decimal_comma);
+        let value = |field: &String| {
+            let calendar = || CalendarTime::parse(field).map(|_| 0.0);
+            number(field, decimal_comma).or_else(calendar)
+        };
         // A recording may begin with missing values; lines above it have text beside their numbers.
         let is_data = |line: &&str| {
             let fields = fields(line);
@@ -186,18 +169,13 @@ impl Layout {
         };
         let first = lines.iter().position(is_data)?;
         let width = fields(lines[first]).len();
-        let headers: Vec<(usize, Vec<String>)> = lines[..first]
+        let headers: Vec<HeadLine> = lines[..first]
             .iter()
             .enumerate()
-            .map(|(at, line)| {
-                (
-                    at,
-                    fields(line.trim_start_matches(['#', '%', '!']).trim_start()),
-                )
-            })
-            .filter(|(_, fields)| fields.len() == width)
+            .map(|(at, line)| HeadLine::of(at, line, delimiter))
+            .filter(|line| line.fields.len() == width)
             .collect();
-        let (names, units) = names_and_units(&headers, width);
+        let (names, units) = names_and_units(&headers, width, delimiter);
         let rows: Vec<Vec<String>> = lines[first..]
             .iter()
             .take(HEAD_ROWS)
@@ -222,9 +200,20 @@ impl Layout {
                 .cloned()
                 .filter(|unit| !unit.is_empty())
                 .or(own);
-            (at, ImportedColumn { name, unit })
+            let calendar = |row: &Vec<String>| CalendarTime::parse(row.get(at)?);
+            let origin = rows.iter().find_map(calendar);
+            let unit = if origin.is_some() {
+                Some("s".to_owned())
+            } else {
+                unit
+            };
+            NumberColumn {
+                at,
+                head: ImportedColumn { name, unit },
+                origin,
+            }
         };
-        let mut columns: Vec<(usize, ImportedColumn)> = kept.iter().map(|at| column(*at)).collect();
+        let mut columns: Vec<NumberColumn> = kept.iter().map(|at| column(*at)).collect();
         make_unique(&mut columns);
         let all = kept.iter().map(|at| numbers(*at)).sum();
         let dropped = dropped.into_iter().map(|at| names[at].clone()).collect();
@@ -266,16 +255,16 @@ impl Layout {
         failures: &mut Failures,
     ) {
         let fields = fields(line, self.delimiter);
-        for (column, (at, _)) in batch.iter_mut().zip(&self.columns) {
+        for (column, NumberColumn { at, origin, .. }) in batch.iter_mut().zip(&self.columns) {
             let field = fields.get(*at);
-            let value = field.and_then(|field| number(field, self.decimal_comma));
+            let value = field.and_then(|field| match origin {
+                Some(first) => CalendarTime::parse(field).map(|time| time.since(*first)),
+                None => number(field, self.decimal_comma),
+            });
             match (field, value) {
                 (None, _) => failures.short_rows += 1,
                 (Some(field), None) if !is_missing(field) => {
-                    failures.fields += 1;
-                    failures
-                        .first
-                        .get_or_insert((number_of_line, field.clone()));
+                    failures.add(number_of_line, field);
                 }
                 _ => {}
             }
@@ -284,18 +273,67 @@ impl Layout {
     }
 }
 
-/// Names and units from the lines above the numbers: the header is the nearest line of text, and the line
-/// below it holds units if there are two.
-fn names_and_units(headers: &[(usize, Vec<String>)], width: usize) -> (Vec<String>, Vec<String>) {
+/// A line above the numbers.
+#[derive(Clone, Debug)]
+struct HeadLine {
+    /// Its place in the text.
+    at: usize,
+    is_comment: bool,
+    fields: Vec<String>,
+}
+
+impl HeadLine {
+    fn of(at: usize, line: &str, delimiter: Delimiter) -> HeadLine {
+        let signs = ['#', '%', '!'];
+        let text = line.trim_start_matches(signs).trim_start();
+        HeadLine {
+            at,
+            is_comment: line.starts_with(signs),
+            fields: fields(text, delimiter),
+        }
+    }
+
+    /// `true` if the line names every column that the line below has a field for, each by another
+    /// word.
+    fn names_columns_of(&self, below: &HeadLine) -> bool {
+        let is_word = |name: &&String| !is_number(name);
+        let names = || self.fields.iter().filter(|name| !name.is_empty());
+        let distinct: BTreeSet<&String> = names().filter(is_word).collect();
+        let mut pairs = self.fields.iter().zip(&below.fields);
+        distinct.len() >= 2
+            && distinct.len() == names().count()
+            && !below.fields.iter().any(|field| is_number(field))
+            && pairs.all(|(name, below)| !name.is_empty() || below.is_empty())
+    }
+}
+
+/// Names and units from the lines above the numbers. Of two lines the upper one is the header if the
+/// lower one holds units that harvest has, or if it names every column by another word. A line alone
+/// is the header.
+fn names_and_units(
+    headers: &[HeadLine],
+    width: usize,
+    delimiter: Delimiter,
+) -> (Vec<String>, Vec<String>) {
     let numbered = || (1..=width).map(|n| format!("column_{n}")).collect();
     match headers {
         [] => (numbered(), Vec::new()),
-        [.., (first, names), (second, units)] if second - first == 1 && are_units(units) => (
-            names.clone(),
-            units.iter().map(|unit| plain_unit(unit)).collect(),
-        ),
-        [.., (_, names)] => (names.clone(), Vec::new()),
+        [.., names, units] if is_above_units(names, units, delimiter) => {
+            let units = units.fields.iter().map(|unit| plain_unit(unit));
+            (names.fields.clone(), units.collect())
+        }
+        [.., names] => (names.fields.clone(), Vec::new()),
     }
+}
+
+/// `true` if a line is the header above a line of units.
+fn is_above_units(names: &HeadLine, units: &HeadLine, delimiter: Delimiter) -> bool {
+    if units.at - names.at != 1 {
+        return false;
+    }
+    // Between spaces, prose has fields as well, and a comment may be above the header.
+    let is_prose = delimiter == Delimiter::Space || names.is_comment && !units.is_comment;
+    are_units(&units.fields) || !is_prose && names.names_columns_of(units)
 }
 
 /// `true` for a row of units: most fields are units that harvest has, or in brackets, or empty.
@@ -309,34 +347,13 @@ fn are_units(fields: &[String]) -> bool {
     2 * fields.iter().filter(is_unit).count() > fields.len()
 }
 
-/// A unit without brackets.
-fn plain_unit(text: &str) -> String {
-    text.trim()
-        .trim_matches(['[', ']', '(', ')', '{', '}'])
-        .trim()
-        .to_owned()
-}
-
-/// Name of a column, and the unit in brackets after it.
-fn name_and_unit(header: &str) -> (String, Option<String>) {
-    let header = header.trim();
-    let bracket = header.find(['[', '(', '{']).filter(|at| *at > 0);
-    match bracket {
-        Some(at) if header.ends_with([']', ')', '}']) => {
-            let unit = plain_unit(&header[at..]);
-            (
-                header[..at].trim().to_owned(),
-                Some(unit).filter(|u| !u.is_empty()),
-            )
-        }
-        _ => (header.to_owned(), None),
-    }
-}
-
 /// Gives columns without a name, or with the name of another, a number.
-fn make_unique(columns: &mut [(usize, ImportedColumn)]) {
-    let mut taken = std::collections::BTreeSet::new();
-    for (at, column) in columns {
+fn make_unique(columns: &mut [NumberColumn]) {
+    let mut taken = BTreeSet::new();
+    for NumberColumn {
+        at, head: column, ..
+    } in columns
+    {
         if column.name.is_empty() {
             column.name = format!("column_{}", *at + 1);
         }
@@ -349,65 +366,6 @@ fn make_unique(columns: &mut [(usize, ImportedColumn)]) {
     }
 }
 
-/// Fields of a line without quotes and spaces around them.
-fn fields(line: &str, delimiter: Delimiter) -> Vec<String> {
-    let plain = |field: &str| field.trim().trim_matches('"').trim().to_owned();
-    let line = line
-        .trim_end_matches(['\r', '\n'])
-        .trim_start_matches('\u{feff}');
-    match delimiter {
-        Delimiter::Space => line.split_whitespace().map(plain).collect(),
-        Delimiter::Character(c) if line.contains('"') => {
-            quoted(line, c).iter().map(|f| plain(f)).collect()
-        }
-        Delimiter::Character(c) => line.split(c).map(plain).collect(),
-    }
-}
-
-/// Fields of a line in which quotes protect delimiters.
-fn quoted(line: &str, delimiter: char) -> Vec<String> {
-    let mut fields = vec![String::new()];
-    let mut inside = false;
-    for c in line.chars() {
-        inside ^= c == '"';
-        if c == delimiter && !inside {
-            fields.push(String::new());
-        } else if let Some(field) = fields.last_mut() {
-            field.push(c);
-        }
-    }
-    fields
-}
-
-fn is_missing(field: &str) -> bool {
-    MISSING.contains(&field.to_lowercase().as_str())
-}
-
-/// A number, or a time of day as seconds: `12:30:05.25`.
-fn number(field: &str, decimal_comma: bool) -> Option<f64> {
-    if is_missing(field) {
-        return None;
-    }
-    let parse = |text: &str| {
-        let text = text.trim();
-        let is_number = text.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
-        match text.split_once(',') {
-            _ if !is_number => None,
-            Some((whole, part)) if decimal_comma => format!("{whole}.{part}").parse().ok(),
-            Some(_) => None,
-            None => text.replace(['D', 'd'], "e").parse().ok(),
-        }
-    };
-    let parts: Vec<&str> = field.split(':').collect();
-    match parts.as_slice() {
-        [one] => parse(one),
-        [hours, minutes, seconds] => {
-            Some(parse(hours)? * 3600.0 + parse(minutes)? * 60.0 + parse(seconds)?)
-        }
-        _ => None,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -417,7 +375,7 @@ mod tests {
     }
 
     fn names(layout: &Layout) -> Vec<(&str, &str)> {
-        let columns = layout.columns.iter().map(|(_, c)| c);
+        let columns = layout.columns.iter().map(|c| &c.head);
         columns
             .map(|c| (c.name.as_str(), c.unit.as_deref().unwrap_or("")))
             .collect()
@@ -445,6 +403,31 @@ mod tests {
         );
         let bare = layout("0 1 2\n1 2 3\n");
         assert_eq!(names(&bare)[2].0, "column_3");
+    }
+
+    #[test]
+    fn a_row_of_words_below_the_header_is_one_of_units_known_or_not() {
+        let german = layout("Zeit;q;alpha\ns;Grad/s;Grad\n0,1;1,5;2\n0,2;1,6;2\n");
+        assert_eq!(
+            names(&german),
+            [("Zeit", "s"), ("q", "Grad/s"), ("alpha", "Grad")]
+        );
+        let unknown = layout("t\tp\tq\nsek.\tGrd/s\tGrd/s\n0\t1\t2\n1\t2\t3\n");
+        assert_eq!(
+            names(&unknown),
+            [("t", "sek."), ("p", "Grd/s"), ("q", "Grd/s")]
+        );
+        // A title names no column, and prose between spaces or behind a comment sign is no header.
+        for text in [
+            "Flight 12;;\ntime;p;q\n0;1;2\n1;2;3\n",
+            "Rates;Rates;Rates\ntime;p;q\n0;1;2\n1;2;3\n",
+            "# left;right;both\ntime;p;q\n0;1;2\n1;2;3\n",
+            "recorded by nobody\ntime p q\n0 1 2\n1 2 3\n",
+        ] {
+            let layout = layout(text);
+            let found = names(&layout).into_iter().map(|(name, _)| name);
+            assert_eq!(found.collect::<Vec<_>>(), ["time", "p", "q"], "{text}");
+        }
     }
 
     #[test]
@@ -489,26 +472,16 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_read_to_the_last_bit() {
-        for value in [
-            0.1_f64 + 0.2,
-            1.0 / 3.0,
-            -5e-324,
-            1.797e308,
-            123_456_789.123_456_78,
-        ] {
-            assert_eq!(
-                number(&format!("{value:?}"), false).map(f64::to_bits),
-                Some(value.to_bits())
-            );
-            let comma = format!("{value:?}").replace('.', ",");
-            assert_eq!(
-                number(&comma, true).map(f64::to_bits),
-                Some(value.to_bits())
-            );
-        }
-        assert_eq!(number("1,5", false), None);
-        assert_eq!(number("e5", false), None);
+    fn calendar_times_are_seconds_from_the_first() {
+        let text = "time [UTC];q\n2024-05-01T12:30:05.25Z;1,5\n2024-05-01T12:30:05.27Z;1,6\n";
+        let layout = layout(text);
+        assert_eq!(names(&layout), [("time", "s"), ("q", "")]);
+        let (mut batch, mut failures) = (vec![Vec::new(), Vec::new()], Failures::default());
+        layout.append("2024-05-02T00:00:05.25Z;1,5", 2, &mut batch, &mut failures);
+        layout.append("05.25;1,5", 3, &mut batch, &mut failures);
+        assert_eq!(batch[0][0].to_bits(), 41_400.0_f64.to_bits());
+        assert!(batch[0][1].is_nan());
+        assert!(failures.notes()[0].contains("line 3: `05.25`"));
     }
 
     #[test]

@@ -43,3 +43,11 @@ pub fn refused(source: &Path, what: &str) -> Error {
         what: what.to_owned(),
     }
 }
+
+/// Error of a temporary file as one of the source that it was made from.
+pub fn of_scratch(error: Error, source: &Path) -> Error {
+    match error {
+        Error::Archive { what, .. } => refused(source, &what),
+        other => other,
+    }
+}

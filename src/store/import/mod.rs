@@ -4,20 +4,26 @@
 //! CSV and tall Parquet are read row by row, in bounded memory. A MATLAB or HDF5 file is read
 //! whole, since its columns follow one another.
 
-mod imported_contents;
+mod calendar_time;
 mod csv_text;
+mod delimited;
 mod flight_file;
+mod gzip;
+mod imported_contents;
 mod matlab;
 pub(super) mod tall;
+mod tall_text;
 mod time_order;
 
+use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::{Digest, atomic, regular};
 use crate::error::{Error, Result};
+use crate::units::Unit;
 
-use imported_contents::refused;
+use imported_contents::{ImportedContents, of_scratch, refused};
 
 pub use imported_contents::{Imported, ImportedColumn};
 
@@ -62,14 +68,16 @@ pub fn is_foreign(source: &Path) -> bool {
 }
 
 fn has_known_name(path: &Path) -> bool {
-    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    let name = gzip::unpacked_name(path);
+    let extension = name.extension().map(|e| e.to_string_lossy().to_lowercase());
     extension.is_some_and(|e| EXTENSIONS.contains(&e.as_str()))
 }
 
 /// File of the archive that a source becomes.
 #[must_use]
 pub fn target(source: &Path, folder: &Path) -> PathBuf {
-    let stem = source.file_stem().map(|s| s.to_string_lossy().into_owned());
+    let name = gzip::unpacked_name(source);
+    let stem = name.file_stem().map(|s| s.to_string_lossy().into_owned());
     folder.join(format!("{}.parquet", stem.unwrap_or_default()))
 }
 
@@ -87,11 +95,17 @@ pub fn import(source: &Path, folder: &Path) -> Result<Imported> {
         ));
     }
     let contents = match Format::of(source)? {
-        Format::Csv => csv_text::import(source, &file)?,
-        Format::Matlab => matlab::import_level_5(source, &file)?,
-        Format::Hdf5 => matlab::import_hdf5(source, &file)?,
-        Format::Parquet => tall::import(source, &file)?,
+        Format::Gzip => {
+            let unpacked = gzip::unpacked(source, folder)?;
+            let place = unpacked.path();
+            let contents = import_format(Format::of(place)?, place, &file);
+            // The temporary file is gone when the message is read.
+            contents.map_err(|e| of_scratch(e, source))?
+        }
+        format => import_format(format, source, &file)?,
     };
+    let mut notes = contents.notes;
+    notes.extend(unknown_units(&contents.columns));
     let digest = Digest::of_file(source)?;
     Ok(Imported {
         source: source.to_owned(),
@@ -99,7 +113,42 @@ pub fn import(source: &Path, folder: &Path) -> Result<Imported> {
         file: contents.folder.unwrap_or(file),
         rows: contents.rows,
         columns: contents.columns,
-        notes: contents.notes,
+        notes,
+    })
+}
+
+fn import_format(format: Format, source: &Path, file: &Path) -> Result<ImportedContents> {
+    match format {
+        Format::Csv => csv_text::import(source, file),
+        Format::Matlab => matlab::import_level_5(source, file),
+        Format::Hdf5 => matlab::import_hdf5(source, file),
+        Format::Parquet => tall::import(source, file),
+        Format::Gzip => Err(refused(source, "it is packed twice; unpack it first")),
+    }
+}
+
+/// Note about units that harvest does not have.
+fn unknown_units(columns: &[ImportedColumn]) -> Option<String> {
+    let mut unknown: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    for column in columns {
+        let unit = column.unit.as_deref().map(str::trim).unwrap_or_default();
+        if !unit.is_empty() && Unit::parse(unit).is_err() {
+            unknown.entry(unit).or_default().push(&column.name);
+        }
+    }
+    let in_words = |(unit, names): (&str, Vec<&str>)| format!("`{unit}` of {}", names.join(", "));
+    let words: Vec<String> = unknown.into_iter().map(in_words).collect();
+    let is_one = words.len() == 1;
+    let what = if is_one {
+        "this unit is"
+    } else {
+        "these units are"
+    };
+    (!words.is_empty()).then(|| {
+        format!(
+            "{what} unknown to harvest and kept as text: {}",
+            words.join("; ")
+        )
     })
 }
 
@@ -122,6 +171,7 @@ const HDF5_SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Format {
     Csv,
+    Gzip,
     Matlab,
     Parquet,
     Hdf5,
@@ -138,7 +188,9 @@ impl Format {
             || head
                 .get(512..)
                 .is_some_and(|rest| rest.starts_with(HDF5_SIGNATURE));
-        Ok(if is_hdf5 {
+        Ok(if head.starts_with(gzip::SIGNATURE) {
+            Format::Gzip
+        } else if is_hdf5 {
             Format::Hdf5
         } else if head.starts_with(b"MATLAB 5.0") {
             Format::Matlab

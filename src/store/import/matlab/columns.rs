@@ -165,8 +165,29 @@ impl Table {
             }
             kept.push((head, values));
         }
+        notes.extend(strip_common_struct(&mut kept));
         (kept, notes)
     }
+}
+
+/// Strips the struct that all names begin with, `rec.` of `rec.q` and `rec.de`. Returns a note about it.
+fn strip_common_struct(columns: &mut [(ImportedColumn, Vec<f64>)]) -> Option<String> {
+    let (first, _) = columns.first()?;
+    let dots = first.name.match_indices('.').map(|(at, _)| at + 1);
+    let is_common = |end: &usize| {
+        let start = &first.name[..*end];
+        let rest = |name: &str| {
+            name.strip_prefix(start)
+                .is_some_and(|rest| !rest.is_empty())
+        };
+        columns.iter().all(|(head, _)| rest(&head.name))
+    };
+    let end = dots.filter(is_common).max()?;
+    let start = first.name[..end].to_owned();
+    for (head, _) in columns {
+        head.name.drain(..end);
+    }
+    Some(format!("all names begin with `{start}`, which is left out"))
 }
 
 /// Unit and values of a struct that holds one signal: `data` or `values`, and perhaps `unit`.
@@ -186,4 +207,48 @@ fn signal_of(fields: &[(String, Value)]) -> Option<(Option<String>, Vec<f64>)> {
     };
     let is_vector = (*rows == 1 || *columns == 1) && values.len() > 1;
     is_vector.then(|| (unit, values.clone()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stripped(names: &[&str]) -> (Vec<String>, Option<String>) {
+        let column = |name: &&str| {
+            let head = ImportedColumn {
+                name: (*name).to_owned(),
+                unit: None,
+            };
+            (head, Vec::new())
+        };
+        let mut columns: Vec<_> = names.iter().map(column).collect();
+        let note = strip_common_struct(&mut columns);
+        (
+            columns.into_iter().map(|(head, _)| head.name).collect(),
+            note,
+        )
+    }
+
+    #[test]
+    fn the_struct_that_holds_all_columns_is_left_out_of_their_names() {
+        let (names, note) = stripped(&["rec.q", "rec.de"]);
+        assert_eq!(names, ["q", "de"]);
+        assert!(note.unwrap().contains("`rec.`"));
+        let (names, _) = stripped(&["a.fast.q", "a.fast.p"]);
+        assert_eq!(names, ["q", "p"]);
+        let (names, _) = stripped(&["a.fast.q", "a.slow.q"]);
+        assert_eq!(names, ["fast.q", "slow.q"]);
+        for other in [
+            &["rec.q", "time"][..],
+            &["rec.q", "recorder.q"],
+            &["q", "de"],
+            &[],
+        ] {
+            let (names, note) = stripped(other);
+            assert_eq!(
+                (names.iter().map(String::as_str).collect::<Vec<_>>(), note),
+                (other.to_vec(), None)
+            );
+        }
+    }
 }

@@ -17,7 +17,7 @@ use super::imported_contents::{ImportedContents, refused};
 use crate::error::Result;
 use crate::store::atomic::Draft;
 
-pub use source::Tall;
+pub use source::{Role, Tall};
 
 /// Imports a Parquet file of three or four columns. One of several parts becomes a folder of files.
 pub fn import(source: &Path, file: &Path) -> Result<ImportedContents> {
@@ -26,6 +26,11 @@ pub fn import(source: &Path, file: &Path) -> Result<ImportedContents> {
                     init --from`; import takes tall files with the columns time, name, value and perhaps unit";
         return Err(refused(source, what));
     };
+    import_opened(&tall, file)
+}
+
+/// Imports an opened file.
+pub fn import_opened(tall: &Tall, file: &Path) -> Result<ImportedContents> {
     let survey = tall.survey()?;
     let parts = tall.parts(&survey, file)?;
     let folder = (parts.len() > 1).then(|| folder_of(file));
@@ -35,7 +40,7 @@ pub fn import(source: &Path, file: &Path) -> Result<ImportedContents> {
     };
     let tables = tall.tables(&survey, &parts, &place, |_| true)?;
     if tables.is_empty() {
-        return Err(refused(source, "it has no values"));
+        return Err(refused(&tall.source, "it has no values"));
     }
     let mut contents = ImportedContents::default();
     let mut replaced = 0;

@@ -20,20 +20,38 @@ use crate::store::recorder::UNIT;
 use crate::store::regular;
 use crate::units::Unit;
 
-/// Names of the columns of tall files.
-const TIMES: [&str; 5] = ["time", "t", "timestamp", "time_s", "times"];
-const NAMES: [&str; 8] = [
-    "name",
-    "signal",
-    "channel",
-    "parameter",
-    "variable",
-    "tag",
-    "sensor",
-    "param",
-];
-const VALUES: [&str; 3] = ["value", "val", "data"];
-const UNITS: [&str; 2] = ["unit", "units"];
+/// Role of a column of a tall file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    Time,
+    Name,
+    Value,
+    Unit,
+}
+
+impl Role {
+    /// `true` if a column of this name has the role.
+    #[must_use]
+    pub fn has(self, name: &str) -> bool {
+        let names: &[&str] = match self {
+            Role::Time => &["time", "t", "timestamp", "time_s", "times", "zeit"],
+            Role::Name => &[
+                "name",
+                "signal",
+                "channel",
+                "parameter",
+                "variable",
+                "tag",
+                "sensor",
+                "param",
+                "kanal",
+            ],
+            Role::Value => &["value", "val", "data", "wert"],
+            Role::Unit => &["unit", "units", "einheit"],
+        };
+        names.contains(&name.to_lowercase().as_str())
+    }
+}
 
 /// Rows that are read at once.
 const READ_ROWS: usize = 16_384;
@@ -62,17 +80,17 @@ struct Roles {
 
 /// Columns of a tall file of this schema; `None` for a schema that lacks time, name or value.
 fn roles(fields: &[Arc<Field>]) -> Option<Roles> {
-    let find = |names: &[&str]| {
+    let find = |role: Role| {
         let mut fields = fields.iter();
         fields
-            .find(|f| names.contains(&f.name().to_lowercase().as_str()))
+            .find(|f| role.has(f.name()))
             .map(|f| f.name().clone())
     };
     Some(Roles {
-        time: find(&TIMES)?,
-        name: find(&NAMES)?,
-        value: find(&VALUES)?,
-        unit: find(&UNITS),
+        time: find(Role::Time)?,
+        name: find(Role::Name)?,
+        value: find(Role::Value)?,
+        unit: find(Role::Unit),
     })
 }
 
