@@ -28,19 +28,31 @@ const DEFINITION_INDENT: f32 = 90.0;
 /// Space after an entry of a list, pt.
 const ENTRY_GAP: f32 = 1.5;
 
+/// Smallest scale of the drawings of an element that is to fit on one page: their text stays near 5 pt.
+const LEAST_SHRINKING: f32 = 0.7;
+
 /// Maker of items from elements.
 #[derive(Debug)]
 pub struct Blocks<'a> {
     fonts: &'a Fonts,
     /// Ids of open elements that have no item yet.
     pending_anchors: Vec<String>,
+    /// Height of a page, pt.
+    page_height: f32,
+    /// Scale of drawings over that of their column.
+    shrinking: f32,
+    /// Height of all drawings so far, pt.
+    drawn_height: f32,
 }
 
 impl<'a> Blocks<'a> {
-    pub fn new(fonts: &'a Fonts) -> Self {
+    pub fn new(fonts: &'a Fonts, page_height: f32) -> Self {
         Blocks {
             fonts,
             pending_anchors: Vec::new(),
+            page_height,
+            shrinking: 1.0,
+            drawn_height: 0.0,
         }
     }
 
@@ -94,11 +106,32 @@ impl<'a> Blocks<'a> {
                 ..Item::default()
             });
         } else {
-            let (made, space_after) = self.element(node, width, style);
+            let (made, space_after) = if has_class(node, "one-page") {
+                self.on_one_page(node, width, style)
+            } else {
+                self.element(node, width, style)
+            };
             self.add(made, &mut items);
             items.push(Item::room(space_after));
         }
         items
+    }
+
+    /// Items of an element, with smaller drawings where it then fits on one page.
+    fn on_one_page(&mut self, node: Node, width: f32, style: Style) -> (Vec<Item>, f32) {
+        let (anchors, drawn_before) = (self.pending_anchors.clone(), self.drawn_height);
+        let made = self.element(node, width, style);
+        let drawn = self.drawn_height - drawn_before;
+        let excess = height_on_page(&made.0) - self.page_height;
+        let shrinking = self.shrinking * (drawn - excess) / drawn.max(1.0);
+        if excess <= 0.0 || shrinking < LEAST_SHRINKING {
+            return made;
+        }
+        self.pending_anchors = anchors;
+        let usual = std::mem::replace(&mut self.shrinking, shrinking);
+        let smaller = self.element(node, width, style);
+        self.shrinking = usual;
+        smaller
     }
 
     /// Items of an element, and the space after it (pt).
@@ -206,7 +239,8 @@ impl<'a> Blocks<'a> {
 
     fn drawing(&mut self, node: Node, width: f32) -> Vec<Item> {
         let drawing = svg::drawing(node, self.fonts);
-        let scale = (width / drawing.width.max(1.0)).min(LARGEST_UNIT);
+        let scale = (width / drawing.width.max(1.0)).min(LARGEST_UNIT) * self.shrinking;
+        self.drawn_height += drawing.height * scale;
         vec![Item {
             height: drawing.height * scale,
             marks: vec![Mark::Drawing {
@@ -237,6 +271,15 @@ impl<'a> Blocks<'a> {
     }
 }
 
+/// Height of items that begin a page: without empty space before the first and after the last.
+fn height_on_page(items: &[Item]) -> f32 {
+    let is_set = |item: &Item| !item.is_room;
+    let first = items.iter().position(is_set).unwrap_or(0);
+    let end = items.iter().rposition(is_set).map_or(0, |last| last + 1);
+    let set = items.get(first..end).unwrap_or(&[]);
+    set.iter().map(|item| item.height).sum()
+}
+
 /// Puts an item beside the first of some lines, with room below them if it is higher.
 fn put_beside(item: &Item, lines: &mut Vec<Item>) {
     let missing = item.height - lines.iter().map(|i| i.height).sum::<f32>();
@@ -248,5 +291,42 @@ fn put_beside(item: &Item, lines: &mut Vec<Item>) {
     }
     if let Some(first) = lines.first_mut() {
         first.absorb(item, 0.0, 0.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Height of the drawing, and of everything, of an element of one page of 300 pt with a drawing of 270 pt.
+    fn heights(paragraphs: usize) -> (f32, f32) {
+        let page = format!(
+            r#"<html><div class="one-page"><svg viewBox="0 0 300 270"/>{}</div></html>"#,
+            "<p>text</p>".repeat(paragraphs)
+        );
+        let xml = roxmltree::Document::parse(&page).unwrap();
+        let fonts = Fonts::load().unwrap();
+        let mut blocks = Blocks::new(&fonts, 300.0);
+        let items = blocks.children(xml.root_element(), 400.0, Style::of_size(TEXT_SIZE));
+        let drawing = items
+            .iter()
+            .find(|item| item.marks.iter().any(|m| matches!(m, Mark::Drawing { .. })));
+        (drawing.unwrap().height, height_on_page(&items))
+    }
+
+    #[test]
+    fn drawings_shrink_where_the_element_then_fits_on_one_page() {
+        let (drawing, all) = heights(1);
+        assert!((drawing - 270.0).abs() < 0.1 && all < 300.0, "it fits");
+        let (drawing, all) = heights(4);
+        assert!(
+            drawing < 265.0 && (all - 300.0).abs() < 0.1,
+            "{drawing} of {all}"
+        );
+        let (drawing, all) = heights(20);
+        assert!(
+            (drawing - 270.0).abs() < 0.1 && all > 500.0,
+            "too much in any case"
+        );
     }
 }

@@ -19,6 +19,7 @@
 //! | class | effect |
 //! |---|---|
 //! | `new-page` | begins a page |
+//! | `one-page` | its drawings shrink, by 30 % at most, where it then fits on one page |
 //! | `screen` | is omitted |
 //! | `note` (`p`), `small` (`div`) | small type |
 //! | `pairs` (`div`) | children two by two |
@@ -54,7 +55,7 @@ use roxmltree::{Document, ParsingOptions};
 use blocks::Blocks;
 use fonts::Fonts;
 use item::Style;
-use pagination::{MARGIN, WIDTH};
+use pagination::{MARGIN, PAGE_HEIGHT, WIDTH};
 
 /// Sets a page as a PDF.
 ///
@@ -81,7 +82,7 @@ pub fn pdf(html: &str) -> Result<Vec<u8>, String> {
         .find(|n| n.has_tag_name("body"))
         .unwrap_or(root);
     let style = Style::of_size(blocks::TEXT_SIZE);
-    let items = Blocks::new(&fonts).children(body, WIDTH - 2.0 * MARGIN, style);
+    let items = Blocks::new(&fonts, PAGE_HEIGHT).children(body, WIDTH - 2.0 * MARGIN, style);
     let document = pagination::paginate(items, &fonts);
     Ok(writer::write(&fonts, title, &document))
 }

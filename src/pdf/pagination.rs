@@ -11,6 +11,8 @@ pub const HEIGHT: f32 = 842.0;
 pub const MARGIN: f32 = 45.0;
 const TOP: f32 = 45.0;
 const BOTTOM: f32 = 52.0;
+/// Height between the margins of a page, pt.
+pub const PAGE_HEIGHT: f32 = HEIGHT - TOP - BOTTOM;
 
 /// Marks of a page, y from its top.
 #[derive(Debug, Default)]
@@ -41,11 +43,14 @@ pub struct PagedDocument {
 const MOST_ENTRIES: usize = 400;
 /// Height above which an item need not stay with the next one, since it would leave a page almost
 /// empty.
-const HIGHEST_KEPT: f32 = 0.8 * (HEIGHT - TOP - BOTTOM);
+const HIGHEST_KEPT: f32 = 0.8 * PAGE_HEIGHT;
 
 /// Divides items into pages.
 pub fn paginate(items: Vec<Item>, fonts: &Fonts) -> PagedDocument {
-    let items = with_contents(items, fonts);
+    let mut items = with_contents(items, fonts);
+    // Empty lines at the end need no page.
+    let end = items.iter().rposition(|item| !item.marks.is_empty());
+    items.truncate(end.map_or(0, |last| last + 1));
     let mut document = PagedDocument {
         pages: vec![Page::default()],
         ..PagedDocument::default()

@@ -72,6 +72,7 @@ pub fn make_report(
         correlations: &campaign.correlations,
         limits: &config.estimate.identifiability,
         posterior: &campaign.model.rows.posterior,
+        contributions: &campaign.model.rows.contributions,
         trends: &campaign.trends,
         specification: config.qualities.as_ref(),
         qualities: &campaign.qualities,

@@ -13,10 +13,10 @@ use crate::proof_of_match::{self, Matched};
 use crate::qualities::{Qualities, Specification};
 use crate::tables::{
     AgreementRow, Airframe, ChannelRow, ChannelVerdict, CheckRow, CheckVerdict, ComparisonRow,
-    CorrelationRow, DeviationBasis, EstimateRow, EventRow, EventVerdict, FitRow, FlightRow,
-    FlyingQuality, History, HistoryOutput, InstrumentRow, Level, LevelRow, MatchRow, MatchVerdict,
-    MatchVerdictRow, MatchedQuantity, ModelSource, Outcome, PosteriorRow, QualityRow, RootRow,
-    TrendRow, TunnelDifference, TunnelVerdict,
+    ContributionRow, CorrelationRow, DeviationBasis, EstimateRow, EventRow, EventVerdict, FitRow,
+    FlightRow, FlyingQuality, History, HistoryOutput, InstrumentRow, Level, LevelRow, MatchRow,
+    MatchVerdict, MatchVerdictRow, MatchedQuantity, ModelSource, Outcome, PosteriorRow, QualityRow,
+    RootRow, TrendRow, TunnelDifference, TunnelVerdict,
 };
 
 /// Owner of the rows that [`Contents`] borrows.
@@ -34,6 +34,7 @@ pub struct Campaign {
     pub tolerances: Option<proof_of_match::Specification>,
     pub matched: Vec<Matched>,
     pub posterior: Vec<PosteriorRow>,
+    pub contributions: Vec<ContributionRow>,
     pub comparison: Vec<ComparisonRow>,
     pub flights: Vec<FlightRow>,
     pub channels: Vec<ChannelRow>,
@@ -63,6 +64,7 @@ impl Campaign {
             correlations: &self.correlations,
             limits: &self.limits,
             posterior: &self.posterior,
+            contributions: &self.contributions,
             trends: &self.trends,
             specification: self.specification.as_ref(),
             qualities: &self.qualities,
@@ -397,6 +399,14 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
             equation_error: Some(0.05),
             equation_error_bound: Some(0.01),
             ..EstimateRow::without_results(&maneuver, name, unit, Status::Estimated)
+        });
+    }
+    for coefficient in axis.coefficients() {
+        campaign.contributions.push(ContributionRow {
+            maneuver_id: maneuver_id.clone(),
+            class: class.into(),
+            coefficient: format!("{coefficient:?}"),
+            weight: 1.0,
         });
     }
     campaign.maneuvers.push(maneuver);

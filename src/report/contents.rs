@@ -11,8 +11,9 @@ use crate::output_error::identifiability::CollinearityLimits;
 use crate::proof_of_match::{self, Matched};
 use crate::qualities::{Qualities, Specification};
 use crate::tables::{
-    AgreementRow, ChannelRow, CheckRow, ComparisonRow, CorrelationRow, EstimateRow, EventRow,
-    FitRow, FlightRow, History, InstrumentRow, InstrumentTrendRow, PosteriorRow, TrendRow,
+    AgreementRow, ChannelRow, CheckRow, ComparisonRow, ContributionRow, CorrelationRow,
+    EstimateRow, EventRow, FitRow, FlightRow, History, InstrumentRow, InstrumentTrendRow,
+    PosteriorRow, TrendRow,
 };
 
 /// A maneuver class of the configuration.
@@ -41,6 +42,8 @@ pub struct Contents<'a> {
     /// Limits above which a correlation, a variance inflation or a condition index is flagged.
     pub limits: &'a CollinearityLimits,
     pub posterior: &'a [PosteriorRow],
+    /// Maneuvers in the posterior.
+    pub contributions: &'a [ContributionRow],
     pub trends: &'a [TrendRow],
     /// Specification of flying qualities, and the rows judged by it; empty without a specification.
     pub specification: Option<&'a Specification>,

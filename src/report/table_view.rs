@@ -18,6 +18,8 @@ pub struct TableView {
     pub links: Vec<String>,
     /// Class token by which each row is hidden; empty for a table that is not filtered.
     pub classes: Vec<String>,
+    /// Columns of each row that are marked as warnings; empty for a table without warnings.
+    pub flagged: Vec<Vec<usize>>,
 }
 
 impl TableView {
@@ -33,6 +35,7 @@ impl TableView {
             numeric,
             links: vec![],
             classes: vec![],
+            flagged: vec![],
         }
     }
 }

@@ -279,7 +279,7 @@ fn every_maneuver_begins_a_page_and_every_derivative_has_a_figure() {
     let campaign = campaign();
     let page = render(&campaign);
     assert_eq!(
-        page.matches("class=\"maneuver new-page\"").count(),
+        page.matches("class=\"maneuver new-page one-page\"").count(),
         campaign.maneuvers.len()
     );
     assert_eq!(
@@ -328,6 +328,52 @@ fn a_long_table_reserves_its_height_before_it_is_laid_out() {
     let height = format!("auto {}px", 28 * rows + 50);
     let start = "<div class=\"scroll long\" style=\"contain-intrinsic-size: ";
     assert!(page.contains(&format!("{start}{height}\">")), "{rows} rows");
+}
+
+#[test]
+fn the_page_begins_with_three_answers_of_one_paragraph_and_picture_each() {
+    let page = render(&campaign());
+    let (start, rest) = page.split_once("<nav").expect("the contents");
+    assert!(!start.contains("<table"), "before any table");
+    let document = parsed(&page);
+    let of_class = |class: &str| {
+        let all = document.descendants();
+        let own = all.filter(|n| n.attribute("class") == Some(class));
+        own.collect::<Vec<_>>()
+    };
+    let answers = of_class("answer pairs");
+    assert_eq!(answers.len(), 3);
+    for answer in answers {
+        for kind in ["h3", "p", "figure"] {
+            let own = answer.descendants().filter(|n| n.has_tag_name(kind));
+            assert_eq!(own.count(), 1, "{kind} of {answer:?}");
+        }
+        let text = answer.descendants().find(|n| n.has_tag_name("p"));
+        let text: String = text
+            .into_iter()
+            .flat_map(|p| p.descendants())
+            .filter_map(|n| n.text())
+            .collect();
+        assert!(text.contains('%') || text.contains("expected"), "{text}");
+    }
+    assert!(rest.contains("What is new"));
+}
+
+#[test]
+fn a_maneuver_outside_the_tolerances_is_marked_in_facts_and_table() {
+    let page = render(&campaign());
+    assert_eq!(
+        page.matches("<strong class=\"flagged\">outside the tolerances")
+            .count(),
+        2,
+        "one maneuver, by both models"
+    );
+    assert!(page.contains("<td class=\"flagged\">outside</td>"));
+    assert_eq!(
+        page.matches("<td class=\"flagged\">").count(),
+        1,
+        "the verdict of the first model"
+    );
 }
 
 #[test]

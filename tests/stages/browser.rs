@@ -110,6 +110,8 @@ addEventListener('load', function () {
   var last = all('.maneuver').pop(); location.hash = last.id;
   said.push('reached ' + (50 > Math.abs(last.getBoundingClientRect().top - 50))); scrollTo(0, 0);
   said.push('wide ' + (document.documentElement.scrollWidth > innerWidth));
+  var answers = all('.answer'), ends = answers.map(function (a) { return a.querySelector('figure').getBoundingClientRect().bottom; });
+  said.push('answers ' + answers.length + ' on the first screen ' + ends.every(function (end) { return 1000 > end; }));
   var figures = all('svg[role=img]');
   said.push('figures ' + figures.length + ' empty ' + figures.filter(function (f) { return !f.querySelector('path,line'); }).length);
   var first = document.querySelector('.derivative svg'); said.push('drawn ' + seen(first));
@@ -119,7 +121,11 @@ addEventListener('load', function () {
   said.push('sorted ' + column.every(function (v, i) { return i === 0 ? true : !(v > column[i - 1]); }));
   var box = document.querySelector('#classes input'), own = all('[data-class=' + box.value + ']');
   said.push('before ' + own.every(seen));
-  box.click(); said.push('after ' + own.some(seen));
+  box.click(); said.push('after ' + own.some(seen)); box.click();
+  var style = document.createElement('style'); style.textContent = '* { content-visibility: visible !important }'; document.head.appendChild(style);
+  all('details').forEach(function (d) { d.open = true; });
+  var clipped = all('.scroll').filter(function (e) { return e.scrollWidth > e.clientWidth; });
+  said.push('clipped ' + clipped.length + ' of ' + (all('.scroll').length > 40 ? 'many' : 'few'));
   document.title = said.join('; ');
 });
 ";
@@ -135,7 +141,12 @@ fn a_browser_shows_the_report_wide_and_narrow_without_errors() {
         .report
         .replace("</body>", &format!("<script>{QUESTIONS}</script></body>"));
     std::fs::write(&page, asked).unwrap();
-    for size in ["--window-size=1400,1000", "--window-size=500,900"] {
+    // On a wide screen the three answers with their pictures are seen at once, and no table is cut.
+    for (size, is_wide) in [
+        ("--window-size=1400,1000", true),
+        ("--window-size=1200,1000", true),
+        ("--window-size=500,900", false),
+    ] {
         let seen = open(&chromium, &page, &["--dump-dom", size], (PAGE, "<title>"));
         assert!(seen.console.is_empty(), "{size}: {:?}", seen.console);
         let page = seen.page();
@@ -146,14 +157,19 @@ fn a_browser_shows_the_report_wide_and_narrow_without_errors() {
             .0;
         assert!(
             title.starts_with(
-                "loaded 0; many cells laid out false, figures false; reached true; wide false; figures "
+                "loaded 0; many cells laid out false, figures false; reached true; wide false; answers 3 on the first screen "
             ),
             "{size}: {title}"
         );
-        assert!(
-            title.ends_with(" empty 0; drawn true; sorted true; before true; after false"),
-            "{size}: {title}"
-        );
+        let end = " empty 0; drawn true; sorted true; before true; after false; clipped ";
+        assert!(title.contains(end), "{size}: {title}");
+        if is_wide {
+            assert!(
+                title.contains("on the first screen true"),
+                "{size}: {title}"
+            );
+            assert!(title.ends_with("clipped 0 of many"), "{size}: {title}");
+        }
     }
 }
 
@@ -172,6 +188,9 @@ fn a_browser_prints_the_report() {
     assert!(seen.console.is_empty(), "{:?}", seen.console);
     let document = lopdf::Document::load_mem(&seen.made).unwrap();
     let pages = document.get_pages().len();
-    let sheets = demo().report.matches("class=\"maneuver new-page\"").count();
+    let sheets = demo()
+        .report
+        .matches("class=\"maneuver new-page one-page\"")
+        .count();
     assert!(pages > sheets, "{pages} pages for {sheets} sheets");
 }

@@ -52,6 +52,30 @@ fn the_summary_can_be_read_and_every_page_has_its_number() {
 }
 
 #[test]
+fn the_first_page_has_the_three_answers_and_few_pages_follow_for_each_maneuver() {
+    let texts = texts(&printed());
+    for question in [
+        "Is it good enough to fly?",
+        "Does the simulator still match?",
+        "What do we fly next?",
+    ] {
+        assert!(texts[0].contains(question), "{question}: {}", texts[0]);
+    }
+    assert!(texts[1].contains("Contents"), "{}", texts[1]);
+    let begins = |text: &&String| text.contains("Flight condition");
+    let (first, last) = (
+        texts.iter().position(|text| begins(&text)).unwrap(),
+        texts.iter().rposition(|text| begins(&text)).unwrap(),
+    );
+    let maneuvers = demo().tables["maneuvers"].len();
+    let pages = last + 1 - first;
+    assert!(
+        8 * pages <= 9 * maneuvers,
+        "{pages} pages of {maneuvers} maneuvers"
+    );
+}
+
+#[test]
 fn every_derivative_and_maneuver_is_on_a_page_of_its_own_that_the_outline_names() {
     let document = printed();
     let texts = texts(&document);

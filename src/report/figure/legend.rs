@@ -2,7 +2,9 @@
 
 use serde::Serialize;
 
-use super::style::{EXCLUDED_COLOUR, INK, MEASURED_COLOUR, TOLERANCE_AREA, TOLERANCE_LIMIT};
+use super::style::{
+    EXCLUDED_COLOUR, INK, MEASURED_COLOUR, OUTSIDE_COLOUR, TOLERANCE_AREA, TOLERANCE_LIMIT,
+};
 
 /// One entry of a legend.
 #[derive(Clone, Debug, Serialize)]
@@ -52,15 +54,30 @@ pub fn time_history(has_excluded_samples: bool) -> Vec<LegendView> {
     legend
 }
 
-/// Legend of a maneuver that was flown again.
+/// Legend of a maneuver that was flown again, with times outside the tolerance and those that another quantity
+/// excuses.
 #[must_use]
-pub fn flown_again() -> Vec<LegendView> {
+pub fn flown_again(has_outside: bool, has_excused: bool) -> Vec<LegendView> {
     let tube = format!(
         r#"<rect x="0" y="1" width="24" height="10" fill="{TOLERANCE_AREA}" stroke="{TOLERANCE_LIMIT}"/>"#
     );
-    vec![
+    let mut legend = vec![
         LegendView::new(key(24, &line(MEASURED_COLOUR, "", 4.0)), "measured"),
         LegendView::new(key(24, &line(INK, "", 1.4)), "flown again"),
         LegendView::new(key(24, &tube), "tolerance"),
-    ]
+    ];
+    if has_outside {
+        let bar = format!(
+            r#"<rect width="24" height="12" fill="{OUTSIDE_COLOUR}" fill-opacity=".15"/><rect y="7" width="24" height="5" fill="{OUTSIDE_COLOUR}"/>"#
+        );
+        legend.push(LegendView::new(key(24, &bar), "outside"));
+    }
+    if has_excused {
+        let bar = format!(
+            r##"<rect x=".5" y="6.5" width="23" height="5" fill="#ffffff" stroke="{OUTSIDE_COLOUR}"/>"##
+        );
+        let label = "outside, but another quantity meets the requirement";
+        legend.push(LegendView::new(key(24, &bar), label));
+    }
+    legend
 }

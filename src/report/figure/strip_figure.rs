@@ -24,6 +24,32 @@ const GAP: f64 = 22.0;
 /// Space right of the last column, for half of its last tick label.
 const EDGE: f64 = 8.0;
 
+/// Divides groups of strips into two columns of about equal height, in their order. Strips of a group stay together.
+#[must_use]
+pub fn in_two_columns(groups: Vec<Vec<Strip>>) -> Vec<Vec<Strip>> {
+    let heights: Vec<f64> = groups.iter().map(|g| SIZES.strips_height(g)).collect();
+    let higher = |first: usize| {
+        let (left, right) = heights.split_at(first);
+        left.iter().sum::<f64>().max(right.iter().sum())
+    };
+    let first = (1..=groups.len()).min_by(|a, b| higher(*a).total_cmp(&higher(*b)));
+    let mut groups = groups.into_iter();
+    let left: Vec<Strip> = groups.by_ref().take(first.unwrap_or(0)).flatten().collect();
+    let columns = [left, groups.flatten().collect()];
+    columns.into_iter().filter(|c| !c.is_empty()).collect()
+}
+
+/// Columns of strips without groups: three strips side by side, others in two columns.
+#[must_use]
+pub fn side_by_side(strips: Vec<Strip>) -> Vec<Vec<Strip>> {
+    let groups: Vec<Vec<Strip>> = strips.into_iter().map(|strip| vec![strip]).collect();
+    if groups.len() == 3 {
+        groups
+    } else {
+        in_two_columns(groups)
+    }
+}
+
 /// Draws the figure.
 #[must_use]
 pub fn draw(figure: &StripFigure) -> String {
@@ -86,6 +112,29 @@ mod tests {
             },
             columns: vec![vec![strip.clone(), strip.clone()], vec![strip]],
         }
+    }
+
+    #[test]
+    fn columns_are_of_about_equal_height_and_groups_stay_together() {
+        let strip =
+            |name: &str, height: f64| Strip::of_lines(name, "", height, figure().time, vec![]);
+        let groups = vec![
+            vec![strip("a", 50.0), strip("residual", 20.0)],
+            vec![strip("b", 50.0), strip("residual", 20.0)],
+            vec![strip("input", 40.0)],
+            vec![strip("input", 40.0)],
+        ];
+        let columns = in_two_columns(groups);
+        let names = |column: &Vec<Strip>| {
+            let names = column.iter().map(|s| s.name.clone());
+            names.collect::<Vec<_>>()
+        };
+        assert_eq!(names(&columns[0]), ["a", "residual"]);
+        assert_eq!(names(&columns[1]), ["b", "residual", "input", "input"]);
+        assert_eq!(in_two_columns(vec![vec![strip("a", 50.0)]]).len(), 1);
+        assert!(in_two_columns(vec![]).is_empty());
+        let columns = |n: usize| side_by_side(vec![strip("a", 50.0); n]).len();
+        assert_eq!([1, 2, 3, 4].map(columns), [1, 2, 3, 2]);
     }
 
     #[test]

@@ -7,7 +7,7 @@ use std::fmt::Write;
 
 use super::layers::Layers;
 use super::scale::Scale;
-use super::style::{EXCLUDED_COLOUR, FAINT, INK, TOLERANCE_AREA, TOLERANCE_LIMIT};
+use super::style::{EXCLUDED_COLOUR, FAINT, INK, OUTSIDE_COLOUR, TOLERANCE_AREA, TOLERANCE_LIMIT};
 use super::svg_writer::{
     Anchor, PathStyle, SvgWriter, TextStyle, coordinate, dot, polyline, rectangle,
 };
@@ -23,11 +23,20 @@ pub struct Strip {
     pub lines: Vec<StripLine>,
     /// Tolerance drawn as an area behind the lines: time, lower and upper limit.
     pub tube: Vec<(f64, f64, f64)>,
+    pub outside: OutsideSpans,
     /// Samples drawn as dots: those excluded from the cost.
     pub dots: Vec<(f64, f64)>,
     pub flagged: FlaggedSpans,
     /// Attributes of the group around lines, dots and flags; no group without any.
     pub attributes: Vec<(&'static str, String)>,
+}
+
+/// Intervals (s) outside the tolerance.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct OutsideSpans {
+    pub spans: Vec<(f64, f64)>,
+    /// `true` where another quantity meets the requirement instead.
+    pub is_excused: bool,
 }
 
 /// One line of a strip.
@@ -66,6 +75,7 @@ impl Strip {
             scale,
             lines,
             tube: vec![],
+            outside: OutsideSpans::default(),
             dots: vec![],
             flagged: FlaggedSpans::default(),
             attributes: vec![],
@@ -310,7 +320,17 @@ impl StripColumn {
             .iter()
             .map(|&(time_s, value)| dot((self.x(time_s), strip.y(top, value)), 4.0))
             .collect();
-        let mut marks = vec![(TUBE_STYLE, self.tube(strip, top))];
+        let (shade, bar) = self.outside(strip, top);
+        let bar_style = if strip.outside.is_excused {
+            EXCUSED_STYLE
+        } else {
+            PathStyle::filled(OUTSIDE_COLOUR)
+        };
+        let mut marks = vec![
+            (OUTSIDE_STYLE, shade),
+            (TUBE_STYLE, self.tube(strip, top)),
+            (bar_style, bar),
+        ];
         marks.extend(strip.lines.iter().map(|line| {
             let style = PathStyle {
                 dash: line.dash,
@@ -320,6 +340,31 @@ impl StripColumn {
         }));
         marks.push((PathStyle::filled(EXCLUDED_COLOUR), dots));
         marks
+    }
+
+    /// Times outside the tolerance: a shade over the whole height, and a heavy bar along the time axis. Times that
+    /// another quantity excuses have the bar alone.
+    fn outside(&self, strip: &Strip, top: f64) -> (String, String) {
+        let (mut shade, mut bar) = (String::new(), String::new());
+        for (start_s, end_s) in &strip.outside.spans {
+            let left = self.x(*start_s);
+            let right = self.x(*end_s).max(left + LEAST_MARK_WIDTH);
+            let bottom = top + strip.height;
+            let area = |upper: f64| {
+                let corners = [
+                    (left, upper),
+                    (right, upper),
+                    (right, bottom),
+                    (left, bottom),
+                ];
+                format!("{}z", polyline(corners.into_iter()))
+            };
+            if !strip.outside.is_excused {
+                shade.push_str(&area(top));
+            }
+            bar.push_str(&area(bottom - OUTSIDE_BAR));
+        }
+        (shade, bar)
     }
 
     /// Area of a tolerance; empty without one.
@@ -397,6 +442,25 @@ const TUBE_STYLE: PathStyle<'static> = PathStyle {
     fill_opacity: None,
 };
 
+/// Appearance of times outside a tolerance.
+const OUTSIDE_STYLE: PathStyle<'static> = PathStyle {
+    stroke: None,
+    dash: "",
+    fill: Some(OUTSIDE_COLOUR),
+    fill_opacity: Some(0.15),
+};
+
+/// Appearance of the bar of times outside a tolerance that another quantity excuses.
+const EXCUSED_STYLE: PathStyle<'static> = PathStyle {
+    stroke: Some((OUTSIDE_COLOUR, 0.8)),
+    dash: "",
+    fill: Some("#ffffff"),
+    fill_opacity: None,
+};
+
+/// Height of the bar of times outside a tolerance.
+const OUTSIDE_BAR: f64 = 6.0;
+
 /// Appearance of missing samples.
 pub const MISSING_STYLE: PathStyle<'static> = PathStyle {
     stroke: Some((EXCLUDED_COLOUR, 0.8)),
@@ -458,5 +522,29 @@ mod tests {
             ["\u{2212}1.0", "\u{2212}0.5", "0.0", "0.5", "1.0"]
         );
         assert!(labels(f64::NAN, 1.0, 0.5).is_empty());
+    }
+
+    #[test]
+    fn times_outside_a_tolerance_have_a_shade_and_a_bar_and_excused_ones_the_bar_alone() {
+        let scale = |max| Scale {
+            min: 0.0,
+            max,
+            step: 1.0,
+        };
+        let column = StripColumn {
+            sizes: Sizes::COMPACT,
+            names_left: 0.0,
+            left: 100.0,
+            right: 200.0,
+            time: scale(10.0),
+        };
+        let mut strip = Strip::of_lines("q", "", 40.0, scale(1.0), vec![]);
+        strip.outside.spans = vec![(2.0, 5.0)];
+        // In quarters of a unit: from 120 to 150, the shade 40 and the bar 6 high.
+        let (shade, bar) = column.outside(&strip, 0.0);
+        assert_eq!(shade, "M480 0l120 0 0 160-120 0z");
+        assert_eq!(bar, "M480 136l120 0 0 24-120 0z");
+        strip.outside.is_excused = true;
+        assert_eq!(column.outside(&strip, 0.0), (String::new(), bar));
     }
 }

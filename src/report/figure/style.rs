@@ -16,6 +16,9 @@ pub const EXCLUDED_COLOUR: &str = "#c44e00";
 pub const TOLERANCE_AREA: &str = "#e9edf1";
 pub const TOLERANCE_LIMIT: &str = "#8a949e";
 
+/// Colour of times outside a tolerance.
+pub const OUTSIDE_COLOUR: &str = "#a50026";
+
 /// Dark colours of lines and markers, which also differ in lightness.
 pub const DARK_COLOURS: [&str; 6] = [
     "#111111", "#0060a8", "#b34700", "#6a2c91", "#00664b", "#7a5200",

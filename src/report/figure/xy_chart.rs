@@ -10,7 +10,7 @@ use super::svg_writer::{
 use crate::report::notation::Digits;
 
 /// Half the width of a page, where text of 11 units is over 7 pt.
-const SIZE: (f64, f64) = (400.0, 300.0);
+const SIZE: (f64, f64) = (400.0, 240.0);
 const TEXT: f64 = 11.0;
 /// Left, top, right and bottom margin of the frame.
 const MARGINS: [f64; 4] = [52.0, 8.0, 10.0, 36.0];
@@ -133,11 +133,13 @@ pub fn decades(low: f64, high: f64) -> Scale {
 pub fn draw(chart: &XyChart) -> String {
     let mut svg = SvgWriter::default();
     let pen = Pen { chart };
-    pen.boxes(&mut svg);
+    let mut labels = Labels::default();
+    pen.boxes(&mut svg, &mut labels);
     pen.axes(&mut svg);
     for series in &chart.series {
         pen.series(&mut svg, series);
     }
+    pen.labels_of_points(&mut svg, &mut labels);
     let alternative = Alternative {
         id: chart.id,
         title: chart.title,
@@ -148,6 +150,56 @@ pub fn draw(chart: &XyChart) -> String {
 
 struct Pen<'a> {
     chart: &'a XyChart<'a>,
+}
+
+/// Width of a letter over its height: an upper estimate.
+const LETTER: f64 = 0.6;
+/// Share of the text's height above the base line.
+const ASCENT: f64 = 0.8;
+/// Distance of a label from the side of its box.
+const LABEL_GAP: f64 = 4.0;
+
+/// Distances of a label from its point, the first that is free counts.
+const LABEL_GAPS: [f64; 5] = [3.0, 6.0, 12.0, 20.0, 30.0];
+/// Areas that a piece of a line is divided into.
+const LINE_AREAS: u32 = 24;
+
+/// Left, top, right and bottom of an area.
+type Area = [f64; 4];
+
+fn overlap(a: &Area, b: &Area) -> bool {
+    a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]
+}
+
+/// Areas of the labels written so far.
+#[derive(Debug, Default)]
+struct Labels {
+    areas: Vec<Area>,
+}
+
+impl Labels {
+    /// Takes the first place inside the frame that overlaps neither a label nor one of the areas to avoid.
+    /// Returns the left end of the text's base line.
+    fn place(
+        &mut self,
+        text: &str,
+        corners: &[(f64, f64)],
+        avoided: &[Area],
+    ) -> Option<(f64, f64)> {
+        let [left, top, right, bottom] = Pen::frame();
+        let width = LETTER * TEXT * text.chars().count() as f64;
+        let areas = corners.iter().map(|(x, y)| [*x, *y, x + width, y + TEXT]);
+        let is_free = |area: &Area| {
+            area[0] >= left
+                && area[1] >= top
+                && area[2] <= right
+                && area[3] <= bottom
+                && !self.areas.iter().chain(avoided).any(|a| overlap(a, area))
+        };
+        let area = areas.into_iter().find(is_free)?;
+        self.areas.push(area);
+        Some((area[0], area[1] + ASCENT * TEXT))
+    }
 }
 
 impl Pen<'_> {
@@ -174,28 +226,98 @@ impl Pen<'_> {
         ]
     }
 
-    fn boxes(&self, svg: &mut SvgWriter) {
+    /// Area of a box; `None` for one without a width or height.
+    fn area(&self, level: &LevelBox) -> Option<Area> {
         let [left, top, right, bottom] = Pen::frame();
-        for level in &self.chart.boxes {
-            let x = |side: Option<f64>, open: f64| side.and_then(|v| self.x(v)).unwrap_or(open);
-            let y = |side: Option<f64>, open: f64| side.and_then(|v| self.y(v)).unwrap_or(open);
-            let (from, to) = (x(level.x.0, left), x(level.x.1, right));
-            let (lower, upper) = (y(level.y.0, bottom), y(level.y.1, top));
-            if to <= from || lower <= upper {
-                continue;
-            }
+        let x = |side: Option<f64>, open: f64| side.and_then(|v| self.x(v)).unwrap_or(open);
+        let y = |side: Option<f64>, open: f64| side.and_then(|v| self.y(v)).unwrap_or(open);
+        let (from, to) = (x(level.x.0, left), x(level.x.1, right));
+        let (lower, upper) = (y(level.y.0, bottom), y(level.y.1, top));
+        (to > from && lower > upper).then_some([from, upper, to, lower])
+    }
+
+    /// Draws the boxes. Each has its label in a corner that no inner box covers, if there is one.
+    fn boxes(&self, svg: &mut SvgWriter, labels: &mut Labels) {
+        let boxes = self.chart.boxes.iter();
+        let boxes: Vec<(&str, Area)> = boxes
+            .filter_map(|level| Some((level.label, self.area(level)?)))
+            .collect();
+        for (_, [from, upper, to, lower]) in &boxes {
             let style = PathStyle {
                 fill: Some("#0060a8"),
                 fill_opacity: Some(0.07),
                 ..PathStyle::line(FAINT, 0.6)
             };
-            svg.path(&rectangle((from, upper), (to - from, lower - upper)), style);
-            let text = TextStyle {
-                anchor: Anchor::End,
-                ..TextStyle::coloured(FAINT)
-            };
-            svg.text((to - 3.0, upper + TEXT), level.label, text);
+            svg.path(
+                &rectangle((*from, *upper), (to - from, lower - upper)),
+                style,
+            );
         }
+        for (i, (label, area)) in boxes.iter().enumerate().rev() {
+            let corners = corners_inside(label, area);
+            let inner: Vec<Area> = boxes[i + 1..].iter().map(|(_, area)| *area).collect();
+            let place = labels
+                .place(label, &corners, &inner)
+                .or_else(|| labels.place(label, &corners, &[]));
+            if let Some(place) = place {
+                svg.text(place, label, TextStyle::coloured(FAINT));
+            }
+        }
+    }
+
+    /// Labels of the points, each at the nearest place that covers neither label, mark nor line; without one, on white
+    /// ground over the marks.
+    fn labels_of_points(&self, svg: &mut SvgWriter, labels: &mut Labels) {
+        let drawn: Vec<Area> = self
+            .chart
+            .series
+            .iter()
+            .flat_map(|s| self.drawn(s))
+            .collect();
+        for series in &self.chart.series {
+            for point in series.points.iter().filter(|p| !p.label.is_empty()) {
+                let Some((x, y)) = self.place(point.at) else {
+                    continue;
+                };
+                let width = LETTER * TEXT * point.label.chars().count() as f64;
+                let around = |gap: f64| {
+                    let (right, left) = (x + gap, x - gap - width);
+                    let (above, below) = (y - gap - TEXT, y + gap);
+                    [(right, above), (right, below), (left, above), (left, below)]
+                };
+                let corners: Vec<(f64, f64)> = LABEL_GAPS.into_iter().flat_map(around).collect();
+                let free = labels.place(&point.label, &corners, &drawn);
+                let place = free.or_else(|| labels.place(&point.label, &corners, &[]));
+                if let Some(place) = place {
+                    if free.is_none() {
+                        let corner = (place.0, place.1 - ASCENT * TEXT);
+                        let ground = rectangle(corner, (width, TEXT));
+                        svg.path(&ground, PathStyle::filled("#ffffff"));
+                    }
+                    let style = TextStyle::coloured(series.colour);
+                    svg.text(place, &point.label, style);
+                }
+            }
+        }
+    }
+
+    /// Areas of the marks of a series and of its line.
+    fn drawn(&self, series: &ChartSeries) -> Vec<Area> {
+        let places: Vec<(f64, f64)> = series
+            .points
+            .iter()
+            .filter_map(|point| self.place(point.at))
+            .collect();
+        let mark = |(x, y): (f64, f64)| [x - MARK, y - MARK, x + MARK, y + MARK];
+        let mut areas: Vec<Area> = places.iter().copied().map(mark).collect();
+        if series.is_joined {
+            for ends in places.windows(2) {
+                let ((x, y), (dx, dy)) = (ends[0], (ends[1].0 - ends[0].0, ends[1].1 - ends[0].1));
+                let between = (1..LINE_AREAS).map(|i| f64::from(i) / f64::from(LINE_AREAS));
+                areas.extend(between.map(|share| mark((x + share * dx, y + share * dy))));
+            }
+        }
+        areas
     }
 
     fn axes(&self, svg: &mut SvgWriter) {
@@ -294,13 +416,15 @@ impl Pen<'_> {
             svg.path(&line, PathStyle::line(series.colour, 0.9));
         }
         svg.path(&marks, PathStyle::filled(series.colour));
-        for point in series.points.iter().filter(|p| !p.label.is_empty()) {
-            if let Some((x, y)) = self.point_in_frame(point.at) {
-                let style = TextStyle::coloured(series.colour);
-                svg.text((x + 4.0, y - 4.0), &point.label, style);
-            }
-        }
     }
+}
+
+/// Upper left ends of a label in the corners of a box: top right, bottom left, top left, bottom right.
+fn corners_inside(label: &str, [from, upper, to, lower]: &Area) -> [(f64, f64); 4] {
+    let width = LETTER * TEXT * label.chars().count() as f64;
+    let (left, right) = (from + LABEL_GAP, to - LABEL_GAP - width);
+    let (top, bottom) = (upper + LABEL_GAP, lower - LABEL_GAP - TEXT);
+    [(right, top), (left, bottom), (left, top), (right, bottom)]
 }
 
 impl ChartAxis {
@@ -360,6 +484,55 @@ mod tests {
         assert!((pen.y(0.1).unwrap() - (bottom - (bottom - top) / 3.0)).abs() < 1e-9);
         assert!((pen.y(-1.0).unwrap() - bottom).abs() < 1e-9);
         assert_eq!(pen.x(f64::NAN), None);
+    }
+
+    /// Places of the texts of a chart that begin with a word.
+    fn places(svg: &str, word: &str) -> Vec<(String, f64, f64)> {
+        let document = roxmltree::Document::parse(svg).unwrap();
+        let texts = document.descendants().filter(|n| n.has_tag_name("text"));
+        let texts = texts.filter(|n| n.text().is_some_and(|t| t.starts_with(word)));
+        let number = |n: roxmltree::Node, name: &str| n.attribute(name).unwrap().parse().unwrap();
+        let place = |n: roxmltree::Node| {
+            let text = n.text().unwrap().to_owned();
+            (text, number(n, "x"), number(n, "y"))
+        };
+        texts.map(place).collect()
+    }
+
+    #[test]
+    fn labels_of_boxes_with_a_common_corner_do_not_cover_each_other() {
+        let level = |label, least| LevelBox {
+            label,
+            x: (Some(least), None),
+            y: (Some(least), None),
+        };
+        let mut chart = chart();
+        chart.y = axis(0.0, 1.0);
+        chart.boxes = vec![
+            level("Level 3", 0.1),
+            level("Level 2", 0.3),
+            level("Level 1", 0.6),
+        ];
+        let places = places(&draw(&chart), "Level");
+        assert_eq!(places.len(), 3);
+        for (i, (label, x, y)) in places.iter().enumerate() {
+            for (other, other_x, other_y) in &places[i + 1..] {
+                let is_apart = (y - other_y).abs() >= TEXT || (x - other_x).abs() >= 40.0;
+                assert!(is_apart, "{label} and {other}: {places:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_label_at_the_edge_stays_inside_the_frame() {
+        let mut chart = chart();
+        chart.y = axis(0.0, 1.0);
+        chart.boxes.clear();
+        chart.series[0].points[0].at = (1.0, 1.0);
+        let [left, top, right, bottom] = Pen::frame();
+        let (_, x, y) = places(&draw(&chart), "10°").remove(0);
+        assert!(x > left && x + 12.0 < right, "{x}");
+        assert!(y - ASCENT * TEXT >= top && y < bottom, "{y}");
     }
 
     #[test]

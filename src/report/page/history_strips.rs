@@ -17,25 +17,19 @@ const RESIDUAL_HEIGHT: f64 = 18.0;
 const INPUT_HEIGHT: f64 = 42.0;
 /// Share of the largest movement below which an input is not drawn.
 const SMALLEST_SHARE: f64 = 0.1;
-/// Largest number of inputs: more would make their column longer than the column of the outputs.
+/// Largest number of inputs: more would make the figure longer than a page has room for.
 const MOST_INPUTS: usize = 9;
 
-/// Draws a maneuver: outputs with residuals on the left, inputs on the right.
+/// Draws a maneuver: outputs with residuals, then inputs, in two columns.
 #[must_use]
 pub fn draw(history: &History, id: String) -> String {
-    let outputs: Vec<Strip> = history
-        .outputs
-        .iter()
-        .flat_map(|output| output_strips(history, output))
-        .collect();
+    let outputs = history.outputs.iter();
+    let outputs = outputs.map(|output| output_strips(history, output).to_vec());
     let mut inputs = inputs(history);
     inputs.truncate(MOST_INPUTS);
     let description = alternative_text(history, &inputs);
-    let columns = if inputs.is_empty() {
-        vec![outputs]
-    } else {
-        vec![outputs, inputs]
-    };
+    let groups = outputs.chain(inputs.into_iter().map(|input| vec![input]));
+    let columns = strip_figure::in_two_columns(groups.collect());
     strip_figure::draw(&StripFigure {
         id,
         title: format!("Time history of {}", history.maneuver_id),

@@ -1,22 +1,27 @@
-//! Information added by the flights: posterior standard deviations over the prior ones, the basis
-//! for what to fly next.
+//! Knowledge that flights have added, the basis for what to fly next: posterior standard deviations over those before
+//! flight, and what one more of the flown maneuvers would add.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::qualities_section;
 use super::quality_charts::QualityChart;
 use crate::aero::Axis;
+use crate::maneuver::Status;
 use crate::numerics::order_statistics::median;
 use crate::report::contents::{Contents, group_by};
 use crate::report::figure::scale::{Scale, extent};
-use crate::report::figure::style::{DARK_COLOURS, TOLERANCE_LIMIT};
+use crate::report::figure::style::{DARK_COLOURS, INK, TOLERANCE_LIMIT};
 use crate::report::figure::xy_chart::{ChartAxis, ChartPoint, ChartSeries, XyChart};
-use crate::report::notation::{angle, coefficient_of, fixed};
-use crate::tables::PosteriorRow;
+use crate::report::notation::{angle, coefficient_of, count, fixed};
+use crate::tables::{EstimateRow, LevelRow, PosteriorRow};
 
-/// Number of derivatives that the answer names.
-const NAMED: usize = 5;
+/// Number of derivatives that answer and chart name.
+const NAMED: usize = 3;
+
+/// Number of maneuvers to repeat that the answer names.
+const REPEATS: usize = 2;
 
 /// Answer in sentences, with its charts.
 #[derive(Clone, Debug, Serialize)]
@@ -53,9 +58,10 @@ pub fn section(contents: &Contents) -> Option<KnowledgeSection> {
         label_at,
         medians: medians(&rows, axis),
     });
+    let least = least_known(&rows);
     Some(KnowledgeSection {
-        answer: answer(contents, &rows, &axes)?,
-        chart: chart(&rows, &axes)?,
+        answer: answer(contents, &rows, &least)?,
+        chart: chart(&rows, &axes, &least)?,
     })
 }
 
@@ -78,65 +84,235 @@ fn medians(rows: &[(&PosteriorRow, f64)], axis: Axis) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Answer in sentences: median over all derivatives, angle of attack with the largest remaining
-/// uncertainty, and derivatives with the largest remaining uncertainty.
-fn answer(
-    contents: &Contents,
-    rows: &[(&PosteriorRow, f64)],
-    axes: &[AxisMedians],
-) -> Option<String> {
+/// A row of the posterior, and its standard deviation in percent of that before flight.
+type Left<'a> = (&'a PosteriorRow, f64);
+
+/// Median of all, the derivatives on which flights gave least, the maneuvers worth a repeat, the level to decide, and
+/// the command that plans the flight.
+fn answer(contents: &Contents, rows: &[Left], least: &[Left]) -> Option<String> {
     let all = median(rows.iter().map(|(_, left)| *left))?;
-    let so_far = format!(
-        "Flights have brought the standard deviations of the derivatives to {} % of those before flight, in \
-         the median.",
-        fixed(all, 0)
-    );
-    let places = axes
+    let information = Information::new(contents);
+    let places: Vec<String> = least
         .iter()
-        .flat_map(|axis| axis.medians.iter().map(move |m| (axis.label, m)));
-    let least = places.max_by(|a, b| a.1.1.total_cmp(&b.1.1));
-    let least = least.map(|(label, (alpha, left))| {
-        format!(
-            " They have taught least at {} ({label} median {} %), and of the derivatives {}.",
-            angle(*alpha),
-            fixed(*left, 0),
-            least_known(contents).join(", ")
-        )
-    });
+        .map(|(row, left)| information.place_in_words(row, *left))
+        .collect();
+    let sentences = [
+        Some(format!(
+            "Flights have brought the standard deviations of the derivatives to {} % of those before flight, in \
+             the median; they gave least on {}.",
+            fixed(all, 0),
+            places.join(", ")
+        )),
+        repeats_in_words(&information.repeats()),
+        level_to_decide(contents),
+        Some(
+            "Cards with their minutes and the chance that they decide a level: harvest next --minutes 45, which \
+             flies each candidate in the simulator."
+                .to_owned(),
+        ),
+    ];
+    let sentences: Vec<String> = sentences.into_iter().flatten().collect();
+    Some(sentences.join(" "))
+}
+
+/// Largest row of each derivative; the derivatives with the largest of these, descending.
+fn least_known<'a>(rows: &[Left<'a>]) -> Vec<Left<'a>> {
+    let mut of_name: BTreeMap<&str, Left> = BTreeMap::new();
+    for (row, left) in rows {
+        let largest = of_name.entry(&row.derivative).or_insert((row, *left));
+        if *left > largest.1 {
+            *largest = (row, *left);
+        }
+    }
+    let mut all: Vec<Left> = of_name.into_values().collect();
+    all.sort_by(|a, b| b.1.total_cmp(&a.1));
+    all.truncate(NAMED);
+    all
+}
+
+/// Least certain level of the last airframe: that with feedback where there is one.
+fn level_to_decide(contents: &Contents) -> Option<String> {
+    let airframe = contents.specification?.airframes().into_iter().last()?;
+    let levels = contents.qualities.levels.iter();
+    let levels: Vec<&LevelRow> = levels.filter(|row| row.airframe == airframe).collect();
+    let row = qualities_section::least_certain(&levels)?;
+    let shares = [
+        ("Level 1", row.level_1_pct),
+        ("Level 2", row.level_2_pct),
+        ("Level 3", row.level_3_pct),
+        ("worse than Level 3", row.worse_pct),
+    ];
+    let (level, pct) = shares
+        .into_iter()
+        .reduce(|a, b| if b.1 > a.1 { b } else { a })?;
     Some(format!(
-        "{so_far}{} The cards that lower them most are chosen by harvest next, which flies each candidate \
-         in the simulator first.",
-        least.unwrap_or_default()
+        "The level to decide first is that of {}: {level} with {} % probability only.",
+        qualities_section::place_in_words(row),
+        fixed(pct, 0)
     ))
 }
 
-/// Derivatives with the largest medians over angle of attack.
-fn least_known(contents: &Contents) -> Vec<String> {
-    let by_name: BTreeMap<&str, Vec<&PosteriorRow>> =
-        group_by(contents.posterior, |row| &row.derivative);
-    let of_name = |(name, own): (&'_ str, Vec<&PosteriorRow>)| {
-        let left = median(own.into_iter().filter_map(left_pct))?;
-        Some((name.to_owned(), left))
+/// A flown maneuver with what it would add if flown once more.
+#[derive(Clone, Debug)]
+struct Repeat<'a> {
+    class: &'a str,
+    alpha_deg: f64,
+    duration_s: f64,
+    derivatives: usize,
+    /// Sum over its derivatives of ln(standard deviation tonight / standard deviation after the repeat).
+    gain: f64,
+}
+
+fn repeats_in_words(repeats: &[Repeat]) -> Option<String> {
+    let words = |repeat: &Repeat| {
+        format!(
+            "{} at {} ({} s: {} by {} %)",
+            repeat.class,
+            angle(repeat.alpha_deg),
+            fixed(repeat.duration_s, 0),
+            count(repeat.derivatives, "derivative"),
+            fixed(
+                -100.0 * (-repeat.gain / repeat.derivatives as f64).exp_m1(),
+                0
+            )
+        )
     };
-    let mut all: Vec<(String, f64)> = by_name.into_iter().filter_map(of_name).collect();
-    all.sort_by(|a, b| b.1.total_cmp(&a.1));
-    all.truncate(NAMED);
-    all.into_iter()
-        .map(|(name, left)| format!("{name} ({} %)", fixed(left, 0)))
-        .collect()
+    let words: Vec<String> = repeats.iter().take(REPEATS).map(words).collect();
+    (!words.is_empty()).then(|| {
+        format!(
+            "Of the maneuvers flown, one more {} lowers the standard deviations most, each derivative alone.",
+            words.join(" or ")
+        )
+    })
+}
+
+/// Estimates that are evidence of the posterior.
+struct Information<'a> {
+    contents: &'a Contents<'a>,
+    posterior: BTreeMap<&'a str, Vec<&'a PosteriorRow>>,
+    /// Weight of each maneuver in each coefficient.
+    weights: BTreeMap<(&'a str, &'a str), f64>,
+}
+
+impl<'a> Information<'a> {
+    fn new(contents: &'a Contents<'a>) -> Information<'a> {
+        let contributions = contents.contributions.iter();
+        let weight = contributions.map(|row| {
+            let key = (row.maneuver_id.as_str(), row.coefficient.as_str());
+            (key, row.weight)
+        });
+        Information {
+            contents,
+            posterior: group_by(contents.posterior, |row| &row.derivative),
+            weights: weight.collect(),
+        }
+    }
+
+    /// Information of an estimate on its derivative, 1/variance; `None` for one that is no evidence.
+    fn of_estimate(&self, row: &EstimateRow) -> Option<f64> {
+        let coefficient = format!("{:?}", coefficient_of(&row.derivative)?);
+        let key = (row.maneuver_id.as_str(), coefficient.as_str());
+        let weight = *self.weights.get(&key)?;
+        let bound = row.bound_corrected.or(row.bound)?;
+        let information = weight / (bound * bound);
+        (row.status == Status::Estimated && information.is_finite()).then_some(information)
+    }
+
+    /// Class whose maneuvers give most information on a derivative, in the mean.
+    fn best_class(&self, derivative: &str) -> Option<&'a str> {
+        let mut by_class: BTreeMap<&str, (f64, f64)> = BTreeMap::new();
+        for row in self.contents.estimates {
+            if row.derivative != derivative {
+                continue;
+            }
+            if let Some(information) = self.of_estimate(row) {
+                let (sum, n) = by_class.entry(&row.class).or_default();
+                *sum += information;
+                *n += 1.0;
+            }
+        }
+        let means = by_class
+            .into_iter()
+            .map(|(class, (sum, n))| (class, sum / n));
+        let best = means.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some(best.0)
+    }
+
+    /// Derivative, angle of attack, share left, and the class that estimates it best.
+    fn place_in_words(&self, row: &PosteriorRow, left: f64) -> String {
+        let class = self.best_class(&row.derivative).map_or_else(
+            || "no class estimates it".to_owned(),
+            |class| format!("{class} estimates it best"),
+        );
+        format!(
+            "{} at {} ({} %; {class})",
+            row.derivative,
+            angle(row.alpha_deg),
+            fixed(left, 0)
+        )
+    }
+
+    /// The best maneuver of each class to be flown once more, the most informative first.
+    fn repeats(&self) -> Vec<Repeat<'a>> {
+        let by_maneuver = group_by(self.contents.estimates, |row| &row.maneuver_id);
+        let mut best: BTreeMap<&str, Repeat> = BTreeMap::new();
+        for maneuver in self.contents.maneuvers {
+            let rows = by_maneuver.get(maneuver.maneuver_id.as_str());
+            let gains: Vec<f64> = rows
+                .into_iter()
+                .flatten()
+                .filter_map(|row| self.gain(row))
+                .collect();
+            let repeat = Repeat {
+                class: &maneuver.class,
+                alpha_deg: maneuver.alpha_deg,
+                duration_s: maneuver.end_s - maneuver.start_s,
+                derivatives: gains.len(),
+                gain: gains.iter().sum(),
+            };
+            let own = best.entry(repeat.class).or_insert_with(|| repeat.clone());
+            if repeat.gain > own.gain {
+                *own = repeat;
+            }
+        }
+        let mut all: Vec<Repeat> = best.into_values().filter(|r| r.derivatives > 0).collect();
+        all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        all
+    }
+
+    /// Logarithm of the reduction of a derivative's standard deviation by one more estimate like this one.
+    fn gain(&self, row: &EstimateRow) -> Option<f64> {
+        let information = self.of_estimate(row)?;
+        let own = self.posterior.get(row.derivative.as_str())?.iter();
+        let distance = |p: &PosteriorRow| (p.alpha_deg - row.alpha_deg).abs();
+        let nearest = own.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+        let gain = 0.5 * (nearest.standard_deviation.powi(2) * information).ln_1p();
+        gain.is_finite().then_some(gain)
+    }
 }
 
 /// Chart over angle of attack: a mark for each derivative, and the medians of both axes.
-fn chart(rows: &[(&PosteriorRow, f64)], axes: &[AxisMedians]) -> Option<QualityChart> {
+fn chart(rows: &[Left], axes: &[AxisMedians], least: &[Left]) -> Option<QualityChart> {
     let (low, high) = extent(rows.iter().map(|(row, _)| row.alpha_deg))?;
     let (_, most) = extent(rows.iter().map(|(_, left)| *left))?;
-    let caption = "Standard deviation of each derivative over that before flight, and the medians of both \
-                   axes. At 100 % or more flights have taught nothing.";
+    let caption = "Standard deviation of each derivative over that before flight, the least known named, and the \
+                   medians of both axes. From 100 % flights gave nothing; above it, they leave the size of the \
+                   tunnel's error uncertain, which counts after flight.";
     let marks = rows.iter().map(|(row, left)| ChartPoint {
         at: (row.alpha_deg, *left),
         label: String::new(),
         outline: vec![],
     });
+    let named = least.iter().map(|(row, left)| ChartPoint {
+        at: (row.alpha_deg, *left),
+        label: row.derivative.clone(),
+        outline: vec![],
+    });
+    let named = ChartSeries {
+        colour: INK,
+        points: named.collect(),
+        is_joined: false,
+    };
     let marks = ChartSeries {
         colour: TOLERANCE_LIMIT,
         points: marks.collect(),
@@ -154,6 +330,7 @@ fn chart(rows: &[(&PosteriorRow, f64)], axes: &[AxisMedians]) -> Option<QualityC
         boxes: vec![],
         series: std::iter::once(marks)
             .chain(axes.iter().map(AxisMedians::series))
+            .chain([named])
             .collect(),
     }))
 }
@@ -180,13 +357,18 @@ mod tests {
     use crate::report::campaign_fixture::campaign;
 
     #[test]
-    fn the_answer_names_what_flights_have_taught_least() {
+    fn answer_and_chart_name_what_flights_gave_least_on() {
         let mut campaign = campaign();
         campaign.posterior.truncate(1);
         let first = campaign.posterior[0].clone();
-        for (alpha_deg, left) in [(20.0, 0.2), (30.0, 0.6), (40.0, 0.4)] {
+        let rows = [
+            ("Cn_dr", 20.0, 0.2),
+            ("Cn_dr", 30.0, 1.3),
+            ("CY_beta", 40.0, 0.4),
+        ];
+        for (derivative, alpha_deg, left) in rows {
             campaign.posterior.push(PosteriorRow {
-                derivative: "Cn_dr".into(),
+                derivative: derivative.into(),
                 alpha_deg,
                 standard_deviation: left * 0.01,
                 prior_deviation: 0.01,
@@ -196,22 +378,54 @@ mod tests {
         campaign.posterior.remove(0);
         let section = section(&campaign.contents()).unwrap();
         assert!(
-            section.answer.contains("to 40 % of those before flight"),
-            "{}",
-            section.answer
-        );
-        assert!(
-            section.answer.contains(
-                "least at 30° (lateral median 60 %), and of the derivatives Cn_dr (40 %)."
+            section.answer.starts_with(
+                "Flights have brought the standard deviations of the derivatives to 40 % of those before flight, in \
+                 the median; they gave least on Cn_dr at 30° (130 %; no class estimates it), CY_beta at 40° (40 %; \
+                 OLAT estimates it best)."
             ),
             "{}",
             section.answer
         );
-        let chart = roxmltree::Document::parse(&section.chart.svg).unwrap();
         assert!(
-            chart
-                .descendants()
-                .any(|node| node.text() == Some("lateral"))
+            section.answer.contains("harvest next"),
+            "{}",
+            section.answer
+        );
+        let chart = roxmltree::Document::parse(&section.chart.svg).unwrap();
+        let has = |text: &str| chart.descendants().any(|node| node.text() == Some(text));
+        assert!(has("lateral") && has("Cn_dr") && has("CY_beta"));
+    }
+
+    #[test]
+    fn the_answer_weighs_one_more_of_the_flown_maneuvers() {
+        let mut campaign = campaign();
+        for row in &mut campaign.estimates {
+            // The posterior's standard deviation is 0.001: information of the same size divides it by √2.
+            let is_best = row.class == "PYRS" && row.alpha_deg > 45.0;
+            row.bound_corrected = Some(if is_best { 0.001 } else { 0.002 });
+        }
+        let contents = campaign.contents();
+        let repeats = Information::new(&contents).repeats();
+        assert_eq!(repeats.len(), 4, "the best of each class");
+        assert_eq!((repeats[0].class, repeats[0].derivatives), ("PYRS", 4));
+        assert!((repeats[0].gain - 4.0 * 0.5 * 2.0_f64.ln()).abs() < 1e-9);
+        let answer = section(&contents).unwrap().answer;
+        assert!(
+            answer.contains("one more PYRS at 50° (15 s: 4 derivatives by 29 %) or "),
+            "{answer}"
+        );
+        campaign.contributions.clear();
+        let answer = section(&campaign.contents()).unwrap().answer;
+        assert!(!answer.contains("one more"), "no evidence: {answer}");
+    }
+
+    #[test]
+    fn the_answer_names_the_level_to_decide_with_its_probability() {
+        let answer = section(&campaign().contents()).unwrap().answer;
+        assert!(
+            answer
+                .contains("short-period damping (3.2.2.1.2) at 20°: Level 1 with 60 % probability"),
+            "{answer}"
         );
     }
 

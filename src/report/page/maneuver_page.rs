@@ -26,8 +26,8 @@ pub struct ManeuverPage {
     pub marker: String,
     /// Word by which the page hides the class.
     pub token: String,
-    /// Names and values under the heading.
-    pub facts: Vec<(String, String)>,
+    /// Names and values under the heading; `true` for a value that is a warning.
+    pub facts: Vec<(String, String, bool)>,
     /// Time history; empty if no response was computed.
     pub svg: String,
     pub legend: Vec<LegendView>,
@@ -91,6 +91,10 @@ impl RowsByManeuver<'_> {
         let history = self.histories.get(id).and_then(|h| h.first());
         let matched = self.matched.get(id).and_then(|m| m.first()).copied();
         let flown_again = matched.and_then(|m| Some((m, m.history.as_ref()?)));
+        let drawn = flown_again.map(|(matched, history)| {
+            let rows = matched.first_rows().collect::<Vec<_>>();
+            match_strips::draw(history, &rows, format!("p{number}"))
+        });
         let mut facts = flight_condition(maneuver);
         facts.extend(fit_facts(self.fits.get(id).copied()));
         facts.extend(self.predictions.get(id).map(|rows| prediction_fact(rows)));
@@ -108,11 +112,10 @@ impl RowsByManeuver<'_> {
             legend: history.map_or_else(Vec::new, |h| {
                 legend::time_history(h.outputs.iter().any(|o| o.marked.contains(&true)))
             }),
-            match_svg: flown_again.map_or_else(String::new, |(matched, history)| {
-                let rows = matched.first_rows().collect::<Vec<_>>();
-                match_strips::draw(history, &rows, format!("p{number}"))
+            match_legend: drawn.as_ref().map_or_else(Vec::new, |drawn| {
+                legend::flown_again(drawn.has_outside, drawn.has_excused)
             }),
-            match_legend: flown_again.map_or_else(Vec::new, |_| legend::flown_again()),
+            match_svg: drawn.map_or_else(String::new, |drawn| drawn.svg),
             match_caption: flown_again.map_or_else(String::new, |(m, _)| match_caption(m)),
             estimates: estimates(self.estimates.get(id).map_or(&[], Vec::as_slice)),
             problems: self
@@ -126,8 +129,8 @@ impl RowsByManeuver<'_> {
     }
 }
 
-/// Verdict of each model.
-fn match_facts(matched: &Matched) -> impl Iterator<Item = (String, String)> {
+/// Verdict of each model; one outside the tolerances is a warning.
+fn match_facts(matched: &Matched) -> impl Iterator<Item = (String, String, bool)> {
     matched.verdicts.iter().map(|row| {
         let name = format!("Match, {}", row.model);
         let value = match row.verdict {
@@ -136,10 +139,11 @@ fn match_facts(matched: &Matched) -> impl Iterator<Item = (String, String)> {
                 "{verdict} the tolerances, margin {}, decided by {}; a repeat flight passes with {} %",
                 number(row.margin, 2),
                 row.decided_by,
-                number(row.repeat_pct, 3)
+                row.repeat_pct
+                    .map_or_else(|| NOTHING.to_owned(), |pct| fixed(pct, 1))
             ),
         };
-        fact(&name, value)
+        (name, value, row.verdict == MatchVerdict::Outside)
     })
 }
 
@@ -159,11 +163,11 @@ fn match_caption(matched: &Matched) -> String {
     )
 }
 
-fn fact(name: &str, value: String) -> (String, String) {
-    (name.to_owned(), value)
+fn fact(name: &str, value: String) -> (String, String, bool) {
+    (name.to_owned(), value, false)
 }
 
-fn flight_condition(m: &Maneuver) -> Vec<(String, String)> {
+fn flight_condition(m: &Maneuver) -> Vec<(String, String, bool)> {
     let window = format!(
         "{}\u{2013}{} s of {}, {}",
         fixed(m.start_s, 1),
@@ -191,7 +195,7 @@ fn flight_condition(m: &Maneuver) -> Vec<(String, String)> {
     ]
 }
 
-fn fit_facts(fit: Option<&FitRow>) -> Vec<(String, String)> {
+fn fit_facts(fit: Option<&FitRow>) -> Vec<(String, String, bool)> {
     let Some(fit) = fit else {
         return vec![fact("Fit", "none".to_owned())];
     };
@@ -215,7 +219,7 @@ fn fit_facts(fit: Option<&FitRow>) -> Vec<(String, String)> {
     facts
 }
 
-fn prediction_fact(rows: &[&AgreementRow]) -> (String, String) {
+fn prediction_fact(rows: &[&AgreementRow]) -> (String, String, bool) {
     let outputs: Vec<String> = rows
         .iter()
         .map(|p| format!("{} {}", p.output, number(p.theil, 2)))
@@ -308,6 +312,18 @@ mod tests {
         assert!(fit.starts_with("did not converge"), "{fit}");
         assert_eq!(pages[0].estimates.rows.len(), 4);
         assert_eq!(anchors(&contents)["1-OLON-20"], pages[1].anchor);
+    }
+
+    #[test]
+    fn a_match_outside_the_tolerances_is_a_warning() {
+        let campaign = campaign();
+        let pages = made(&campaign.contents());
+        let warnings = |page: &ManeuverPage| {
+            let warned = page.facts.iter().filter(|fact| fact.2);
+            warned.map(|fact| fact.0.clone()).collect::<Vec<_>>()
+        };
+        assert!(warnings(&pages[0]).is_empty());
+        assert_eq!(warnings(&pages[2]), ["Match, posterior", "Match, tunnel"]);
     }
 
     #[test]

@@ -8,6 +8,7 @@ use super::class_markers::ClassMarkers;
 use super::maneuver_page;
 use super::match_charts;
 use super::quality_charts::QualityChart;
+use crate::proof_of_match::Matched;
 use crate::report::contents::Contents;
 use crate::report::notation::{DASH, angle, count, fixed, number};
 use crate::report::table_view::TableView;
@@ -17,8 +18,8 @@ use crate::tables::{MatchRow, MatchVerdict, MatchVerdictRow, ModelSource};
 #[derive(Clone, Debug, Serialize)]
 pub struct MatchSection {
     pub note: String,
-    /// The board's answer, a sentence or two for each model.
-    pub answers: Vec<String>,
+    /// The board's answer in a paragraph.
+    pub answer: String,
     pub charts: Vec<QualityChart>,
     pub tables: Vec<TableView>,
 }
@@ -40,7 +41,7 @@ pub fn section(contents: &Contents, markers: &ClassMarkers) -> Option<MatchSecti
             specification.standard,
             fixed(specification.inside_pct, 0)
         ),
-        answers: models.iter().map(|m| answer(contents, *m)).collect(),
+        answer: answer(contents, models),
         charts: models
             .iter()
             .filter_map(|m| match_charts::chart(contents, *m))
@@ -70,26 +71,31 @@ fn words(model: ModelSource) -> &'static str {
     }
 }
 
-/// Answer in sentences: number of maneuvers that a model reproduces, number expected if they were
-/// flown once more, and the maneuver farthest outside.
-fn answer(contents: &Contents, model: ModelSource) -> String {
+/// Answers of all models; the maneuvers flown closed-loop are the same for all.
+fn answer(contents: &Contents, models: &[ModelSource]) -> String {
+    let mut sentences: Vec<String> = models
+        .iter()
+        .map(|model| answer_of(contents, *model))
+        .collect();
+    let first = models.first().map(|model| flown_by(contents, *model));
+    sentences.extend(first.and_then(|flown| closed_loop(&flown)));
+    sentences.join(" ")
+}
+
+/// Number of maneuvers that a model reproduces now and if flown once more, and the farthest from it.
+fn answer_of(contents: &Contents, model: ModelSource) -> String {
     let flown = flown_by(contents, model);
     let inside = flown
         .iter()
         .filter(|row| row.verdict == MatchVerdict::Inside);
-    let sentences = [
-        Some(format!(
-            "With {} as its derivatives a simulator matches {} of {} within every tolerance{}.",
-            words(model),
-            inside.count(),
-            count(flown.len(), "maneuver"),
-            farthest(&flown).unwrap_or_default(),
-        )),
-        repeats(&flown),
-        closed_loop(&flown),
-    ];
-    let sentences: Vec<String> = sentences.into_iter().flatten().collect();
-    sentences.join(" ")
+    format!(
+        "With the derivatives of {} a simulator matches {} of {} within every tolerance{}{}.",
+        words(model),
+        inside.count(),
+        count(flown.len(), "maneuver"),
+        repeats(&flown).unwrap_or_default(),
+        farthest(&flown).unwrap_or_default(),
+    )
 }
 
 /// The maneuver farthest outside; `None` where all are inside.
@@ -99,11 +105,12 @@ fn farthest(flown: &[&MatchVerdictRow]) -> Option<String> {
         .filter(|row| row.verdict == MatchVerdict::Outside);
     let worst = outside.min_by(|a, b| size(a.margin).total_cmp(&size(b.margin)))?;
     Some(format!(
-        "; the farthest outside is {} ({} at {}, {})",
+        "; the farthest outside is {} ({} at {}, {}, margin {})",
         worst.maneuver_id,
         worst.class,
         angle(worst.alpha_deg),
-        worst.decided_by
+        worst.decided_by,
+        number(worst.margin, 2)
     ))
 }
 
@@ -112,7 +119,7 @@ fn repeats(flown: &[&MatchVerdictRow]) -> Option<String> {
     let probabilities = flown.iter().map(|row| Some(0.01 * row.repeat_pct?));
     let expected = probabilities.sum::<Option<f64>>()?;
     Some(format!(
-        "Flown once more, {} of them are expected to match.",
+        ", and is expected to match {} if all are flown once more",
         fixed(expected, 1)
     ))
 }
@@ -126,7 +133,7 @@ fn closed_loop(flown: &[&MatchVerdictRow]) -> Option<String> {
         closed => format!("{closed} were"),
     };
     Some(format!(
-        "{verb} flown closed-loop, judged with the recorded surfaces."
+        "{verb} flown closed-loop and judged with the recorded surfaces."
     ))
 }
 
@@ -214,12 +221,15 @@ fn maneuver_table(
         ])
         .collect();
     let decisive = decisive_rows(contents);
+    let verdict_column = 3 + models.len();
     let mut rows = Vec::new();
-    let (mut links, mut classes) = (Vec::new(), Vec::new());
-    for matched in contents.matched {
+    let (mut links, mut classes, mut flagged) = (Vec::new(), Vec::new(), Vec::new());
+    for matched in worst_first(contents) {
         let Some(first) = matched.verdicts.first() else {
             continue;
         };
+        let is_outside = first.verdict == MatchVerdict::Outside;
+        flagged.push(is_outside.then_some(verdict_column).into_iter().collect());
         let id = first.maneuver_id.as_str();
         rows.push(maneuver_row(
             first,
@@ -231,15 +241,28 @@ fn maneuver_table(
     }
     let mut table = TableView::new(
         "By maneuver",
-        "Verdict, deciding tolerance, probability that a repeat flight passes, share inside and largest \
-         excess are those of the first model. The \
-         page of a maneuver draws it.",
+        "The farthest outside first. Verdict, deciding tolerance, probability that a \
+         repeat flight passes, share inside and largest excess are those of the first model. The page of a \
+         maneuver draws it.",
         &heads,
         rows,
     );
     table.links = links;
     table.classes = classes;
+    table.flagged = flagged;
     table
+}
+
+/// Maneuvers by the margin of their first model, ascending; those that were not flown again come last.
+fn worst_first<'a>(contents: &Contents<'a>) -> Vec<&'a Matched> {
+    let key = |matched: &&Matched| {
+        let first = matched.verdicts.first();
+        let flown = first.filter(|row| row.verdict != MatchVerdict::NotFlown);
+        flown.map_or(f64::INFINITY, |row| size(row.margin))
+    };
+    let mut all: Vec<&Matched> = contents.matched.iter().collect();
+    all.sort_by(|a, b| key(a).total_cmp(&key(b)));
+    all
 }
 
 fn maneuver_row(
@@ -286,7 +309,7 @@ fn maneuver_row(
 
 /// Row that decides each maneuver's verdict, of the first model.
 fn decisive_rows<'a>(contents: &Contents<'a>) -> BTreeMap<&'a str, &'a MatchRow> {
-    let decisive = |matched: &'a crate::proof_of_match::Matched| {
+    let decisive = |matched: &'a Matched| {
         let verdict = matched.verdicts.first()?;
         let mut rows = matched.rows.iter().filter(|row| row.model == verdict.model);
         let row =
@@ -308,17 +331,24 @@ mod tests {
         let markers = ClassMarkers::new(&contents);
         let section = section(&contents, &markers).expect("a section");
         assert_eq!(
-            section.answers[0],
-            "With the posterior as its derivatives a simulator matches 2 of 3 maneuvers within every \
-             tolerance; the farthest outside is 1-OLON-30 (OLON at 30°, 2.c.10 an_g). Flown once more, 1.6 of them are expected to match. 1 was flown \
-             closed-loop, judged with the recorded surfaces."
+            section.answer,
+            "With the derivatives of the posterior a simulator matches 2 of 3 maneuvers within every tolerance, \
+             and is expected to match 1.6 if all are flown once more; the farthest outside is 1-OLON-30 (OLON at \
+             30°, 2.c.10 an_g, margin \u{2212}0.50). With the derivatives of the wind tunnel a simulator matches 2 \
+             of 3 maneuvers within every tolerance, and is expected to match 1.6 if all are flown once more; the \
+             farthest outside is 1-OLON-30 (OLON at 30°, 2.c.10 an_g, margin \u{2212}0.60). 1 was flown \
+             closed-loop and judged with the recorded surfaces."
         );
-        assert!(section.answers[1].starts_with("With the wind tunnel"));
         assert_eq!(section.charts.len(), 2);
         assert_eq!(section.charts[0].svg.matches("inside").count(), 2);
-        let rows = &section.tables[1].rows;
+        let table = &section.tables[1];
+        let rows = &table.rows;
         assert_eq!(rows.len(), 4);
-        assert_eq!(rows[0][..5], ["1-OLON-10", "OLON", "10.0", "0.40", "0.30"]);
+        let outside = ["1-OLON-30", "OLON", "30.0", "\u{2212}0.50", "\u{2212}0.60"];
+        assert_eq!(rows[0][..5], outside, "the worst first");
+        assert_eq!(table.flagged, [vec![5], vec![], vec![], vec![]]);
+        assert_eq!(rows[0][5], "outside");
+        assert_eq!(rows[2][..5], ["1-OLON-10", "OLON", "10.0", "0.40", "0.30"]);
         assert!(rows[3][5].starts_with("not flown: no"), "{:?}", rows[3]);
     }
 

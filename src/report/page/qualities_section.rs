@@ -138,26 +138,89 @@ fn answer(levels: &[&LevelRow]) -> String {
         share(Level::Two),
         share(Level::Three)
     );
-    if let Some(worst) = worst_paragraph(levels) {
-        text.push_str(&worst);
-    }
+    text.extend(worst(levels));
+    text.extend(least_certain(levels).map(|row| {
+        format!(
+            " The least certain is {}: {}.",
+            place_in_words(row),
+            probabilities_in_words(row)
+        )
+    }));
     text
 }
 
-/// The paragraph with the smallest probability of Level 1, and where.
-fn worst_paragraph(levels: &[&LevelRow]) -> Option<String> {
+/// Paragraph with the largest probability of missing Level 1, and where; of several, the one that is worst on
+/// average. `None` where every paragraph is certain to meet Level 1.
+fn worst(levels: &[&LevelRow]) -> Option<String> {
+    let mean_level = |row: &LevelRow| {
+        row.level_1_pct + 2.0 * row.level_2_pct + 3.0 * row.level_3_pct + 4.0 * row.worse_pct
+    };
+    let badness = |row: &LevelRow| (-row.level_1_pct, mean_level(row));
     let own = levels.iter().filter(|row| row.paragraph != ALL);
-    let worst = own.min_by(|a, b| a.level_1_pct.total_cmp(&b.level_1_pct))?;
+    let worst = own.max_by(|a, b| {
+        let (a, b) = (badness(a), badness(b));
+        // The first of equals stands at the lowest angle of attack.
+        a.0.total_cmp(&b.0)
+            .then(a.1.total_cmp(&b.1))
+            .then(std::cmp::Ordering::Greater)
+    })?;
     (worst.level_1_pct < CERTAIN_PCT).then(|| {
         format!(
-            " The least certain is {} ({}) at {}: Level 1 with {} %, worse than Level 3 with {} %.",
-            worst.subject,
-            worst.paragraph,
-            angle(worst.alpha_deg),
-            fixed(worst.level_1_pct, 0),
+            " The worst is {}: it misses Level 1 with {} % probability, and is worse than Level 3 with {} %.",
+            place_in_words(worst),
+            fixed(100.0 - worst.level_1_pct, 0),
             fixed(worst.worse_pct, 0)
         )
     })
+}
+
+/// Paragraph and angle of attack whose level is least certain: the largest entropy of its probabilities. `None` where
+/// every level is certain.
+#[must_use]
+pub fn least_certain<'a>(levels: &[&'a LevelRow]) -> Option<&'a LevelRow> {
+    let entropy = |row: &LevelRow| -> f64 {
+        let shares = probabilities(row).map(|(_, pct)| 0.01 * pct);
+        shares
+            .iter()
+            .filter(|p| **p > 0.0)
+            .map(|p| -p * p.ln())
+            .sum()
+    };
+    let own = levels.iter().copied().filter(|row| row.paragraph != ALL);
+    let most = own.max_by(|a, b| entropy(a).total_cmp(&entropy(b)))?;
+    let largest = probabilities(most).into_iter().map(|(_, pct)| pct);
+    (largest.fold(0.0, f64::max) < CERTAIN_PCT).then_some(most)
+}
+
+fn probabilities(row: &LevelRow) -> [(&'static str, f64); 4] {
+    [
+        ("Level 1", row.level_1_pct),
+        ("Level 2", row.level_2_pct),
+        ("Level 3", row.level_3_pct),
+        ("worse", row.worse_pct),
+    ]
+}
+
+/// Subject, paragraph and angle of attack: `Dutch roll (3.3.1.1) at 20°`.
+#[must_use]
+pub fn place_in_words(row: &LevelRow) -> String {
+    format!(
+        "{} ({}) at {}",
+        row.subject,
+        row.paragraph,
+        angle(row.alpha_deg)
+    )
+}
+
+/// Levels with their probabilities, without those that round to zero.
+fn probabilities_in_words(row: &LevelRow) -> String {
+    let likely = probabilities(row)
+        .into_iter()
+        .filter(|(_, pct)| *pct >= 0.5);
+    let words: Vec<String> = likely
+        .map(|(level, pct)| format!("{level} with {} %", fixed(pct, 0)))
+        .collect();
+    words.join(", ")
 }
 
 /// Level and its probability of each paragraph, by angle of attack.
@@ -269,8 +332,13 @@ mod tests {
             bare.answer
         );
         assert!(
+            bare.answer.ends_with(
+                " The worst is short-period damping (3.2.2.1.2) at 30°: it misses Level 1 with 99 % \
+                 probability, and is worse than Level 3 with 0 %. The least certain is short-period damping \
+                 (3.2.2.1.2) at 20°: Level 1 with 60 %, Level 2 with 40 %."
+            ),
+            "{}",
             bare.answer
-                .contains("short-period damping (3.2.2.1.2) at 30°: Level 1 with 1 %")
         );
         assert_eq!(
             bare.charts.len(),
@@ -280,6 +348,27 @@ mod tests {
         let levels = &bare.tables[0];
         assert_eq!(levels.rows[1], ["20°", "1 (60 %)", "1 (60 %)"]);
         assert_eq!(bare.tables[1].rows[0][4], "0.550 ± 0.050");
+    }
+
+    #[test]
+    fn the_worst_of_several_that_miss_level_1_is_the_one_with_the_worst_levels() {
+        let mut campaign = campaign();
+        for row in &mut campaign.qualities.levels {
+            (row.level_1_pct, row.level_2_pct) = (0.0, 100.0);
+        }
+        let last = campaign.qualities.levels.len() - 2;
+        let row = &mut campaign.qualities.levels[last];
+        (row.level_2_pct, row.worse_pct) = (0.0, 100.0);
+        let levels: Vec<&LevelRow> = campaign.qualities.levels.iter().collect();
+        let answer = answer(&levels);
+        assert!(
+            answer.contains("at 30°: it misses Level 1 with 100 % probability, and is worse than Level 3 with 100 %"),
+            "{answer}"
+        );
+        assert!(
+            !answer.contains("least certain"),
+            "every level is certain: {answer}"
+        );
     }
 
     #[test]

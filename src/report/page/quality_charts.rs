@@ -111,10 +111,7 @@ fn probabilities(levels: &[&LevelRow], airframe: Airframe) -> Option<QualityChar
         x: ChartAxis::linear("α, deg", Scale::covering(low, high)),
         y: ChartAxis::linear("probability, %", Scale::covering(0.0, 100.0)),
         boxes: vec![],
-        series: LEVEL_LINES
-            .iter()
-            .map(|line| line.through(levels))
-            .collect(),
+        series: level_lines(levels),
     }))
 }
 
@@ -123,8 +120,6 @@ struct LevelLine {
     /// Number of the level.
     label: &'static str,
     colour: &'static str,
-    /// Fifth of the angles of attack at which the label stands: lines often lie on each other.
-    label_at: usize,
     share: fn(&LevelRow) -> f64,
 }
 
@@ -132,37 +127,68 @@ const LEVEL_LINES: [LevelLine; 3] = [
     LevelLine {
         label: "1",
         colour: DARK_COLOURS[4],
-        label_at: 1,
         share: |row| row.level_1_pct,
     },
     LevelLine {
         label: "2",
         colour: DARK_COLOURS[1],
-        label_at: 4,
         share: |row| row.level_1_pct + row.level_2_pct,
     },
     LevelLine {
         label: "3",
         colour: DARK_COLOURS[2],
-        label_at: 2,
         share: |row| row.level_1_pct + row.level_2_pct + row.level_3_pct,
     },
 ];
 
-impl LevelLine {
-    fn through(&self, levels: &[&LevelRow]) -> ChartSeries {
-        let labelled = self.label_at * levels.len() / 5;
+/// Lines that differ less cannot be told apart in the chart, per cent.
+const LEAST_APART_PCT: f64 = 3.0;
+
+/// Lines of the levels. Lines that coincide everywhere share one label; each other line has its label where it is
+/// farthest from the others.
+fn level_lines(levels: &[&LevelRow]) -> Vec<ChartSeries> {
+    let shares: Vec<Vec<f64>> = LEVEL_LINES
+        .iter()
+        .map(|line| levels.iter().map(|row| (line.share)(row)).collect())
+        .collect();
+    let apart = |a: usize, b: usize, i: usize| (shares[a][i] - shares[b][i]).abs();
+    let coincide = |a: usize, b: usize| (0..levels.len()).all(|i| apart(a, b, i) < LEAST_APART_PCT);
+    let all = 0..LEVEL_LINES.len();
+    let group = |own: usize| {
+        let others = all.clone().filter(move |other| coincide(own, *other));
+        others.collect::<Vec<_>>()
+    };
+    let line = |own: usize| {
+        let group = group(own);
+        let nearest = |i: usize| {
+            let others = all.clone().filter(|other| !group.contains(other));
+            others
+                .map(|other| apart(own, other, i))
+                .fold(100.0, f64::min)
+        };
+        let labelled = (0..levels.len()).max_by(|a, b| nearest(*a).total_cmp(&nearest(*b)));
+        // The last line of a group is drawn over the others.
+        let names = group.iter().map(|i| LEVEL_LINES[*i].label);
+        let label = match group.last() {
+            Some(last) if *last == own => names.collect::<Vec<_>>().join(", "),
+            _ => String::new(),
+        };
         let point = |(i, row): (usize, &&LevelRow)| ChartPoint {
-            at: (row.alpha_deg, (self.share)(row)),
-            label: if i == labelled { self.label } else { "" }.to_owned(),
+            at: (row.alpha_deg, shares[own][i]),
+            label: if Some(i) == labelled {
+                label.clone()
+            } else {
+                String::new()
+            },
             outline: vec![],
         };
         ChartSeries {
-            colour: self.colour,
+            colour: LEVEL_LINES[own].colour,
             points: levels.iter().enumerate().map(point).collect(),
             is_joined: true,
         }
-    }
+    };
+    all.clone().map(line).collect()
 }
 
 /// Chart of two quantities of one mode.
@@ -360,8 +386,28 @@ mod tests {
         row.level_1_pct = 50.0;
         row.level_2_pct = 30.0;
         row.level_3_pct = 15.0;
-        let lines = LEVEL_LINES.iter().map(|line| line.through(&[&row]));
-        let at: Vec<f64> = lines.map(|line| line.points[0].at.1).collect();
+        let lines = level_lines(&[&row]);
+        let at: Vec<f64> = lines.iter().map(|line| line.points[0].at.1).collect();
         assert_eq!(at, [50.0, 80.0, 95.0]);
+    }
+
+    #[test]
+    fn lines_that_coincide_share_one_label() {
+        let campaign = campaign();
+        let row = |level_1_pct: f64, level_3_pct: f64| LevelRow {
+            level_1_pct,
+            level_2_pct: 0.0,
+            level_3_pct,
+            ..campaign.qualities.levels[0].clone()
+        };
+        let rows = [row(0.0, 0.0), row(0.0, 90.0), row(1.0, 40.0)];
+        let lines = level_lines(&rows.iter().collect::<Vec<_>>());
+        let labels = |line: &ChartSeries| {
+            let labels = line.points.iter().map(|p| p.label.clone());
+            labels.collect::<Vec<_>>()
+        };
+        assert_eq!(labels(&lines[0]), ["", "", ""]);
+        assert_eq!(labels(&lines[1]).concat(), "1, 2");
+        assert_eq!(labels(&lines[2]), ["", "3", ""], "where it is alone");
     }
 }
