@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::record::{Record, Series};
 use super::signal as s;
 use crate::earth::air;
+use crate::numerics::bisection::last_that_holds;
 
 /// Source of the values of a signal that is not recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -132,20 +133,14 @@ const HALVINGS: usize = 28;
 
 /// Altitude of the standard atmosphere with a density, ft; NaN for a density of no altitude.
 fn altitude_ft(density_slug_ft3: f64) -> f64 {
-    let (mut low, mut high) = ALTITUDES_FT;
+    let (low, high) = ALTITUDES_FT;
     let is_inside = air(high).density_slug_ft3 <= density_slug_ft3
         && density_slug_ft3 <= air(low).density_slug_ft3;
     if !is_inside {
         return f64::NAN;
     }
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (low + high);
-        if air(middle).density_slug_ft3 > density_slug_ft3 {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
+    let is_denser = |altitude_ft| air(altitude_ft).density_slug_ft3 > density_slug_ft3;
+    let (low, high) = last_that_holds(ALTITUDES_FT, HALVINGS, is_denser);
     0.5 * (low + high)
 }
 

@@ -350,7 +350,7 @@ pub fn moves(grid: &Grid, facts: &ColumnFacts, kind: Input) -> bool {
     let values = || grid.columns.get(&facts.name).into_iter().flatten().copied();
     let rarely = rare_share(grid);
     let range = quantile(values(), 1.0 - rarely).zip(quantile(values(), rarely));
-    let is_in_radians = facts.unit.is_some_and(|unit| unit.name == "rad");
+    let is_in_radians = facts.unit.is_some_and(units::Unit::is_radian);
     let least = match (kind.is_surface(), is_in_radians) {
         (true, true) => MOVES_DEG.to_radians(),
         (true, false) => MOVES_DEG,

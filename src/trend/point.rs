@@ -1,5 +1,7 @@
 //! Points of a trend.
 
+use crate::numerics::mean::mean;
+
 /// One maneuver's estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Point {
@@ -36,9 +38,9 @@ pub(super) fn count_flown<'a>(points: impl Iterator<Item = &'a mut Point>, step_
 
 /// The flown α, deg, ascending: each the mean of its maneuvers, to a tenth.
 pub(super) fn flown_alphas(points: &[Point]) -> Vec<f64> {
-    let mean = |own: &[Point]| own.iter().map(|p| p.alpha_deg).sum::<f64>() / own.len() as f64;
+    let mean_alpha_deg = |own: &[Point]| mean(own.iter().map(|p| p.alpha_deg));
     points
         .chunk_by(|a, b| a.flown == b.flown)
-        .map(|own| (10.0 * mean(own)).round() / 10.0)
+        .map(|own| (10.0 * mean_alpha_deg(own)).round() / 10.0)
         .collect()
 }

@@ -2,13 +2,13 @@
 
 use serde::Serialize;
 
-use super::quality_charts::{self, ALL, QualityChart};
+use super::quality_charts::{self, QualityChart};
 use crate::aero::Axis;
 use crate::qualities::{Qualities, Specification};
 use crate::report::contents::Contents;
 use crate::report::notation::{NOTHING, angle, fixed, number};
 use crate::report::table_view::TableView;
-use crate::tables::{Airframe, FlyingQuality, Level, LevelRow, QualityRow};
+use crate::tables::{ALL_PARAGRAPHS, Airframe, FlyingQuality, Level, LevelRow, QualityRow};
 
 /// The section.
 #[derive(Clone, Debug, Serialize)]
@@ -120,7 +120,10 @@ fn is_at(a: f64, b: f64) -> bool {
 
 /// Level 1 with certainty, the most certain level elsewhere, and the paragraphs that fail most.
 fn answer(levels: &[&LevelRow]) -> String {
-    let all: Vec<&&LevelRow> = levels.iter().filter(|row| row.paragraph == ALL).collect();
+    let all: Vec<&&LevelRow> = levels
+        .iter()
+        .filter(|row| row.paragraph == ALL_PARAGRAPHS)
+        .collect();
     let certain = |row: &&&&LevelRow, most: Level| {
         let shares = [row.level_1_pct, row.level_2_pct, row.level_3_pct];
         let count = most as usize + 1;
@@ -145,7 +148,7 @@ fn answer(levels: &[&LevelRow]) -> String {
 
 /// The paragraph with the smallest probability of Level 1, and where.
 fn worst_paragraph(levels: &[&LevelRow]) -> Option<String> {
-    let own = levels.iter().filter(|row| row.paragraph != ALL);
+    let own = levels.iter().filter(|row| row.paragraph != ALL_PARAGRAPHS);
     let worst = own.min_by(|a, b| a.level_1_pct.total_cmp(&b.level_1_pct))?;
     (worst.level_1_pct < CERTAIN_PCT).then(|| {
         format!(

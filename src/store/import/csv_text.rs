@@ -175,69 +175,22 @@ impl Layout {
     /// Layout with one delimiter, and the count of numbers that it reads; `None` without a row of two or
     /// more numbers.
     fn with(lines: &[&str], delimiter: Delimiter, decimal_comma: bool) -> Option<(usize, Layout)> {
-        let fields = |line: &str| fields(line, delimiter);
-        let value = |field: &String| number(field, decimal_comma);
-        // A recording may begin with missing values; lines above it have text beside their numbers.
-        let is_data = |line: &&str| {
-            let fields = fields(line);
-            let numbers = fields.iter().filter(|f| value(f).is_some()).count();
-            let has_text = || fields.iter().any(|f| value(f).is_none() && !is_missing(f));
-            fields.len() >= 2 && (numbers * 2 > fields.len() || numbers > 0 && !has_text())
-        };
-        let first = lines.iter().position(is_data)?;
-        let width = fields(lines[first]).len();
-        let headers: Vec<(usize, Vec<String>)> = lines[..first]
-            .iter()
-            .enumerate()
-            .map(|(at, line)| {
-                (
-                    at,
-                    fields(line.trim_start_matches(['#', '%', '!']).trim_start()),
-                )
-            })
-            .filter(|(_, fields)| fields.len() == width)
-            .collect();
-        let (names, units) = names_and_units(&headers, width);
-        let rows: Vec<Vec<String>> = lines[first..]
-            .iter()
-            .take(HEAD_ROWS)
-            .map(|line| fields(line))
-            .collect();
-        let numbers = |at: usize| {
-            rows.iter()
-                .filter(|row| row.get(at).and_then(value).is_some())
-                .count()
-        };
-        let is_text = |at: &usize| {
-            numbers(*at) == 0
-                && rows
-                    .iter()
-                    .any(|row| row.get(*at).is_some_and(|f| !is_missing(f)))
-        };
-        let (dropped, kept): (Vec<usize>, Vec<usize>) = (0..width).partition(is_text);
-        let column = |at: usize| {
-            let (name, own) = name_and_unit(&names[at]);
-            let unit = units
-                .get(at)
-                .cloned()
-                .filter(|unit| !unit.is_empty())
-                .or(own);
-            (at, ImportedColumn { name, unit })
-        };
-        let mut columns: Vec<(usize, ImportedColumn)> = kept.iter().map(|at| column(*at)).collect();
+        let head = Head::of(lines, delimiter, decimal_comma)?;
+        let (dropped, kept): (Vec<usize>, Vec<usize>) =
+            (0..head.names.len()).partition(|at| head.is_text(*at));
+        let mut columns: Vec<(usize, ImportedColumn)> =
+            kept.iter().map(|at| (*at, head.column(*at))).collect();
         make_unique(&mut columns);
-        let all = kept.iter().map(|at| numbers(*at)).sum();
-        let dropped = dropped.into_iter().map(|at| names[at].clone()).collect();
-        (columns.len() >= 2).then_some((
-            all,
-            Layout {
-                delimiter,
-                decimal_comma,
-                skipped: first,
-                columns,
-                dropped,
-            },
-        ))
+        let all = kept.iter().map(|at| head.count_numbers(*at)).sum();
+        let dropped = dropped.into_iter().map(|at| head.names[at].clone());
+        let layout = Layout {
+            delimiter,
+            decimal_comma,
+            skipped: head.skipped,
+            dropped: dropped.collect(),
+            columns,
+        };
+        (layout.columns.len() >= 2).then_some((all, layout))
     }
 
     /// Message for rows that have twice as many fields as the line of names above them: their
@@ -282,6 +235,76 @@ impl Layout {
             column.push(value.unwrap_or(f64::NAN));
         }
     }
+}
+
+/// Beginning of a text in fields, as one delimiter and decimal sign read it.
+struct Head {
+    decimal_comma: bool,
+    /// Lines above the first row of numbers.
+    skipped: usize,
+    /// Name of each column.
+    names: Vec<String>,
+    /// Unit of each column, empty where there is none; no units without a line of units.
+    units: Vec<String>,
+    /// First rows of numbers.
+    rows: Vec<Vec<String>>,
+}
+
+impl Head {
+    /// `None` without a row of two or more numbers.
+    fn of(lines: &[&str], delimiter: Delimiter, decimal_comma: bool) -> Option<Head> {
+        let skipped = lines
+            .iter()
+            .position(|line| is_data(&fields(line, delimiter), decimal_comma))?;
+        let width = fields(lines[skipped], delimiter).len();
+        let above = lines[..skipped].iter().enumerate().map(|(at, line)| {
+            let line = line.trim_start_matches(['#', '%', '!']).trim_start();
+            (at, fields(line, delimiter))
+        });
+        let headers: Vec<(usize, Vec<String>)> =
+            above.filter(|(_, fields)| fields.len() == width).collect();
+        let (names, units) = names_and_units(&headers, width);
+        let rows = lines[skipped..].iter().take(HEAD_ROWS);
+        Some(Head {
+            decimal_comma,
+            skipped,
+            names,
+            units,
+            rows: rows.map(|line| fields(line, delimiter)).collect(),
+        })
+    }
+
+    /// Fields of a column, where a row has it.
+    fn fields(&self, at: usize) -> impl Iterator<Item = &String> {
+        self.rows.iter().filter_map(move |row| row.get(at))
+    }
+
+    fn count_numbers(&self, at: usize) -> usize {
+        self.fields(at)
+            .filter(|field| number(field, self.decimal_comma).is_some())
+            .count()
+    }
+
+    /// `true` for a column of text without any number.
+    fn is_text(&self, at: usize) -> bool {
+        self.count_numbers(at) == 0 && self.fields(at).any(|field| !is_missing(field))
+    }
+
+    fn column(&self, at: usize) -> ImportedColumn {
+        let (name, own) = name_and_unit(&self.names[at]);
+        let stated = self.units.get(at).cloned();
+        let unit = stated.filter(|unit| !unit.is_empty()).or(own);
+        ImportedColumn { name, unit }
+    }
+}
+
+/// `true` for the fields of a row of numbers. A recording may begin with missing values; lines above it have
+/// text beside their numbers.
+fn is_data(fields: &[String], decimal_comma: bool) -> bool {
+    let is_number = |field: &&String| number(field, decimal_comma).is_some();
+    let numbers = fields.iter().filter(is_number).count();
+    let has_text = || fields.iter().any(|f| !is_number(&f) && !is_missing(f));
+    fields.len() >= 2 && (numbers * 2 > fields.len() || numbers > 0 && !has_text())
 }
 
 /// Names and units from the lines above the numbers: the header is the nearest line of text, and the line
