@@ -38,6 +38,27 @@ words! {
 }
 
 impl DerivativeUnit {
+    /// The unit in words, as pages have it; empty for a pure number.
+    #[must_use]
+    pub fn typeset(self) -> &'static str {
+        match self {
+            DerivativeUnit::Number => "",
+            DerivativeUnit::PerDeg => "per deg",
+            DerivativeUnit::PerRad => "per rad",
+            DerivativeUnit::PerFtS => "per ft s",
+            DerivativeUnit::PerDeg2 => "per deg2",
+            DerivativeUnit::PerRad2 => "per rad2",
+            DerivativeUnit::PerDegRad => "per deg rad",
+            DerivativeUnit::PerDegFtS => "per deg ft s",
+            DerivativeUnit::PerRadFtS => "per rad ft s",
+            DerivativeUnit::LbfPerDeg => "lbf/deg",
+            DerivativeUnit::FtLbfPerDeg => "ft·lbf/deg",
+            DerivativeUnit::G => "g",
+            DerivativeUnit::DegPerS => "deg/s",
+            DerivativeUnit::Deg => "deg",
+        }
+    }
+
     /// Factor from values in a unit as a database spells it (`per_rad`, `1/deg`, `N_per_deg`, `nd`)
     /// to values in this one.
     ///

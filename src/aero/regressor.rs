@@ -5,6 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::derivative_unit::DerivativeUnit;
+use crate::flight::signal;
 use crate::units::{Quantity, Unit};
 
 /// Factor of a derivative.
@@ -90,6 +91,18 @@ impl Regressor {
             Regressor::Surface(signal) | Regressor::Vane(signal) => Some(signal),
             _ => None,
         }
+    }
+
+    /// `true` for the airspeed. A build-up, and its key in the store, has it as the signal that it is.
+    #[must_use]
+    pub fn is_velocity(&self) -> bool {
+        self.surface() == Some(signal::VELOCITY)
+    }
+
+    /// `true` for the Mach number, likewise.
+    #[must_use]
+    pub fn is_mach(&self) -> bool {
+        self.surface() == Some(signal::MACH)
     }
 
     /// Signals of surfaces, vanes and others in the regressor.

@@ -8,7 +8,7 @@ use crate::maneuver::Status;
 use crate::store::archive;
 
 /// Least width of the names of classes.
-const SHORT_NAME: usize = 10;
+const SHORT_CLASS: usize = 10;
 
 /// Validates the configuration and prints what a run would use.
 pub fn check(options: &Options) -> anyhow::Result<ExitCode> {
@@ -36,7 +36,7 @@ pub fn check(options: &Options) -> anyhow::Result<ExitCode> {
         }
     );
     let longest = config.classes.iter().map(|c| c.name.chars().count()).max();
-    let width = longest.unwrap_or_default().max(SHORT_NAME);
+    let width = longest.unwrap_or_default().max(SHORT_CLASS);
     out!("{:<width$} estimated  held  inactive", "classes");
     for class in &config.classes {
         let count = |status| class.statuses.values().filter(|s| **s == status).count();

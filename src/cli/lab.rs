@@ -7,15 +7,12 @@ use std::process::ExitCode;
 use clap::{Args, Subcommand};
 
 use super::bars::Bars;
-use super::options::start_threads;
+use super::options::{REJECTED, start_threads};
 use crate::error::Problem;
 use crate::lab::campaign::{self, SimulatedCampaign};
 use crate::lab::{bounds_study, standard_case};
 use crate::store::{atomic, files};
 use crate::tables;
-
-/// Exit code when part of the work was rejected.
-const REJECTED: u8 = 2;
 
 #[derive(Debug, Subcommand)]
 pub enum LabCommand {

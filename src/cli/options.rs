@@ -10,7 +10,7 @@ use clap::Args;
 use crate::config::{Config, Overrides};
 use crate::store::files;
 
-/// Exit code of a run that rejected something, and of a night that is no longer valid.
+/// Exit code of a command that rejected something, and of a night that is no longer valid.
 pub const REJECTED: u8 = 2;
 
 /// Exit code when values moved, or artefacts are stale or missing.

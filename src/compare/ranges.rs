@@ -4,6 +4,7 @@
 use super::judgement::Agreement;
 use super::settings::Settings;
 use crate::aero::WindTunnel;
+use crate::numerics::mean::mean;
 use crate::numerics::order_statistics::median;
 use crate::tables::{ChangeRow, ComparisonRow, DisagreementRow, Verdict, VerdictRow};
 
@@ -101,7 +102,7 @@ pub fn ranges_of_changes(
             .filter(|p| p.derivative == name)
             .filter_map(|p| p.other)
             .collect();
-        (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+        mean(values.iter().map(|v| v * v)).sqrt()
     };
     ranges(&compared, against, against, settings, size)
 }

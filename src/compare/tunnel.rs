@@ -9,6 +9,7 @@ use super::settings::Settings;
 use crate::aero::wind_tunnel::TunnelValue;
 use crate::aero::{Condition, WindTunnel};
 use crate::maneuver::{Maneuver, Status};
+use crate::numerics::mean::mean;
 use crate::tables::{
     ComparisonRow, EstimateRow, ManeuverComparisonRow, PosteriorRow, TunnelDifference,
     TunnelVerdict,
@@ -201,9 +202,7 @@ fn condition_near<'a>(
                 .min_by(|a, b| distance(a).total_cmp(&distance(b))),
         );
     }
-    let mean = |values: Vec<f64>| {
-        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-    };
+    let mean = |values: Vec<f64>| (!values.is_empty()).then(|| mean(values.iter().copied()));
     let mach = mean(near.iter().map(|m| m.mach).collect())?;
     let third = mean(
         near.iter()

@@ -33,11 +33,13 @@ impl Air {
 
 /// kg/m³ in a slug/ft³.
 const KG_M3_PER_SLUG_FT3: f64 = 515.378_818_393_2;
-/// Pascals in a pound-force per square foot.
+/// Pascals in a pound-force per square foot: newtons in a pound-force (`LBF` of `units/unit.rs`) over
+/// [`M_PER_FT`]², rounded to fourteen digits; the quotient itself would change published bits.
 const PA_PER_PSF: f64 = 47.880_258_980_336;
 /// Gas constant of air, J/(kg K).
 const GAS: f64 = 287.052_87;
-/// Standard gravity, m/s².
+/// Standard gravity, m/s²: the unit g of [`crate::units::G0_FT_S2`], 9.80665/0.3048 = 32.174049 ft/s², to its
+/// last stated digit.
 const GRAVITY: f64 = 9.806_65;
 /// Radius of the earth in the definition of the geopotential height.
 const RADIUS_M: f64 = 6_356_766.0;

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::record::{Record, Series};
 use super::signal as s;
 use crate::earth::air;
+use crate::numerics::bisection::last_that_holds;
 
 /// Source of the values of a signal that is not recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -138,20 +139,14 @@ const HALVINGS: usize = 28;
 /// Altitude with a density, ft, in air of a temperature (K), or of that of the standard atmosphere if
 /// it is not finite; NaN for a density of no altitude.
 fn altitude_ft(density_slug_ft3: f64, kelvin: f64) -> f64 {
-    let (mut low, mut high) = ALTITUDES_FT;
+    let (low, high) = ALTITUDES_FT;
     let density = |altitude_ft: f64| air(altitude_ft).at_temperature(kelvin).density_slug_ft3;
     let is_inside = density(high) <= density_slug_ft3 && density_slug_ft3 <= density(low);
     if !is_inside {
         return f64::NAN;
     }
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (low + high);
-        if density(middle) > density_slug_ft3 {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
+    let is_denser = |altitude_ft| density(altitude_ft) > density_slug_ft3;
+    let (low, high) = last_that_holds(ALTITUDES_FT, HALVINGS, is_denser);
     0.5 * (low + high)
 }
 

@@ -40,6 +40,7 @@
 //!
 //! For one limit at a distance d from m, and ν = 0, the sum is Φ((d − zσ′)/τ) + Φ(−(d + zσ′)/τ).
 
+use crate::numerics::bisection::last_that_holds;
 use crate::numerics::normal;
 
 /// Halvings of an interval in a search: to 2⁻⁶⁰ of its length, the last digit.
@@ -144,14 +145,5 @@ impl Decision {
 /// Largest number from zero to a limit that satisfies a condition, which must fail at every larger
 /// number; zero if no number does.
 fn largest_up_to(limit: f64, holds: impl Fn(f64) -> bool) -> f64 {
-    let (mut low, mut high) = (0.0, limit);
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (low + high);
-        if holds(middle) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    low
+    last_that_holds((0.0, limit), HALVINGS, holds).0
 }

@@ -80,18 +80,7 @@ pub fn assess(
     if relations.impossible.is_empty() {
         relations.impossible = examination.impossible(&blocks, &relations.faulty);
     }
-    let impossible = &relations.impossible;
-    if !impossible.is_empty() {
-        let found = impossible.iter().map(|one| {
-            let refusal = context.refusal(one.signal, one.reason.clone());
-            refusal.into_problem(flight_id)
-        });
-        let found: Vec<Problem> = found.collect();
-        if context.settings.on_failed_check == OnFailedCheck::Refuse {
-            return Err(joined(&found, flight_id));
-        }
-        problems.extend(found);
-    }
+    problems.extend(impossible_values(&relations, context, flight_id)?);
     let mut stand_ins = recording.stand_ins;
     if let Some(report) = &relations.report {
         let left_out = left_out(report, &relations.faulty);
@@ -102,11 +91,7 @@ pub fn assess(
         problems.push(problem);
         stand_ins.extend(left_out);
     }
-    let faults = findings.problems(flight_id);
-    if context.settings.compatibility.fault == OnFault::Refuse && findings.has_required_fault() {
-        return Err(joined(&faults, flight_id));
-    }
-    problems.extend(faults);
+    problems.extend(instrument_faults(&findings, context, flight_id)?);
     Ok(Assessment {
         flight: Some(flight_row(stretch, &relations.gusts)),
         channels: channel_rows(
@@ -125,6 +110,43 @@ pub fn assess(
         lift: lift_curve(&blocks, context.aircraft, &context.settings.checks),
         signature: recording.signature,
     })
+}
+
+/// Problems of signals with impossible values.
+///
+/// # Errors
+/// The problem, where failed checks refuse a stretch.
+fn impossible_values(
+    relations: &RelationResult,
+    context: &Context,
+    flight_id: &str,
+) -> Result<Vec<Problem>, Problem> {
+    let found = relations.impossible.iter().map(|one| {
+        let refusal = context.refusal(one.signal, one.reason.clone());
+        refusal.into_problem(flight_id)
+    });
+    let found: Vec<Problem> = found.collect();
+    let refuses = context.settings.on_failed_check == OnFailedCheck::Refuse;
+    if refuses && !found.is_empty() {
+        return Err(joined(&found, flight_id));
+    }
+    Ok(found)
+}
+
+/// Problems of faulty instruments.
+///
+/// # Errors
+/// The problem, where a fault of a required instrument refuses a stretch.
+fn instrument_faults(
+    findings: &Findings,
+    context: &Context,
+    flight_id: &str,
+) -> Result<Vec<Problem>, Problem> {
+    let faults = findings.problems(flight_id);
+    if context.settings.compatibility.fault == OnFault::Refuse && findings.has_required_fault() {
+        return Err(joined(&faults, flight_id));
+    }
+    Ok(faults)
 }
 
 /// A channel with its name and the statistics of its conditioning.

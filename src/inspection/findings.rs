@@ -472,7 +472,7 @@ fn input_unit(facts: &ColumnFacts, input: &InputColumn) -> (Unit, bool) {
     let degrees = Unit::of_signal("_deg");
     let radians = degrees
         .alike()
-        .find(|unit| unit.name == "rad")
+        .find(|unit| unit.is_radian())
         .unwrap_or(degrees);
     match (
         input.kind.is_surface(),
@@ -486,7 +486,7 @@ fn input_unit(facts: &ColumnFacts, input: &InputColumn) -> (Unit, bool) {
 
 /// Suffix of the names of signals in the quantity of a unit.
 fn suffix(unit: Unit) -> &'static str {
-    if unit.name == "in" {
+    if unit.is_inch() {
         return unit.suffix.unwrap_or_default();
     }
     unit.alike()

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::aero::{Axis, Condition, WindTunnel};
+use crate::flight::signal;
 use crate::schema::{table, words};
 
 /// One line of the analyst's list of events.
@@ -196,11 +197,11 @@ impl Maneuver {
     pub fn condition(&self, tunnel: &WindTunnel) -> Condition {
         let third = tunnel.settings().third.as_ref().map(|third| {
             let mean = match third.name.as_str() {
-                "altitude_ft" => self.altitude_ft,
-                "qbar_psf" => self.qbar_psf,
-                "velocity_ft_s" => self.velocity_ft_s,
-                "mass_slug" => self.mass_slug,
-                "x_cg_ft" => self.x_cg_ft,
+                signal::ALTITUDE => self.altitude_ft,
+                signal::QBAR => self.qbar_psf,
+                signal::VELOCITY => self.velocity_ft_s,
+                signal::MASS => self.mass_slug,
+                signal::X_CG => self.x_cg_ft,
                 _ => third.at,
             };
             if mean.is_finite() { mean } else { third.at }

@@ -24,7 +24,6 @@ use super::campaign_model::Model;
 use super::evidence::Evidence;
 use crate::aero::{Axis, Buildup, Coefficient, Derivative, DerivativeUnit, Regressor};
 use crate::aircraft::Aircraft;
-use crate::flight::signal;
 use crate::maneuver::{Maneuver, Means, Status};
 use crate::tables::{EstimateRow, LiftAndDragRow};
 use crate::units::RAD;
@@ -132,8 +131,8 @@ impl PublishedManeuver<'_> {
         match part {
             Regressor::Constant => 1.0,
             Regressor::Alpha => maneuver.alpha_deg,
-            Regressor::Surface(name) if name == signal::VELOCITY => maneuver.velocity_ft_s,
-            Regressor::Surface(name) if name == signal::MACH => maneuver.mach,
+            Regressor::Surface(_) if part.is_velocity() => maneuver.velocity_ft_s,
+            Regressor::Surface(_) if part.is_mach() => maneuver.mach,
             Regressor::Surface(name) | Regressor::Vane(name) => {
                 self.means.surfaces_deg.get(name).copied().unwrap_or(0.0)
             }

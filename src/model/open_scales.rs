@@ -20,12 +20,14 @@ use nalgebra::DVector;
 
 use super::observed_differences::ObservedDifferences;
 use super::posterior::Gaussian;
-use super::scale_prior::Scale;
+use super::scale_prior::{SPREAD_OF_SIZE, Scale};
 use super::scales::{LEAST_VARIANCE, logarithms_of, negative_log_posterior, scales_of};
 
-/// Least eigenvalue of H that is used, so that points stay where the prior allows scales. It is a
-/// little below 1/0.8² = 1.56, the second derivative of the widest prior of a scale.
+/// Least eigenvalue of H that is used, so that points stay where the prior allows scales. The widest
+/// prior of a scale alone gives 1/`SPREAD_OF_SIZE`² = 1.56; the limit is 4 % below it, so it acts only
+/// where the data make H less curved than the prior.
 const LEAST_CURVATURE: f64 = 1.5;
+const _: () = assert!(LEAST_CURVATURE < 1.0 / (SPREAD_OF_SIZE * SPREAD_OF_SIZE));
 
 /// Weight of each outer point of the Gauss-Hermite rule.
 const OUTER: f64 = 1.0 / 6.0;

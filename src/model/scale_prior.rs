@@ -3,7 +3,7 @@
 use crate::tables::Knowledge;
 
 /// Standard deviation of the logarithm of the size.
-const SPREAD_OF_SIZE: f64 = 0.8;
+pub(super) const SPREAD_OF_SIZE: f64 = 0.8;
 
 /// Standard deviation of the logarithm of the size of a table with stated uncertainties.
 const SPREAD_OF_STATED_SIZE: f64 = 0.4;

@@ -5,8 +5,8 @@ use nalgebra::{Cholesky, DVector};
 
 use super::flight_data::FlightData;
 use super::posterior::{Gaussian, LeavingOut, LeftOut, SolvedPosterior, information};
+use crate::numerics::normal::NORMAL_95;
 use crate::numerics::root::BlockRoot;
-use crate::numerics::student::NORMAL_95;
 
 /// Agreement of omitted data with their prediction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

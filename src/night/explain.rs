@@ -212,13 +212,13 @@ fn write_fit(text: &mut String, estimated: &Estimated) {
 }
 
 /// Least width of the names of derivatives.
-const SHORT_NAME: usize = 10;
+const SHORT_DERIVATIVE: usize = 10;
 
 fn write_derivatives(text: &mut String, estimated: &Estimated) {
     write_heading(text, "Derivatives");
     let named = estimated.estimates.iter().chain(&estimated.combined);
     let longest = named.map(|e| e.derivative.chars().count()).max();
-    let width = longest.unwrap_or_default().max(SHORT_NAME);
+    let width = longest.unwrap_or_default().max(SHORT_DERIVATIVE);
     let _ = writeln!(
         text,
         "  {:<width$} {:<9} {:>12} {:>12} {:>12} {:>12} {:>9}  unit",

@@ -1,7 +1,8 @@
 //! Numerical methods that several rooms share: linear algebra and dual numbers, distributions and order
-//! statistics, differences, sums over time and frequency, roots and minima, random numbers, and the processor's
+//! statistics, differences, sums over time and frequency, bisection, roots and minima, random numbers, and the processor's
 //! vectors.
 
+pub mod bisection;
 pub mod chi_squared;
 pub mod differences;
 pub(crate) mod digits;

@@ -4,6 +4,12 @@ use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
 use statrs::function::erf::{erf, erf_inv};
 
+/// One-sided 90 % quantile.
+pub const NORMAL_90: f64 = 1.281_551_565_544_600_4;
+
+/// Two-sided 95 % quantile.
+pub const NORMAL_95: f64 = 1.959_963_984_540_054;
+
 /// Probability that a normal deviate with a mean and standard deviation lies within ± a width.
 #[must_use]
 pub fn within(width: f64, mean: f64, deviation: f64) -> f64 {

@@ -8,6 +8,7 @@
 //! | [`quantile`] | linear between the two neighbours | left out |
 //! | [`lower_quantile_in_place`] | the smaller of the two neighbours | ordered |
 //! | [`trimmed_range`] | | ordered |
+//! | [`weighted_median`] | the smaller of the two middle values | ordered |
 //!
 //! Every function returns `None` for no values. The functions on `_in_place` reorder their argument
 //! and allocate nothing; they select in linear time. The upper median of many values is one of
@@ -38,6 +39,20 @@ pub fn upper_median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
 #[must_use]
 pub fn upper_median_in_place(values: &mut [f64]) -> Option<f64> {
     select(values, values.len() / 2)
+}
+
+/// Smallest value at which the weights of the values up to it are half of all weights, from values with their
+/// weights.
+#[must_use]
+pub fn weighted_median(mut values: Vec<(f64, f64)>) -> Option<f64> {
+    values.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * values.iter().map(|(_, weight)| weight).sum::<f64>();
+    let mut sum = 0.0;
+    let median = values.into_iter().find(|(_, weight)| {
+        sum += weight;
+        sum >= half
+    });
+    median.map(|(value, _)| value)
 }
 
 /// Median of counts; the larger of the two middle ones of an even number of counts. Reorders them.
@@ -116,6 +131,14 @@ mod tests {
 
     const EVEN: [f64; 4] = [4.0, 1.0, 3.0, 2.0];
     const ODD: [f64; 3] = [3.0, 1.0, 2.0];
+
+    #[test]
+    fn a_weighted_median_has_half_of_the_weights_on_either_side() {
+        let values = vec![(4.0, 1.0), (1.0, 1.0), (2.0, 5.0), (3.0, 1.0)];
+        assert_eq!(weighted_median(values), Some(2.0));
+        assert_eq!(weighted_median(vec![(2.0, 1.0), (1.0, 1.0)]), Some(1.0));
+        assert_eq!(weighted_median(vec![]), None);
+    }
 
     #[test]
     fn medians_of_even_counts_follow_their_rules() {

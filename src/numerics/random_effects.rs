@@ -5,19 +5,21 @@
 //! solves the moment equation of Paule and Mandel, Σ w_i (y_i − x_iᵀ β)² = n − p; it is zero where
 //! the left side is below n − p without scatter. For equal s_i this is restricted maximum
 //! likelihood. (R. C. Paule, J. Mandel, J. Res. NBS 87 (1982) 377; R. DerSimonian, R. Kacker,
-//! Contemp. Clin. Trials 28 (2007) 105.)
+//! Contemp. Clin. Trials 28 (2007) 105.) The trends solve the same equation for residuals of a given fit, with
+//! Huber's cut (`scatter.rs` of the trends).
 
 use nalgebra::{SMatrix, SVector};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// Halvings of the interval of τ²: to the last digit.
+use super::bisection::try_last_that_holds;
+use super::chi_squared;
+use super::normal::NORMAL_90;
+
+/// Halvings of the interval of τ², whose ends are at most a factor of four apart unless τ² is below the
+/// least variance: to 2⁻⁶⁰ of its length, the last digit.
 const HALVINGS: usize = 60;
 
 /// Probability that the scatter exceeds its limit.
 const TAIL: f64 = 0.1;
-
-/// One-sided 90 % quantile of the normal distribution.
-const NORMAL_90: f64 = 1.281_551_565_544_600_4;
 
 /// An observation with its variance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,9 +81,7 @@ impl RandomEffects<1> {
     /// are stated too large, which hide a scatter from the first limit.
     #[must_use]
     pub fn scatter_limit(&self, observations: &[Observation]) -> Option<f64> {
-        let least = ChiSquared::new(self.degrees_of_freedom)
-            .ok()?
-            .inverse_cdf(TAIL);
+        let least = chi_squared::quantile(TAIL, self.degrees_of_freedom)?;
         let shown = scatter_variance(observations, &|_| [1.0], least)?;
         let information: f64 = observations.iter().map(|y| y.variance.powi(-2)).sum();
         Some(shown.max(NORMAL_90 * (2.0 / information).sqrt()))
@@ -117,14 +117,8 @@ fn scatter_variance<const P: usize>(
         low = high;
         high *= 4.0;
     }
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (low + high);
-        if squares(middle)? > wanted {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
+    let is_too_small = |scatter| Some(squares(scatter)? > wanted);
+    let (low, high) = try_last_that_holds((low, high), HALVINGS, is_too_small)?;
     Some(0.5 * (low + high))
 }
 

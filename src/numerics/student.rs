@@ -2,8 +2,7 @@
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// Two-sided 95 % quantile of the normal distribution.
-pub const NORMAL_95: f64 = 1.959_963_984_540_054;
+pub use super::normal::NORMAL_95;
 
 /// Least number of degrees of freedom of [`widening_95`]. With fewer, the variance's standard error
 /// exceeds the variance, and the delta method behind the degrees of freedom fails.

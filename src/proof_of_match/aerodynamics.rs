@@ -371,8 +371,8 @@ impl Factors<'_> {
             Regressor::AlphaRate => Factor::AlphaRate {
                 half_length: 0.5 * self.aircraft.chord_ft,
             },
-            Regressor::Surface(name) if name == signal::VELOCITY => Factor::Velocity,
-            Regressor::Surface(name) if name == signal::MACH => Factor::Mach,
+            Regressor::Surface(_) if regressor.is_velocity() => Factor::Velocity,
+            Regressor::Surface(_) if regressor.is_mach() => Factor::Mach,
             Regressor::Surface(name) => Factor::Recorded(self.signal_index(name)),
             Regressor::Vane(name) => Factor::Vane {
                 place: self.signal_index(name),

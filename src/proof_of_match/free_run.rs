@@ -8,13 +8,12 @@ use super::outputs::{Outputs, outputs};
 use super::recording::ManeuverRecording;
 use crate::aircraft::Aircraft;
 use crate::numerics::runge_kutta::{self, POINT};
-use crate::rigid_body::{AirData, BodyState, CHANGING, Euler, Instant, Loads, Readings, body};
+use crate::rigid_body::{
+    AirData, BodyState, CHANGING, DEPARTURE_DEG, Euler, Instant, Loads, Readings, body,
+};
 use crate::units::DEG;
 use nalgebra::{Quaternion, Vector3};
 use pulp::{Arch, Simd, WithSimd};
-
-/// Angle of attack beyond which the aircraft has departed, deg: no build-up is valid there.
-const DEPARTURE_DEG: f64 = 90.0;
 
 /// Number of states at the start.
 pub const STATES: usize = 8;

@@ -14,6 +14,7 @@ use super::outputs::COUNT;
 use super::recording::ManeuverRecording;
 use crate::dynamics::{Equations, Lateral, Longitudinal, Motion};
 use crate::earth::air;
+use crate::numerics::mean::mean;
 use crate::numerics::symmetric;
 use crate::units::DEG;
 
@@ -198,11 +199,6 @@ fn implied(simulation: &Simulation, motion: &Motion) -> [f64; COEFFICIENTS] {
     let inputs = Lateral::rate_inputs(aircraft, motion);
     let [side, rolling, yawing] = Lateral::implied_coefficients(aircraft, motion, &inputs);
     [normal, pitching, axial, side, rolling, yawing]
-}
-
-fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
-    let count = values.len().max(1) as f64;
-    values.sum::<f64>() / count
 }
 
 /// Value at the first sample of the straight line of least squares.

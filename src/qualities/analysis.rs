@@ -14,12 +14,12 @@ use super::trim::Trim;
 use crate::aero::Axis;
 use crate::model::LocalPosterior;
 use crate::numerics::dual::Dual;
+use crate::numerics::normal::NORMAL_95;
 use crate::numerics::order_statistics::quantile;
 use crate::numerics::random::RandomStream;
 use crate::numerics::root::continuous_root;
-use crate::numerics::student::NORMAL_95;
 use crate::tables::{
-    Airframe, DeviationBasis, FlyingQuality, Level, LevelRow, QualityRow, RootRow,
+    ALL_PARAGRAPHS, Airframe, DeviationBasis, FlyingQuality, Level, LevelRow, QualityRow, RootRow,
 };
 
 /// Seed of the draws. All angles of attack use the same random numbers, so that probabilities vary
@@ -29,9 +29,6 @@ const SEED: u64 = 21;
 /// Share of draws with another pattern of modes, above which the standard deviation is taken from
 /// the draws.
 const COALESCED: f64 = 0.01;
-
-/// Name of the row for the worst level of all paragraphs.
-const ALL: &str = "all";
 
 /// Rows of one airframe at one angle of attack.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -265,7 +262,7 @@ impl JudgedFlight<'_> {
                 counts[level as usize] += 1;
             }
         }
-        let of_all = (ALL, "all paragraphs");
+        let of_all = (ALL_PARAGRAPHS, "all paragraphs");
         let paragraphs = specification.requirements.iter();
         let paragraphs = paragraphs.map(|r| (r.paragraph.as_str(), r.subject.as_str()));
         let rows = paragraphs.chain([of_all]).zip(mean).zip(counts);

@@ -9,7 +9,6 @@ use super::trim::Trim;
 use crate::aero::{Buildup, Coefficient, Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::dynamics::COEFFICIENTS;
-use crate::flight::signal;
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
 use crate::units::DEG;
 
@@ -265,8 +264,8 @@ impl SteadyFlight<'_> {
         let mut effect = Effect::constant(match regressor {
             Regressor::Constant => 1.0,
             Regressor::Alpha => DEG * trim.alpha,
-            Regressor::Surface(name) if name == signal::VELOCITY => trim.velocity,
-            Regressor::Surface(name) if name == signal::MACH => trim.condition.mach,
+            Regressor::Surface(_) if regressor.is_velocity() => trim.velocity,
+            Regressor::Surface(_) if regressor.is_mach() => trim.condition.mach,
             Regressor::Surface(name) | Regressor::Vane(name) => {
                 trim.surfaces_deg.get(name).copied().unwrap_or(0.0)
             }
@@ -278,12 +277,11 @@ impl SteadyFlight<'_> {
         if let Some((state, factor)) = (states.of_regressor)(regressor) {
             effect.by_state[state] = factor;
         }
-        match (regressor.surface(), states.velocity) {
-            (Some(signal::VELOCITY | signal::MACH), Some(velocity)) => {
-                effect.by_state[velocity] = effect.at_trim / trim.velocity;
-            }
-            (Some(surface), _) => self.add_surface(surface, DEG, states, &mut effect),
-            (None, _) => {}
+        let is_of_velocity = regressor.is_velocity() || regressor.is_mach();
+        if let Some(velocity) = states.velocity.filter(|_| is_of_velocity) {
+            effect.by_state[velocity] = effect.at_trim / trim.velocity;
+        } else if let Some(surface) = regressor.surface() {
+            self.add_surface(surface, DEG, states, &mut effect);
         }
         effect
     }

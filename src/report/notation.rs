@@ -3,7 +3,7 @@
 
 use minijinja::HtmlEscape;
 
-use crate::aero::{Axis, Coefficient};
+use crate::aero::{Axis, Coefficient, DerivativeUnit};
 use crate::tables::Outcome;
 use crate::units::Unit;
 
@@ -87,19 +87,9 @@ pub fn well_formed(page: String) -> String {
 
 /// Unit of a derivative in words; empty for a pure number.
 #[must_use]
-pub fn unit(name: &str) -> String {
-    match name {
-        "-" => String::new(),
-        "per_deg" => "per deg".to_owned(),
-        "per_rad" => "per rad".to_owned(),
-        "lbf_per_deg" => "lbf/deg".to_owned(),
-        "ftlbf_per_deg" => "ft·lbf/deg".to_owned(),
-        "deg_s" => "deg/s".to_owned(),
-        other => other.strip_prefix("per_").map_or_else(
-            || other.to_owned(),
-            |per| format!("per {}", per.replace('_', " ")),
-        ),
-    }
+pub fn unit(word: &str) -> String {
+    let unit = DerivativeUnit::from_word(word);
+    unit.map_or_else(|| word.to_owned(), |unit| unit.typeset().to_owned())
 }
 
 /// Name of a signal without the unit suffix.

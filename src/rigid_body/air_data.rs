@@ -5,6 +5,10 @@ use nalgebra::Vector3;
 
 use crate::earth::air;
 
+/// Limit of |α| and |β|, deg, beyond which the aircraft has departed: the flow comes from behind, and no
+/// build-up is valid there.
+pub const DEPARTURE_DEG: f64 = 90.0;
+
 /// Air data at the c.g.; angles in rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AirData {

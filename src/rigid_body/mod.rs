@@ -13,7 +13,7 @@ pub(crate) mod reading_changes;
 #[cfg(test)]
 mod tests;
 
-pub use air_data::AirData;
+pub use air_data::{AirData, DEPARTURE_DEG};
 pub use body::{BodyState, Euler, Loads, StateRate};
 pub(crate) use changes::{AirChange, AirSlopes, BodySlopes, CHANGING, StateChange};
 pub use loading::{Loading, Mass};

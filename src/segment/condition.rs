@@ -48,7 +48,7 @@ pub(super) fn maneuver(
             class.name
         ));
     }
-    let mean = |name: &str| mean(record, name, first..=last);
+    let mean = |name: &str| mean_of_signal(record, name, first..=last);
     let start_s = record.time_s(first);
     let is_given = recognised.is_none();
     let mut maneuver = Maneuver {
@@ -79,7 +79,11 @@ pub(super) fn maneuver(
     Ok(maneuver)
 }
 
-fn mean(record: &Record, name: &str, window: RangeInclusive<usize>) -> Result<f64, String> {
+fn mean_of_signal(
+    record: &Record,
+    name: &str,
+    window: RangeInclusive<usize>,
+) -> Result<f64, String> {
     let values = record
         .values(name)
         .and_then(|v| v.get(window))

@@ -17,6 +17,10 @@ use crate::flight::channel::RawColumn;
 /// Key of the field metadata that states a column's unit.
 pub(super) const UNIT: &str = "unit";
 
+/// Largest number of rows that are encoded or decoded at a time: 128 kB of a column, so a few MB for a file of
+/// some ten columns and row groups of any size.
+pub(super) const BATCH_ROWS: usize = 16_384;
+
 /// Encodes columns of one length as the bytes of a Parquet file.
 ///
 /// # Errors

@@ -45,6 +45,6 @@ pub use predictions::{AgreementRow, PredictedRow, PredictionStatus};
 pub use proof_of_match::{MatchRow, MatchVerdict, MatchVerdictRow, MatchedQuantity, ModelSource};
 pub use published::{PublishedTrend, PublishedVerdict};
 pub use qualities::{
-    Airframe, DeviationBasis, FlyingQuality, Level, LevelRow, QualityRow, RootRow,
+    ALL_PARAGRAPHS, Airframe, DeviationBasis, FlyingQuality, Level, LevelRow, QualityRow, RootRow,
 };
 pub use trends::{OutlierRow, TrendRow};

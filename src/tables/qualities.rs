@@ -144,6 +144,9 @@ words! {
     }
 }
 
+/// `paragraph` of the worst level of all paragraphs.
+pub const ALL_PARAGRAPHS: &str = "all";
+
 table! {
     /// Levels of flying qualities with their probabilities, over the posterior of all derivatives.
     pub struct LevelRow in "levels" per "airframe, angle of attack and paragraph" {

@@ -1,5 +1,7 @@
 //! Points of a trend.
 
+use crate::numerics::mean::mean;
+
 /// One maneuver's estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct TrendPoint {
@@ -37,9 +39,9 @@ pub(super) fn count_flown<'a>(points: impl Iterator<Item = &'a mut TrendPoint>, 
 
 /// Flown α, deg, ascending: each is the mean of its maneuvers, rounded to a tenth.
 pub(super) fn flown_alphas(points: &[TrendPoint]) -> Vec<f64> {
-    let mean = |own: &[TrendPoint]| own.iter().map(|p| p.alpha_deg).sum::<f64>() / own.len() as f64;
+    let mean_alpha_deg = |own: &[TrendPoint]| mean(own.iter().map(|p| p.alpha_deg));
     points
         .chunk_by(|a, b| a.flown == b.flown)
-        .map(|own| (10.0 * mean(own)).round() / 10.0)
+        .map(|own| (10.0 * mean_alpha_deg(own)).round() / 10.0)
         .collect()
 }

@@ -1,8 +1,10 @@
 //! Scatter between maneuvers beyond their bounds, by Paule and Mandel's equation with Huber's cut.
+//! [`crate::numerics::random_effects`] solves the equation without the cut, and with the fit in it.
 
 use nalgebra::DVector;
 
 use super::point::TrendPoint;
+use crate::numerics::bisection::last_that_holds;
 use crate::numerics::order_statistics::upper_median;
 
 /// Standard deviations beyond which the influence of a residual stays constant: Huber's weights. The
@@ -12,6 +14,9 @@ pub(super) const HUBER: f64 = 1.5;
 pub(super) const HUBER_VARIANCE: f64 = 0.778_465;
 /// Least bound, as a share of the median bound: bounds are uncertain by a factor of a few.
 const BOUND_FLOOR: f64 = 0.25;
+/// Most halvings of the interval of τ². It begins at zero, so a τ² that is 2⁻ⁿ of the upper end needs n
+/// halvings before those of its own digits, 53: these allow n = 147. The search ends earlier at neighbours.
+const HALVINGS: usize = 200;
 /// Least number of maneuvers of a class with a scatter of its own; classes with fewer maneuvers
 /// share the scatter of all.
 const OWN_SCATTER: usize = 8;
@@ -80,20 +85,8 @@ pub(super) fn scatter_squared(
         return 0.0;
     }
     let square: f64 = stratum.iter().map(|i| residuals[*i].powi(2)).sum();
-    let (mut low, mut high) = (0.0, square / expected);
-    for _ in 0..200 {
-        let middle = 0.5 * (low + high);
-        if !(low < middle && middle < high) {
-            // Neighbours: further halves change nothing.
-            break;
-        }
-        if sum(middle) > expected {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    high
+    let is_too_small = |scatter2| sum(scatter2) > expected;
+    last_that_holds((0.0, square / expected), HALVINGS, is_too_small).1
 }
 
 #[cfg(test)]

@@ -326,6 +326,24 @@ impl Unit {
             .unwrap_or(number)
     }
 
+    /// `true` for the radian.
+    #[must_use]
+    pub fn is_radian(self) -> bool {
+        self.name == "rad"
+    }
+
+    /// `true` for the inch.
+    #[must_use]
+    pub fn is_inch(self) -> bool {
+        self.name == "in"
+    }
+
+    /// `true` for deg/s, rad/s and other units of an angular rate.
+    #[must_use]
+    pub fn is_angular_rate(self) -> bool {
+        self.quantity == Quantity::AngularRate
+    }
+
     /// All units of the same quantity, this one included.
     pub fn alike(self) -> impl Iterator<Item = Unit> {
         UNITS

@@ -17,7 +17,8 @@ const OFF_GRID: f64 = 0.05;
 /// from chance.
 const MOST_STEPS: f64 = 40.0;
 
-/// Share of changes that must be multiples of the step.
+/// Share of changes that must be multiples of the step: one in twenty may be a spike. Of changes without a grid
+/// one in ten fits (2 [`OFF_GRID`]), so the share is far from chance with [`LEAST_CHANGES`] and more.
 const FITTING_SHARE: f64 = 0.95;
 
 /// Relative change below which two values are equal: the last digits of a converted number.

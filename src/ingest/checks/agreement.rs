@@ -8,7 +8,7 @@ use super::relations::{self, GustEffect, Relation, Selection};
 use super::windows::{WindowPair, relation_pairs};
 use crate::aircraft::Aircraft;
 use crate::ingest::settings::Checks;
-use crate::numerics::order_statistics::{SIGMA_PER_MAD, upper_median};
+use crate::numerics::order_statistics::{SIGMA_PER_MAD, upper_median, weighted_median};
 use crate::tables::{CheckRow, CheckVerdict};
 
 /// Number of windows that are selected in a short flight, for relations that select the largest, as
@@ -20,15 +20,16 @@ const LEAST_SELECTED: usize = 5;
 /// which the window contains a jump of the record: far beyond noise, gusts and turbulence.
 const JUMP_DEVIATIONS: f64 = 10.0;
 
-/// Distance of a window above which it contains the motion of a control, for a relation that only
-/// gusts excite.
+/// Distance of a window, in standard deviations, above which it contains the motion of a control, for a relation
+/// that only gusts excite. Normal gusts exceed it in one window of 370, which are lost for the slope.
 const MANEUVER_DEVIATIONS: f64 = 3.0;
 
 /// Least change of the gusts' velocity at which a relation that gusts excite is checked, ft/s²:
 /// that of turbulence of 1 ft/s, ten times the value that still air seems to have.
 const LEAST_GUST_FT_S2: f64 = 0.75;
 
-/// Number of standard deviations that gusts reach in one of many windows.
+/// Number of standard deviations that gusts reach in one of many windows: normal gusts in one of 370, about as
+/// many as a flight has.
 const GUST_DEVIATIONS: f64 = 3.0;
 
 /// Error of a relation that biases may cause, as a share of the level above which it counts as
@@ -301,19 +302,8 @@ fn find_jumps(relation: &Relation, pairs: &[WindowPair], settings: &Checks) -> V
 fn median_slope(pairs: &[WindowPair]) -> f64 {
     let most = upper_median(pairs.iter().map(|p| p.predicted.abs())).unwrap_or_default();
     let moved = pairs.iter().filter(|p| p.predicted != 0.0);
-    let mut slopes: Vec<(f64, f64)> = moved
-        .map(|p| (p.measured / p.predicted, p.predicted.abs().min(most)))
-        .collect();
-    slopes.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let half = 0.5 * slopes.iter().map(|(_, weight)| weight).sum::<f64>();
-    let mut sum = 0.0;
-    for (slope, weight) in slopes {
-        sum += weight;
-        if sum >= half {
-            return slope;
-        }
-    }
-    f64::NAN
+    let slopes = moved.map(|p| (p.measured / p.predicted, p.predicted.abs().min(most)));
+    weighted_median(slopes.collect()).unwrap_or(f64::NAN)
 }
 
 /// Fits the windows without jumps; the misfit is that of `all` windows. `None` if a side is zero

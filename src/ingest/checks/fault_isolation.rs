@@ -22,7 +22,9 @@ use crate::units::Unit;
 /// best trial: by residual noise, equally good explanations differ by less.
 const EQUAL_MISFIT: f64 = 3.0;
 
-/// Largest number of independent faults searched for in one flight; each costs a round of trials.
+/// Largest number of independent faults searched for in one flight. Trade-off: each costs a round of trials, and
+/// fails several relations, so that after three few are left to confirm a fourth. Channels of further faults are
+/// named without a cause.
 const MOST_FAULTS: usize = 3;
 
 /// Relative difference below which two units are the same for a trial: no conversion is so close

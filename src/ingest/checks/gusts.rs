@@ -27,6 +27,9 @@ const SHARE: f64 = 0.75;
 /// Standard deviations of a normal distribution in its magnitude at [`SHARE`]: Φ⁻¹(⅞).
 const DEVIATIONS: f64 = 1.150_349;
 
+/// Variance of a second difference x₁ − 2 x₂ + x₃ of white noise over the noise's: 1² + 2² + 1².
+const SECOND_DIFFERENCE_VARIANCE: f64 = 6.0;
+
 /// Lag over which gusts lose their correlation, s: 1750 ft, the scale of turbulence above 2000 ft
 /// (MIL-F-8785C), take 2 to 8 s at 900 to 220 ft/s.
 const LONG_S: f64 = 8.0;
@@ -112,11 +115,12 @@ fn of_axis(runs: &[Vec<f64>], step_s: f64, window_s: f64) -> Option<AxisGusts> {
         variance_of_second_differences(runs, lag)
     };
     let (one, two) = (variance(step_s)?, variance(2.0 * step_s)?);
-    let noise = ((2.0 * one - two) / 6.0).max(0.0);
-    let without_noise = |variance: f64| (variance - 6.0 * noise).max(0.0);
+    let noise = ((2.0 * one - two) / SECOND_DIFFERENCE_VARIANCE).max(0.0);
+    let without_noise = |variance: f64| (variance - SECOND_DIFFERENCE_VARIANCE * noise).max(0.0);
     Some(AxisGusts {
         change_ft_s2: (without_noise(variance(window_s)?) / 2.0).sqrt() / window_s,
-        rms_ft_s: variance(LONG_S).map(|long| (without_noise(long) / 6.0).sqrt()),
+        rms_ft_s: variance(LONG_S)
+            .map(|long| (without_noise(long) / SECOND_DIFFERENCE_VARIANCE).sqrt()),
     })
 }
 

@@ -38,7 +38,8 @@ const LEAST_ALPHA_DEG: f64 = 5.0;
 /// makes it 14.6 times as large.
 const LIFT_PER_SIN_ALPHA: std::ops::Range<f64> = 0.6..24.0;
 
-/// Geometric mean of the range for aircraft in maneuvers.
+/// Typical normal force coefficient over sin α, per rad: between 2 beyond stall and 10 with flaps. Only the
+/// nearest unit of the mass is chosen by it, and units differ by factors of 2.2 and more.
 const TYPICAL_LIFT: f64 = 4.0;
 
 /// Least number of blocks from which the mass is checked: ten seconds of a usual setting.

@@ -176,6 +176,41 @@ fn attitudes(settings: &Checks) -> Vec<Relation> {
     ]
 }
 
+/// Signals of the relation of the normal acceleration, the dominant one first.
+const OF_AN: &[&str] = &[
+    s::AN,
+    s::THETA,
+    s::PHI,
+    s::Q,
+    s::P,
+    s::ALPHA_VANE,
+    s::BETA_VANE,
+    s::VELOCITY,
+];
+
+/// Signals of the relation of the axial acceleration.
+const OF_AX: &[&str] = &[
+    s::AX,
+    s::THETA,
+    s::Q,
+    s::R,
+    s::ALPHA_VANE,
+    s::BETA_VANE,
+    s::VELOCITY,
+];
+
+/// Signals of the relation of the lateral acceleration.
+const OF_AY: &[&str] = &[
+    s::AY,
+    s::BETA_VANE,
+    s::R,
+    s::PHI,
+    s::P,
+    s::THETA,
+    s::ALPHA_VANE,
+    s::VELOCITY,
+];
+
 fn accelerations(settings: &Checks) -> Vec<Relation> {
     let relation = |axis, name, signals, measured, predicted, selection| Relation {
         name,
@@ -196,16 +231,7 @@ fn accelerations(settings: &Checks) -> Vec<Relation> {
         relation(
             2,
             "normal acceleration of the motion against an",
-            &[
-                s::AN,
-                s::THETA,
-                s::PHI,
-                s::Q,
-                s::P,
-                s::ALPHA_VANE,
-                s::BETA_VANE,
-                s::VELOCITY,
-            ],
+            OF_AN,
             both(
                 |m| -(m.uvw[2] + m.arm_velocity(m.arms[0])[2]) / G0_FT_S2,
                 |m| -(m.turning_acceleration()[2] + m.centripetal(m.arms[0])[2]) / G0_FT_S2,
@@ -216,15 +242,7 @@ fn accelerations(settings: &Checks) -> Vec<Relation> {
         relation(
             0,
             "axial acceleration of the motion against ax",
-            &[
-                s::AX,
-                s::THETA,
-                s::Q,
-                s::R,
-                s::ALPHA_VANE,
-                s::BETA_VANE,
-                s::VELOCITY,
-            ],
+            OF_AX,
             both(
                 |m| (m.uvw[0] + m.arm_velocity(m.arms[1])[0]) / G0_FT_S2,
                 |m| (m.turning_acceleration()[0] + m.centripetal(m.arms[1])[0]) / G0_FT_S2,
@@ -235,16 +253,7 @@ fn accelerations(settings: &Checks) -> Vec<Relation> {
         relation(
             1,
             "lateral acceleration of the motion against ay",
-            &[
-                s::AY,
-                s::BETA_VANE,
-                s::R,
-                s::PHI,
-                s::P,
-                s::THETA,
-                s::ALPHA_VANE,
-                s::VELOCITY,
-            ],
+            OF_AY,
             both(
                 |m| (m.uvw[1] + m.arm_velocity(m.arms[2])[1]) / G0_FT_S2,
                 |m| (m.turning_acceleration()[1] + m.centripetal(m.arms[2])[1]) / G0_FT_S2,
@@ -257,6 +266,41 @@ fn accelerations(settings: &Checks) -> Vec<Relation> {
         ),
     ]
 }
+
+/// Signals of the relation of the forward velocity, the dominant three first.
+const OF_FORWARD: &[&str] = &[
+    s::VELOCITY,
+    s::AX,
+    s::THETA,
+    s::Q,
+    s::R,
+    s::ALPHA_VANE,
+    s::BETA_VANE,
+];
+
+/// Signals of the relation of the side velocity, the dominant two first.
+const OF_SIDEWARD: &[&str] = &[
+    s::BETA_VANE,
+    s::R,
+    s::VELOCITY,
+    s::P,
+    s::PHI,
+    s::THETA,
+    s::AY,
+    s::ALPHA_VANE,
+];
+
+/// Signals of the relation of the downward velocity, the dominant two first.
+const OF_DOWNWARD: &[&str] = &[
+    s::ALPHA_VANE,
+    s::Q,
+    s::VELOCITY,
+    s::AN,
+    s::P,
+    s::THETA,
+    s::PHI,
+    s::BETA_VANE,
+];
 
 fn velocities(settings: &Checks) -> Vec<Relation> {
     let selection = Selection::Above(settings.excitation.velocity_ft_s2);
@@ -279,15 +323,7 @@ fn velocities(settings: &Checks) -> Vec<Relation> {
         relation(
             0,
             "forward velocity against ax and theta",
-            &[
-                s::VELOCITY,
-                s::AX,
-                s::THETA,
-                s::Q,
-                s::R,
-                s::ALPHA_VANE,
-                s::BETA_VANE,
-            ],
+            OF_FORWARD,
             3,
             change(|m| m.uvw[0]),
             integral(|m| m.specific_force()[0] - m.turning_acceleration()[0]),
@@ -295,16 +331,7 @@ fn velocities(settings: &Checks) -> Vec<Relation> {
         relation(
             1,
             "side velocity against r, p and phi",
-            &[
-                s::BETA_VANE,
-                s::R,
-                s::VELOCITY,
-                s::P,
-                s::PHI,
-                s::THETA,
-                s::AY,
-                s::ALPHA_VANE,
-            ],
+            OF_SIDEWARD,
             2,
             change(|m| m.uvw[1]),
             integral(|m| m.specific_force()[1] - m.turning_acceleration()[1]),
@@ -312,16 +339,7 @@ fn velocities(settings: &Checks) -> Vec<Relation> {
         relation(
             2,
             "downward velocity against q and an",
-            &[
-                s::ALPHA_VANE,
-                s::Q,
-                s::VELOCITY,
-                s::AN,
-                s::P,
-                s::THETA,
-                s::PHI,
-                s::BETA_VANE,
-            ],
+            OF_DOWNWARD,
             2,
             change(|m| m.uvw[2]),
             integral(|m| m.specific_force()[2] - m.turning_acceleration()[2]),
@@ -381,7 +399,9 @@ fn air_data(settings: &Checks) -> Vec<Relation> {
 /// *Airplane Flight Dynamics*: −0.2 to −1.5).
 const TYPICAL_CY_BETA: f64 = -0.6;
 
-/// Largest factor between an aircraft's side force by sideslip and the typical one.
+/// Largest factor between an aircraft's side force by sideslip and the typical one: the ends of the usual range
+/// are factors of 3 and 2.5 away, the rest is for the error of a slope in gusts. Units of the vane (57) and a
+/// reversed sign lie beyond it.
 const CY_BETA_FACTOR: f64 = 4.0;
 
 /// Least rate of sideslip, deg/s: twice the apparent rate from an error of 0.2 deg in bank at 400

@@ -42,7 +42,8 @@ const SAMPLES_PER_ROW: usize = 10;
 /// Upper limit of a sample's number, which only a damaged time reaches.
 const MOST_SAMPLES: usize = usize::MAX / 2;
 
-/// Largest relative difference between the configured rate and the recorded one.
+/// Largest relative difference between the configured rate and the recorded one. Recorders keep their rate to a
+/// part in a thousand; usual rates (20, 25, 32, 36, 40, 50 Hz) differ by a tenth and more.
 const RATE_TOLERANCE: f64 = 0.05;
 
 /// Gain of the filter that follows a drift of the recorder's phase, per sample: slow against

@@ -15,14 +15,24 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-use super::parameters::{INPUTS, OUTPUTS};
+use super::parameters::{INPUTS, OUTPUTS, input, output};
 use crate::aircraft::{Aircraft, Flow, Position};
 use crate::dynamics::lever;
 use crate::earth::air;
 use crate::numerics::trig::sin_cos;
 use crate::units::DEG;
 
-/// States: three velocities at the sensors (ft/s), φ, θ, ψ (rad), altitude (ft).
+/// Places of the states: three velocities at the sensors (ft/s), φ, θ, ψ (rad), altitude (ft).
+pub mod state {
+    pub const U: usize = 0;
+    pub const V: usize = 1;
+    pub const W: usize = 2;
+    pub const PHI: usize = 3;
+    pub const THETA: usize = 4;
+    pub const PSI: usize = 5;
+    pub const ALTITUDE: usize = 6;
+}
+
 pub const STATES: usize = 7;
 
 pub type State = SVector<f64, STATES>;
@@ -62,54 +72,52 @@ pub struct ReadingSlopes {
     pub by_rates: SMatrix<f64, OUTPUTS, 3>,
 }
 
+/// Velocity in body axes.
+const VELOCITY: [usize; 3] = [state::U, state::V, state::W];
+/// Velocity and altitude.
+const VELOCITY_AND_ALTITUDE: [usize; 4] = [state::U, state::V, state::W, state::ALTITUDE];
+/// Body rates.
+const RATES: [usize; 3] = [input::P, input::Q, input::R];
+
 /// States along which the rate of each state can have a slope.
 pub const RATES_BY_STATE: [&[usize]; STATES] = [
-    &[1, 2, 4],
-    &[0, 2, 3, 4],
-    &[0, 1, 3, 4],
-    &[3, 4],
-    &[3],
-    &[3, 4],
-    &[0, 1, 2, 3, 4],
+    &[state::V, state::W, state::THETA],
+    &[state::U, state::W, state::PHI, state::THETA],
+    &[state::U, state::V, state::PHI, state::THETA],
+    &[state::PHI, state::THETA],
+    &[state::PHI],
+    &[state::PHI, state::THETA],
+    &[state::U, state::V, state::W, state::PHI, state::THETA],
 ];
 /// Inputs along which the rate of each state can have a slope.
 pub const RATES_BY_INPUT: [&[usize]; STATES] = [
-    &[0, 1, 2, 3],
-    &[0, 1, 2, 4],
-    &[0, 1, 2, 5],
-    &[0, 1, 2],
-    &[1, 2],
-    &[1, 2],
-    &[0, 1, 2],
+    &[input::P, input::Q, input::R, input::FORWARD],
+    &[input::P, input::Q, input::R, input::RIGHT],
+    &[input::P, input::Q, input::R, input::DOWN],
+    &RATES,
+    &[input::Q, input::R],
+    &[input::Q, input::R],
+    &RATES,
 ];
 /// States along which each reading can have a slope.
 pub const READINGS_BY_STATE: [&[usize]; OUTPUTS] = [
-    &[0, 1, 2],
-    &[0, 1, 2],
-    &[0, 1, 2],
-    &[4],
-    &[3],
-    &[5],
-    &[6],
-    &[0, 1, 2, 6],
-    &[0, 1, 2, 6],
+    &VELOCITY,
+    &VELOCITY,
+    &VELOCITY,
+    &[state::THETA],
+    &[state::PHI],
+    &[state::PSI],
+    &[state::ALTITUDE],
+    &VELOCITY_AND_ALTITUDE,
+    &VELOCITY_AND_ALTITUDE,
 ];
 /// Body rates along which each reading can have a slope.
-pub const READINGS_BY_RATES: [&[usize]; OUTPUTS] = [
-    &[0, 1, 2],
-    &[0, 1, 2],
-    &[0, 1, 2],
-    &[],
-    &[],
-    &[],
-    &[],
-    &[0, 1, 2],
-    &[0, 1, 2],
-];
+pub const READINGS_BY_RATES: [&[usize]; OUTPUTS] =
+    [&RATES, &RATES, &RATES, &[], &[], &[], &[], &RATES, &RATES];
 
 #[inline(always)]
 fn body_rates(input: &Inputs) -> Vector3<f64> {
-    Vector3::new(input[0], input[1], input[2])
+    Vector3::new(input[input::P], input[input::Q], input[input::R])
 }
 
 /// Velocity at the c.g. and its slopes along ω.
@@ -119,7 +127,7 @@ fn velocity_at_cg(
     omega: Vector3<f64>,
     terms: &MeasuredTerms,
 ) -> (Vector3<f64>, Matrix3<f64>) {
-    let mut velocity = Vector3::new(x[0], x[1], x[2]);
+    let mut velocity = Vector3::new(x[state::U], x[state::V], x[state::W]);
     let mut by_rates = Matrix3::zeros();
     for i in 0..3 {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);
@@ -136,21 +144,21 @@ fn velocity_at_cg(
 pub fn rates(x: &State, input: &Inputs, terms: &MeasuredTerms) -> State {
     let omega = body_rates(input);
     let (v, _) = velocity_at_cg(x, omega, terms);
-    let [(sp, cp), (st, ct)] = sin_cos([x[3], x[4]]);
+    let [(sp, cp), (st, ct)] = sin_cos([x[state::PHI], x[state::THETA]]);
     let g = terms.gravity;
     let gravity = [-g * st, g * ct * sp, g * ct * cp];
     let turned = (omega + terms.earth).cross(&v);
     let mut rates = State::zeros();
     for i in 0..3 {
         let swing = lever(i, terms.arms[i], [omega.x, omega.y, omega.z], [0.0; 3]);
-        rates[i] = input[3 + i] - swing.value + gravity[i] - turned[i];
+        rates[i] = input[input::FORWARD + i] - swing.value + gravity[i] - turned[i];
     }
     let w = omega - terms.horizon;
     let (along, across) = (w.y * sp + w.z * cp, w.y * cp - w.z * sp);
-    rates[3] = w.x + st / ct * along;
-    rates[4] = across;
-    rates[5] = along / ct;
-    rates[6] = v.x * st - v.y * sp * ct - v.z * cp * ct;
+    rates[state::PHI] = w.x + st / ct * along;
+    rates[state::THETA] = across;
+    rates[state::PSI] = along / ct;
+    rates[state::ALTITUDE] = v.x * st - v.y * sp * ct - v.z * cp * ct;
     rates
 }
 
@@ -159,7 +167,7 @@ pub fn rates(x: &State, input: &Inputs, terms: &MeasuredTerms) -> State {
 pub fn rate_slopes(x: &State, input: &Inputs, terms: &MeasuredTerms) -> RateSlopes {
     let omega = body_rates(input);
     let (velocity, velocity_by_rates) = velocity_at_cg(x, omega, terms);
-    let [(sp, cp), (st, ct)] = sin_cos([x[3], x[4]]);
+    let [(sp, cp), (st, ct)] = sin_cos([x[state::PHI], x[state::THETA]]);
     let g = terms.gravity;
     let turning = omega + terms.earth;
     let mut out = RateSlopes {
@@ -177,13 +185,15 @@ pub fn rate_slopes(x: &State, input: &Inputs, terms: &MeasuredTerms) -> RateSlop
             turning[k] * moved(i, j) - turning[j] * moved(i, k) - swing.by_rates[i];
         out.by_input[(i, j)] = -velocity[k] - turning[j] * moved(j, k) - swing.by_rates[j];
         out.by_input[(i, k)] = velocity[j] + turning[k] * moved(k, j) - swing.by_rates[k];
-        out.by_input[(i, 3 + i)] = 1.0;
+        out.by_input[(i, input::FORWARD + i)] = 1.0;
     }
     let by_phi = Vector3::new(0.0, g * ct * cp, -g * ct * sp);
     let by_theta = Vector3::new(-g * ct, -g * st * sp, -g * st * cp);
-    out.by_state.fixed_view_mut::<3, 1>(0, 3).copy_from(&by_phi);
     out.by_state
-        .fixed_view_mut::<3, 1>(0, 4)
+        .fixed_view_mut::<3, 1>(state::U, state::PHI)
+        .copy_from(&by_phi);
+    out.by_state
+        .fixed_view_mut::<3, 1>(state::U, state::THETA)
         .copy_from(&by_theta);
     add_attitude_slopes(&mut out, omega - terms.horizon, (sp, cp), (st, ct));
     add_climb_slopes(&mut out, velocity, velocity_by_rates, (sp, cp), (st, ct));
@@ -200,13 +210,13 @@ fn add_attitude_slopes(
 ) {
     let tan = st / ct;
     let (along, across) = (w.y * sp + w.z * cp, w.y * cp - w.z * sp);
-    out.by_state[(3, 3)] = tan * across;
-    out.by_state[(3, 4)] = along / (ct * ct);
-    out.by_state[(4, 3)] = -along;
-    out.by_state[(5, 3)] = across / ct;
-    out.by_state[(5, 4)] = along * tan / ct;
+    out.by_state[(state::PHI, state::PHI)] = tan * across;
+    out.by_state[(state::PHI, state::THETA)] = along / (ct * ct);
+    out.by_state[(state::THETA, state::PHI)] = -along;
+    out.by_state[(state::PSI, state::PHI)] = across / ct;
+    out.by_state[(state::PSI, state::THETA)] = along * tan / ct;
     out.by_input
-        .fixed_view_mut::<3, 3>(3, 0)
+        .fixed_view_mut::<3, 3>(state::PHI, input::P)
         .copy_from(&Matrix3::new(
             1.0,
             tan * sp,
@@ -231,11 +241,11 @@ fn add_climb_slopes(
 ) {
     let up = Vector3::new(st, -sp * ct, -cp * ct);
     for i in 0..3 {
-        out.by_state[(6, i)] = up[i];
-        out.by_input[(6, i)] = up.dot(&v_by_rates.column(i));
+        out.by_state[(state::ALTITUDE, i)] = up[i];
+        out.by_input[(state::ALTITUDE, i)] = up.dot(&v_by_rates.column(i));
     }
-    out.by_state[(6, 3)] = -v.y * cp * ct + v.z * sp * ct;
-    out.by_state[(6, 4)] = v.x * ct + v.y * sp * st + v.z * cp * st;
+    out.by_state[(state::ALTITUDE, state::PHI)] = -v.y * cp * ct + v.z * sp * ct;
+    out.by_state[(state::ALTITUDE, state::THETA)] = v.x * ct + v.y * sp * st + v.z * cp * st;
 }
 
 /// Computes the readings of the output instruments: α and β vanes, V, θ, φ, ψ, altitude, q̄ and
@@ -251,16 +261,16 @@ pub fn readings(
     let (v, _) = velocity_at_cg(x, omega, terms);
     let speed = v.norm();
     let flow = flow(v, speed, omega);
-    let air = air(x[6]);
+    let air = air(x[state::ALTITUDE]);
     let air = air.at_temperature(terms.temperature_ratio * air.kelvin);
     [
         DEG * aircraft.sensors.alpha_reading(&flow, terms.cg).angle,
         DEG * aircraft.sensors.beta_reading(&flow, terms.cg).angle,
         speed,
-        DEG * x[4],
-        DEG * x[3],
-        DEG * x[5],
-        x[6],
+        DEG * x[state::THETA],
+        DEG * x[state::PHI],
+        DEG * x[state::PSI],
+        x[state::ALTITUDE],
         0.5 * air.density_slug_ft3 * speed * speed,
         speed / air.sound_ft_s,
     ]
@@ -293,7 +303,7 @@ pub fn reading_slopes(
     let flow = flow(v, speed, omega);
     let alpha_by = Vector3::new(-v.z, 0.0, v.x) / across2;
     let beta_by = (Vector3::y() - unit * unit.y) / (speed * flow.beta.cos());
-    let air = AirWithSlopes::at(x[6], terms.temperature_ratio);
+    let air = AirWithSlopes::at(x[state::ALTITUDE], terms.temperature_ratio);
     let mut by_velocity = SMatrix::<f64, OUTPUTS, 3>::zeros();
     let mut by_rates = SMatrix::<f64, OUTPUTS, 3>::zeros();
     let vanes = [
@@ -310,18 +320,21 @@ pub fn reading_slopes(
         by_rates.set_row(o, &(rates * DEG).transpose());
     }
     let pressures = [1.0, air.density * speed, 1.0 / air.sound];
-    for (o, factor) in [2, 7, 8].into_iter().zip(pressures) {
+    let pressure_outputs = [output::AIRSPEED, output::QBAR, output::MACH];
+    for (o, factor) in pressure_outputs.into_iter().zip(pressures) {
         by_velocity.set_row(o, &(unit * factor).transpose());
     }
     let mut by_state = SMatrix::<f64, OUTPUTS, STATES>::zeros();
-    by_state.fixed_columns_mut::<3>(0).copy_from(&by_velocity);
+    by_state
+        .fixed_columns_mut::<3>(state::U)
+        .copy_from(&by_velocity);
     by_rates += by_velocity * v_by_rates;
-    by_state[(3, 4)] = DEG;
-    by_state[(4, 3)] = DEG;
-    by_state[(5, 5)] = DEG;
-    by_state[(6, 6)] = 1.0;
-    by_state[(7, 6)] = 0.5 * air.density_slope * speed * speed;
-    by_state[(8, 6)] = -speed * air.sound_slope / (air.sound * air.sound);
+    by_state[(output::THETA, state::THETA)] = DEG;
+    by_state[(output::PHI, state::PHI)] = DEG;
+    by_state[(output::PSI, state::PSI)] = DEG;
+    by_state[(output::ALTITUDE, state::ALTITUDE)] = 1.0;
+    by_state[(output::QBAR, state::ALTITUDE)] = 0.5 * air.density_slope * speed * speed;
+    by_state[(output::MACH, state::ALTITUDE)] = -speed * air.sound_slope / (air.sound * air.sound);
     ReadingSlopes { by_state, by_rates }
 }
 

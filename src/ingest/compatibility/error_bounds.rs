@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::joint_state::JointState;
-use super::parameters::{INPUTS, Kind, OUTPUTS, PARAMETERS, Parameters, SIGNALS, place};
+use super::parameters::{INPUTS, Kind, OUTPUTS, PARAMETERS, Parameters, SIGNALS, input, place};
 use super::window::{Window, input_factor};
 use super::window_fit::{Squares, squares_about_mean};
 use crate::flight::signal;
@@ -41,7 +41,7 @@ impl JointState<'_> {
         let jackknife = self.jackknife();
         let mut systematic = [0.0; PARAMETERS];
         for (i, ratio) in turning_over_force(windows).into_iter().enumerate() {
-            let j = place(FIRST_ACCELEROMETER + i, Kind::Scale);
+            let j = place(input::FORWARD + i, Kind::Scale);
             systematic[j] += (MODEL_SCALE * ratio).powi(2);
         }
         self.add_gust_errors(&inverse, &mut systematic);
@@ -119,15 +119,12 @@ impl JointState<'_> {
     }
 }
 
-/// The first accelerometer among the inputs; three rate gyros stand before it.
-const FIRST_ACCELEROMETER: usize = 3;
-
 /// Ratio of the variations of ω × v to those of the specific force in each axis (forward, right,
 /// down). A relative error of the former looks like an error of the accelerometer's scale
 /// multiplied by this ratio.
 fn turning_over_force(windows: &[Window]) -> [f64; 3] {
     std::array::from_fn(|i| {
-        let input = FIRST_ACCELEROMETER + i;
+        let input = input::FORWARD + i;
         let turning = swings(windows, |w, k| w.turning(k)[i]);
         let force = swings(windows, |w, k| {
             input_factor(input) * w.inputs[input][w.margin + k]

@@ -21,48 +21,101 @@ pub struct ErrorSize {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ErrorSizes([ErrorSize; INSTRUMENTS]);
 
+/// Bias in the signal's unit, and relative scale error: ordinary ones, then those of a fault.
+struct Sizes {
+    bias: [f64; 2],
+    scale: [f64; 2],
+}
+
+// Sources. Where no better one is stated, a size is that of usual flight-test instrumentation, and the analyst
+// who has a calibration states it: `instruments: <signal>: ordinary` and `fault` of aircraft.yaml. An ordinary
+// size is the standard deviation of a prior. Too small, it draws a real error towards zero and its remainder into
+// other instruments; too large, errors that the flight does not determine have wide bounds and are less often
+// corrected. The size of a fault decides from where an instrument is named, not what is estimated.
+
+/// Rate gyros, deg/s. Usual instrumentation; 0.1 deg/s is the sixfold of a last bit of 12 over ±30 deg/s.
+const GYRO: Sizes = Sizes {
+    bias: [0.1, 0.5],
+    scale: [0.005, 0.05],
+};
+/// Accelerometers, g. Usual instrumentation; 0.01 g is the effect of a tilt of 0.6°, 0.05 g of 3°.
+const ACCELEROMETER: Sizes = Sizes {
+    bias: [0.01, 0.05],
+    scale: [0.003, 0.05],
+};
+/// Flow vanes, deg. Usual instrumentation: alignment of the vane, and what is left of the upwash after its
+/// correction.
+const FLOW_VANE: Sizes = Sizes {
+    bias: [0.3, 2.0],
+    scale: [0.02, 0.1],
+};
+/// Airspeed, ft/s. A third of what 14 CFR 25.1323 allows an airspeed system, 5 kt (8.4 ft/s) and 3 %; a fault is
+/// beyond that.
+const AIRSPEED: Sizes = Sizes {
+    bias: [3.0, 20.0],
+    scale: [0.01, 0.05],
+};
+/// Altitude, ft. The error of static pressure that 14 CFR 25.1325 allows, 30 ft per 100 kt, at 330 kt; the scale
+/// is that of a day whose temperature is 1 % (3 K) from the standard atmosphere.
+const ALTITUDE: Sizes = Sizes {
+    bias: [100.0, 1000.0],
+    scale: [0.01, 0.05],
+};
+/// Dynamic pressure, lbf/ft². Usual instrumentation; it is 2 % where the airspeed is 1 %, the rest is that of
+/// the static pressure.
+const DYNAMIC_PRESSURE: Sizes = Sizes {
+    bias: [1.0, 10.0],
+    scale: [0.03, 0.15],
+};
+/// Mach number. Usual instrumentation; 0.005 is 5.6 ft/s at sea level, of airspeed and temperature.
+const MACH: Sizes = Sizes {
+    bias: [0.005, 0.05],
+    scale: [0.02, 0.1],
+};
+/// Pitch attitude, bank and heading, deg. Usual instrumentation: a vertical gyro or a strapdown platform.
+const ATTITUDE: Sizes = Sizes {
+    bias: [0.2, 1.0],
+    scale: [0.005, 0.05],
+};
+
+/// Delay against the other channels, s: an ordinary one is less than half a sample at the usual 40 Hz. From
+/// three times that the phase of a mode of 1 Hz is wrong by 11°. Usual instrumentation.
+const DELAY_S: [f64; 2] = [0.01, 0.03];
+
+impl Sizes {
+    fn of_signal(signal: &str) -> &'static Sizes {
+        match signal {
+            s::P | s::Q | s::R => &GYRO,
+            s::AX | s::AY | s::AN => &ACCELEROMETER,
+            s::ALPHA_VANE | s::BETA_VANE => &FLOW_VANE,
+            s::VELOCITY => &AIRSPEED,
+            s::ALTITUDE => &ALTITUDE,
+            s::QBAR => &DYNAMIC_PRESSURE,
+            s::MACH => &MACH,
+            _ => &ATTITUDE,
+        }
+    }
+}
+
 impl ErrorSizes {
-    /// Standard deviations of the errors of healthy instruments, as flight-test instrumentation
-    /// usually has them.
+    /// Standard deviations of the errors of healthy instruments.
     pub(super) fn ordinary() -> ErrorSizes {
-        ErrorSizes(SIGNALS.map(|signal| {
-            let (bias, scale) = match signal {
-                s::P | s::Q | s::R => (0.1, 0.005),
-                s::AX | s::AY | s::AN => (0.01, 0.003),
-                s::ALPHA_VANE | s::BETA_VANE => (0.3, 0.02),
-                s::VELOCITY => (3.0, 0.01),
-                s::ALTITUDE => (100.0, 0.01),
-                s::QBAR => (1.0, 0.03),
-                s::MACH => (0.005, 0.02),
-                _ => (0.2, 0.005),
-            };
-            let delay_s = 0.01;
-            ErrorSize {
-                bias,
-                scale,
-                delay_s,
-            }
-        }))
+        ErrorSizes::of_column(0)
     }
 
     /// Sizes from which an error is a fault: several times the ordinary ones.
     pub(super) fn faulty() -> ErrorSizes {
+        ErrorSizes::of_column(1)
+    }
+
+    /// Ordinary sizes (0) or those of a fault (1).
+    fn of_column(column: usize) -> ErrorSizes {
         ErrorSizes(SIGNALS.map(|signal| {
-            let (bias, scale) = match signal {
-                s::P | s::Q | s::R => (0.5, 0.05),
-                s::AX | s::AY | s::AN => (0.05, 0.05),
-                s::ALPHA_VANE | s::BETA_VANE => (2.0, 0.1),
-                s::VELOCITY => (20.0, 0.05),
-                s::ALTITUDE => (1000.0, 0.05),
-                s::QBAR => (10.0, 0.15),
-                s::MACH => (0.05, 0.1),
-                _ => (1.0, 0.05),
-            };
-            let delay_s = 0.03;
+            let sizes = Sizes::of_signal(signal);
             ErrorSize {
-                bias,
-                scale,
-                delay_s,
+                bias: sizes.bias[column],
+                scale: sizes.scale[column],
+                delay_s: DELAY_S[column],
             }
         }))
     }

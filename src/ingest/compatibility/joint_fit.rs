@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::joint_state::{JointState, Posterior, kind_of};
 use super::parameters::{
-    ALL_KINDS, INPUTS, INSTRUMENTS, PARAMETERS, Parameters, is_observable, place,
+    ALL_KINDS, INPUTS, INSTRUMENTS, PARAMETERS, Parameters, is_observable, output, place,
 };
 use super::settings::Compatibility;
 use super::window::{Window, margin};
@@ -117,11 +117,13 @@ pub fn fit(
     })
 }
 
-/// Place of the airspeed among the outputs.
-const AIRSPEED: usize = 2;
-
 fn mean_speed_ft_s(windows: &[Window]) -> Option<f64> {
-    finite_mean(windows.iter().flat_map(|w| &w.outputs[AIRSPEED]).copied())
+    finite_mean(
+        windows
+            .iter()
+            .flat_map(|w| &w.outputs[output::AIRSPEED])
+            .copied(),
+    )
 }
 
 /// Parameters of recorded instruments that are observable.

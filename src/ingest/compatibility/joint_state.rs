@@ -18,7 +18,8 @@ use crate::numerics::symmetric;
 /// that change anyway.
 const STEPS: usize = 2;
 
-/// Largest number of halvings of a step that raises the cost; after them the step is dropped.
+/// Largest number of halvings of a step that raises the cost; after them the step is dropped. A Gauss-Newton
+/// step that raises the cost at 1/32 of its length is wrong in its direction, and not in its length.
 const HALVINGS: usize = 5;
 
 /// Rise of twice the cost that is ignored: that of a tenth of a standard deviation. A gradient of

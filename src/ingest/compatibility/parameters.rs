@@ -5,6 +5,29 @@
 
 use crate::flight::signal as s;
 
+/// Places of the inputs: body rates, then specific forces forward, right, down.
+pub mod input {
+    pub const P: usize = 0;
+    pub const Q: usize = 1;
+    pub const R: usize = 2;
+    pub const FORWARD: usize = 3;
+    pub const RIGHT: usize = 4;
+    pub const DOWN: usize = 5;
+}
+
+/// Places of the outputs.
+pub mod output {
+    pub const ALPHA: usize = 0;
+    pub const BETA: usize = 1;
+    pub const AIRSPEED: usize = 2;
+    pub const THETA: usize = 3;
+    pub const PHI: usize = 4;
+    pub const PSI: usize = 5;
+    pub const ALTITUDE: usize = 6;
+    pub const QBAR: usize = 7;
+    pub const MACH: usize = 8;
+}
+
 pub const INPUTS: usize = 6;
 pub const OUTPUTS: usize = 9;
 pub const INSTRUMENTS: usize = INPUTS + OUTPUTS;

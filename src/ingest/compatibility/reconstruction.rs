@@ -438,6 +438,7 @@ impl CorrectedInputs {
             for point in 1..points {
                 let mean = mean_over_step(&corrected[(point - 1) * spacing..][..spacing + 3]);
                 let ends = values[2 * point - 2][i] + values[2 * point][i];
+                // Simpson's rule, mean = (y₀ + 4 y½ + y₁)/6, solved for the middle value y½.
                 values[2 * point - 1][i] = 1.5 * mean - 0.25 * ends;
             }
         }

@@ -8,20 +8,29 @@ use nalgebra::{DMatrix, DVector};
 
 use super::equations::STATES;
 use super::input_noise::{score_covariance, with_input_noise};
-use super::parameters::{INPUTS, Kind, OUTPUTS, PARAMETERS, Parameters};
+use super::parameters::{INPUTS, Kind, OUTPUTS, PARAMETERS, Parameters, output};
 use super::reconstruction::{LOCAL, LocalParameters, Path, Row, WIND, reconstruct, sensitivities};
 use super::settings::Compatibility;
 use super::window::Window;
 use super::window_sums::{Comparison, LinearisedWindow, ReducedInformation, weighted_gradient};
 use crate::aircraft::Aircraft;
+use crate::numerics::mean::mean;
 use crate::output_error::coloured;
 
 /// Least standard deviation of an output's residuals, as a share of its ordinary bias: keeps the
 /// weights of exact (simulated) data finite.
 const LEAST_DEVIATION: f64 = 1e-3;
 
-/// Output whose instrument reads each state: V, β, α, φ, θ, ψ, altitude.
-const READ_BY: [usize; STATES] = [2, 1, 0, 4, 3, 5, 6];
+/// Output whose instrument reads each state; α and β make w and v of the airspeed.
+const READ_BY: [usize; STATES] = [
+    output::AIRSPEED,
+    output::BETA,
+    output::ALPHA,
+    output::PHI,
+    output::THETA,
+    output::PSI,
+    output::ALTITUDE,
+];
 
 /// Standard deviations about the assumed value of an initial state that no instrument reads, ft/s,
 /// rad and ft: wide, so that the other outputs decide what they can.
@@ -335,7 +344,7 @@ fn slow_squares(values: &[f64]) -> f64 {
 
 /// Sum of squared deviations from the mean.
 pub fn squares_about_mean(values: &[f64]) -> f64 {
-    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    let mean = mean(values.iter().copied());
     values.iter().map(|v| (v - mean).powi(2)).sum()
 }
 

@@ -33,12 +33,29 @@ pub fn classes(draft: &Draft) -> Vec<DraftClass> {
     let of_pilot = Inputs::of(draft, |kind| !kind.is_surface());
     let acts = [Acts::Pitch, Acts::Roll, Acts::Yaw];
     let of_pilot_all = acts.map(|acts| of_pilot.of_axis(acts)).concat();
-    let mut classes = of_surfaces.classes("surface", &of_pilot_all);
-    classes.extend(of_pilot.classes("pilot", &[]));
+    let mut classes = of_surfaces.classes(FlownBy::Surfaces, &of_pilot_all);
+    classes.extend(of_pilot.classes(FlownBy::Pilot, &[]));
     classes
 }
 
-/// Surfaces that move, or controls.
+/// Inputs whose steps make a maneuver.
+#[derive(Clone, Copy)]
+enum FlownBy {
+    Pilot,
+    Surfaces,
+}
+
+impl FlownBy {
+    /// End of a class's name.
+    fn suffix(self) -> &'static str {
+        match self {
+            FlownBy::Pilot => "pilot",
+            FlownBy::Surfaces => "surface",
+        }
+    }
+}
+
+/// Inputs of one kind that have steps.
 struct Inputs<'a> {
     inputs: Vec<(&'a Channel, &'a InputColumn)>,
 }
@@ -67,7 +84,7 @@ impl<'a> Inputs<'a> {
 
     /// Pitch, roll, yaw, and roll with yaw. The first input of each axis must step, the others may; `others` must rest in
     /// all of them.
-    fn classes(&self, by: &str, others: &[String]) -> Vec<DraftClass> {
+    fn classes(&self, by: FlownBy, others: &[String]) -> Vec<DraftClass> {
         let [pitch, roll, yaw] =
             [Acts::Pitch, Acts::Roll, Acts::Yaw].map(|acts| self.of_axis(acts));
         let class = |name: &str, axis: Axis, steps: &[&Vec<String>], rests: &[&Vec<String>]| {
@@ -75,7 +92,7 @@ impl<'a> Inputs<'a> {
             let all_step = steps.iter().all(|signals| !signals.is_empty());
             let further = steps.iter().flat_map(|signals| signals.iter().skip(1));
             all_step.then(|| DraftClass {
-                name: format!("{name}_{by}"),
+                name: format!("{name}_{}", by.suffix()),
                 title: title(name, by),
                 axis,
                 steps: steps.iter().filter_map(first).collect(),
@@ -97,11 +114,11 @@ impl<'a> Inputs<'a> {
     }
 }
 
-fn title(name: &str, by: &str) -> String {
+fn title(name: &str, by: FlownBy) -> String {
     let inputs = name.replace('_', " and ");
     match by {
-        "pilot" => format!("Steps of the pilot's {inputs} control"),
-        _ => format!("Steps of the {inputs} surfaces"),
+        FlownBy::Pilot => format!("Steps of the pilot's {inputs} control"),
+        FlownBy::Surfaces => format!("Steps of the {inputs} surfaces"),
     }
 }
 

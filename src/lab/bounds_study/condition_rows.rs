@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use super::coverage::{MeasuredPoint, TrueAndEstimated};
 use super::recordings::Realisation;
 use crate::aero::{Buildup, Regressor, WindTunnel};
+use crate::numerics::normal::NORMAL_95;
 use crate::numerics::order_statistics::median;
-use crate::numerics::student::NORMAL_95;
 use crate::tables::ConditionRow;
 
 /// Class of the row of all classes.

@@ -5,8 +5,9 @@ use rayon::prelude::*;
 use super::recordings::{Realisation, StudyManeuver};
 use crate::error::Problem;
 use crate::maneuver::Status;
+use crate::numerics::mean::mean;
+use crate::numerics::normal::NORMAL_95;
 use crate::numerics::random::derived_seed;
-use crate::numerics::student::NORMAL_95;
 use crate::output_error::Outcome;
 use crate::tables::{CoverageRow, EstimateRow};
 
@@ -134,11 +135,6 @@ impl Realisation {
             })
         })
     }
-}
-
-fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
-    let count = values.len() as f64;
-    values.sum::<f64>() / count
 }
 
 /// Mean and standard deviation of errors.

@@ -16,12 +16,10 @@ use crate::error::did_you_mean;
 use crate::flight::record::Series;
 use crate::flight::{Mark, Record, signal};
 use crate::maneuver::{Maneuver, ManeuverOrigin, Quality, Recognised};
+use crate::numerics::mean::mean;
 use crate::numerics::sample_count::nearest;
-use crate::rigid_body::BodyState;
+use crate::rigid_body::{BodyState, DEPARTURE_DEG};
 use crate::units::DEG;
-
-/// Limit of |α| and |β|, deg: the build-up has no meaning beyond it.
-const DEPARTURE_DEG: f64 = 90.0;
 
 /// State of the aircraft at a control step.
 struct AircraftState {
@@ -112,10 +110,6 @@ fn unwrap_heading(heading: &mut [f64]) {
         };
         *value += offset;
     }
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 impl<'a> CardFlight<'a> {
@@ -376,9 +370,10 @@ impl<'a> CardFlight<'a> {
         let last = record.sample_at(record.start_s + to_s).max(first);
         let mean_of = |name: &str| {
             let values = record.values(name).and_then(|v| v.get(first..=last));
-            mean(values.unwrap_or_default())
+            mean(values.unwrap_or_default().iter().copied())
         };
         let start_s = record.time_s(first);
+        let alphas_deg = alphas_deg.get(first..=last).unwrap_or_default();
         Maneuver {
             maneuver_id: format!("{}_t{:05}", record.flight_id, start_s.floor()),
             flight_id: record.flight_id.clone(),
@@ -386,7 +381,7 @@ impl<'a> CardFlight<'a> {
             axis: self.card.axis,
             start_s,
             end_s: record.time_s(last),
-            alpha_deg: mean(alphas_deg.get(first..=last).unwrap_or_default()),
+            alpha_deg: mean(alphas_deg.iter().copied()),
             mach: mean_of(signal::MACH),
             qbar_psf: mean_of(signal::QBAR),
             velocity_ft_s: mean_of(signal::VELOCITY),

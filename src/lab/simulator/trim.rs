@@ -15,7 +15,8 @@ use crate::earth::air;
 use crate::rigid_body::{AirData, BodyState, Euler};
 use crate::units::DEG;
 
-/// Starting values of the iteration; the trim does not depend on them.
+/// Starting values of the iteration; the trim does not depend on them beyond the norm at which it ends. Gravity
+/// is g of `units/constants.rs`, to four digits.
 const START_GRAVITY_FT_S2: f64 = 32.17;
 const START_THRUST_PER_WEIGHT: f64 = 0.3;
 const START_PATH_ANGLE: f64 = -0.2;

@@ -15,6 +15,7 @@ use crate::dynamics::OUTPUTS;
 use crate::earth::gravity_ft_s2;
 use crate::flight::record::Series;
 use crate::flight::{Mark, Record, signal};
+use crate::numerics::bisection::last_that_holds;
 use crate::output_error::Measurements;
 use crate::units::{DEG, G0_FT_S2};
 
@@ -77,17 +78,17 @@ const COLUMNS: [(&str, &str); 14] = [
 /// Latitude of the case, which gives only g; the altitude is chosen to match g.
 const LATITUDE_DEG: f64 = 45.0;
 
+/// Altitudes between which that of a given g is looked for, ft: gravity from 32.5 to 29.3 ft/s².
+const ALTITUDES_FT: (f64, f64) = (-100_000.0, 1_000_000.0);
+
+/// Most halvings of that range; it ends at neighbours, after 53 and as many as the altitude is below 10⁶ ft in
+/// powers of two.
+const HALVINGS: usize = 100;
+
 /// Altitude at which gravity is g, ft, by bisection.
 fn altitude_of_gravity_ft(g: f64) -> f64 {
-    let (mut low, mut high) = (-100_000.0, 1_000_000.0);
-    for _ in 0..100 {
-        let middle = 0.5 * (low + high);
-        if gravity_ft_s2(LATITUDE_DEG, middle) > g {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
+    let is_heavier = |altitude_ft| gravity_ft_s2(LATITUDE_DEG, altitude_ft) > g;
+    let (low, high) = last_that_holds(ALTITUDES_FT, HALVINGS, is_heavier);
     0.5 * (low + high)
 }
 

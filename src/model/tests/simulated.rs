@@ -2,10 +2,10 @@
 //! the truth in the posterior.
 
 use nalgebra::DVector;
-use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::fixture::{Flown, at, diagonal, exact, maneuver, posterior, tunnel};
 use crate::model::Settings;
+use crate::numerics::normal;
 use crate::numerics::random::RandomStream;
 use crate::numerics::root::{EXACT, root};
 
@@ -48,7 +48,7 @@ fn rank(noise: &mut RandomStream, settings: &Settings) -> f64 {
     };
     let (value, deviation) = at(&posterior(&flown, &tunnel, &settings), "CN_alpha", 20.0);
     let truth = tunnel.value("CN_alpha", 20.0, 0.3).unwrap().value + differences[4];
-    Normal::standard().cdf((truth - value) / deviation)
+    normal::below((truth - value) / deviation)
 }
 
 #[test]

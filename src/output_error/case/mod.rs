@@ -147,7 +147,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
             terms,
             layout,
             biased_outputs,
-            start: mean(motion.states.iter().take(TRIMMED_SAMPLES)),
+            start: mean_state(motion.states.iter().take(TRIMMED_SAMPLES)),
             motion,
             initial_state: model.initial_state,
             noisy_inputs: NoisyInputs::default(),
@@ -159,7 +159,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
 
     /// Starts the integration at the mean of the first measured states.
     pub fn start_from_mean_of(&mut self, samples: usize) {
-        self.start = mean(self.motion.states.iter().take(samples));
+        self.start = mean_state(self.motion.states.iter().take(samples));
     }
 
     #[must_use]
@@ -263,7 +263,7 @@ fn ranges_by_coefficient(terms: &[BuildUpTerm]) -> [Range<usize>; COEFFICIENTS] 
 /// Number of samples over which the initial state is averaged: the aircraft is still trimmed there.
 const TRIMMED_SAMPLES: usize = 10;
 
-fn mean<'a, const NX: usize>(
+fn mean_state<'a, const NX: usize>(
     states: impl ExactSizeIterator<Item = &'a SVector<f64, NX>>,
 ) -> SVector<f64, NX> {
     let count = states.len().max(1) as f64;

@@ -7,6 +7,7 @@ use std::ops::Range;
 
 use super::surface_noise::white_variance;
 use crate::flight::{Mark, Record, signal};
+use crate::numerics::mean::mean;
 
 /// Variance of white noise that has the same effect on slow motion as the noise of a slow dynamic
 /// pressure, relative to the square of the dynamic pressure. Zero for a dynamic pressure recorded
@@ -29,7 +30,7 @@ pub fn relative_variance(record: &Record, range: Range<usize>) -> f64 {
     if !is_slow || recorded.is_empty() {
         return 0.0;
     }
-    let mean = recorded.iter().sum::<f64>() / recorded.len() as f64;
+    let mean = mean(recorded.iter().copied());
     let samples_per_value = values.len() as f64 / recorded.len() as f64;
     let relative = white_variance(&recorded) / (mean * mean);
     if relative.is_finite() {

@@ -14,6 +14,7 @@
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
+use crate::numerics::mean::mean;
 use crate::numerics::symmetric::{inverse, scale, scaled};
 use crate::settings::settings;
 
@@ -186,7 +187,7 @@ pub fn excitation(values: &[f64]) -> f64 {
 }
 
 fn about_mean(values: &[f64]) -> Vec<f64> {
-    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    let mean = mean(values.iter().copied());
     let rounding = 1e-12 * values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
     values
         .iter()
@@ -201,7 +202,7 @@ fn about_mean(values: &[f64]) -> Vec<f64> {
 }
 
 fn root_mean_square(values: &[f64]) -> f64 {
-    (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+    mean(values.iter().map(|v| v * v)).sqrt()
 }
 
 #[cfg(test)]

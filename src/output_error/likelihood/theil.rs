@@ -17,6 +17,7 @@
 //! for a perfect prediction and can be negative.
 
 use crate::dynamics::OUTPUTS;
+use crate::numerics::mean::mean;
 use crate::output_error::case::Measurements;
 
 /// Theil's inequality coefficient and the shares of its parts.
@@ -46,15 +47,15 @@ impl OutputAgreement {
     /// Moments of pairs (measured, computed).
     #[must_use]
     pub fn of_pairs(pairs: &[(f64, f64)]) -> OutputAgreement {
-        let mean_measured = mean(pairs, |z, _| z);
-        let mean_computed = mean(pairs, |_, y| y);
+        let mean_measured = mean_of(pairs, |z, _| z);
+        let mean_computed = mean_of(pairs, |_, y| y);
         OutputAgreement {
             samples: pairs.len(),
             mean_measured,
             mean_computed,
-            square_measured: mean(pairs, |z, _| (z - mean_measured).powi(2)),
-            square_computed: mean(pairs, |_, y| (y - mean_computed).powi(2)),
-            product: mean(pairs, |z, y| (z - mean_measured) * (y - mean_computed)),
+            square_measured: mean_of(pairs, |z, _| (z - mean_measured).powi(2)),
+            square_computed: mean_of(pairs, |_, y| (y - mean_computed).powi(2)),
+            product: mean_of(pairs, |z, y| (z - mean_measured) * (y - mean_computed)),
         }
     }
 
@@ -109,9 +110,9 @@ impl OutputAgreement {
     }
 }
 
-fn mean(pairs: &[(f64, f64)], value: impl Fn(f64, f64) -> f64) -> f64 {
-    let sum = pairs.iter().map(|&(z, y)| value(z, y)).sum::<f64>();
-    sum / pairs.len().max(1) as f64
+/// Mean of a function of the pairs.
+fn mean_of(pairs: &[(f64, f64)], value: impl Fn(f64, f64) -> f64) -> f64 {
+    mean(pairs.iter().map(|&(z, y)| value(z, y)))
 }
 
 /// Theil's coefficient of several outputs together, weighted as in the cost; `None` if all are

@@ -276,7 +276,7 @@ impl Pen<'_> {
             .collect();
         for series in &self.chart.series {
             for point in series.points.iter().filter(|p| !p.label.is_empty()) {
-                let Some((x, y)) = self.place(point.at) else {
+                let Some((x, y)) = self.point_in_frame(point.at) else {
                     continue;
                 };
                 let width = LETTER * TEXT * point.label.chars().count() as f64;
@@ -306,7 +306,7 @@ impl Pen<'_> {
         let places: Vec<(f64, f64)> = series
             .points
             .iter()
-            .filter_map(|point| self.place(point.at))
+            .filter_map(|point| self.point_in_frame(point.at))
             .collect();
         let mark = |(x, y): (f64, f64)| [x - MARK, y - MARK, x + MARK, y + MARK];
         let mut areas: Vec<Area> = places.iter().copied().map(mark).collect();

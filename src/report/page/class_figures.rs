@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::class_markers::ClassMarkers;
 use super::history_strips;
 use crate::aero::Axis;
+use crate::numerics::mean::mean;
 use crate::report::contents::{Contents, group_by};
 use crate::report::figure::legend::{LegendView, key, line};
 use crate::report::figure::scale::extent;
@@ -17,6 +18,7 @@ use crate::report::figure::style::DARK_COLOURS;
 use crate::report::history;
 use crate::report::notation::{angle, fixed, without_unit};
 use crate::tables::{CorrelationKind, CorrelationRow, History};
+use crate::units::Unit;
 
 /// A figure of one class, or of all classes of an axis.
 #[derive(Clone, Debug, Serialize)]
@@ -273,7 +275,7 @@ fn is_of_axis(contents: &Contents, class: &str, axis: Axis) -> bool {
 fn rate_labels<'a>(histories: &[&'a History]) -> Vec<&'a str> {
     let mut labels: BTreeMap<usize, &str> = BTreeMap::new();
     for (i, output) in histories.iter().flat_map(|h| h.outputs.iter().enumerate()) {
-        if output.unit == "deg/s" {
+        if Unit::parse(&output.unit).is_ok_and(Unit::is_angular_rate) {
             labels.insert(i, &output.label);
         }
     }
@@ -352,7 +354,7 @@ fn rate_strips(name: &str, measured: &[(&History, Points)], markers: &ClassMarke
 }
 
 fn root_mean_square(points: &[(f64, f64)]) -> f64 {
-    (points.iter().map(|p| p.1 * p.1).sum::<f64>() / points.len().max(1) as f64).sqrt()
+    mean(points.iter().map(|p| p.1 * p.1)).sqrt()
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::maneuver::Status;
-use crate::numerics::order_statistics::quantile;
+use crate::numerics::order_statistics::median;
 use crate::report::contents::Contents;
 use crate::report::figure::scale::extent;
 use crate::report::notation::{DASH, fixed};
@@ -111,7 +111,7 @@ fn inflated_variances(contents: &Contents) -> TableView {
         "Inflated variances",
         &note,
         &heads,
-        rows_by_class(contents, rows, median),
+        rows_by_class(contents, rows, median_in_words),
     )
 }
 
@@ -142,7 +142,7 @@ fn near_dependencies(contents: &Contents) -> TableView {
         "Near dependencies",
         &note,
         &heads,
-        rows_by_class(contents, rows, median),
+        rows_by_class(contents, rows, median_in_words),
     )
 }
 
@@ -221,8 +221,8 @@ fn rows_by_class(
     cells
 }
 
-fn median(values: &[f64]) -> String {
-    quantile(values.iter().copied(), 0.5).map_or_else(|| DASH.to_owned(), |v| fixed(v, 0))
+fn median_in_words(values: &[f64]) -> String {
+    median(values.iter().copied()).map_or_else(|| DASH.to_owned(), |v| fixed(v, 0))
 }
 
 /// Smallest to largest value: the sign of a correlation may differ between maneuvers.

@@ -140,7 +140,7 @@ fn match_facts(matched: &Matched) -> impl Iterator<Item = (String, String, bool)
                 number(row.margin, 2),
                 row.decided_by,
                 row.repeat_pct
-                    .map_or_else(|| NOTHING.to_owned(), |pct| fixed(pct, 1))
+                    .map_or_else(|| DASH.to_owned(), |pct| fixed(pct, 1))
             ),
         };
         (name, value, row.verdict == MatchVerdict::Outside)

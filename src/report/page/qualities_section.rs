@@ -2,13 +2,13 @@
 
 use serde::Serialize;
 
-use super::quality_charts::{self, ALL, QualityChart};
+use super::quality_charts::{self, QualityChart};
 use crate::aero::Axis;
 use crate::qualities::{Qualities, Specification};
 use crate::report::contents::Contents;
 use crate::report::notation::{DASH, angle, fixed, number};
 use crate::report::table_view::TableView;
-use crate::tables::{Airframe, FlyingQuality, Level, LevelRow, QualityRow};
+use crate::tables::{ALL_PARAGRAPHS, Airframe, FlyingQuality, Level, LevelRow, QualityRow};
 
 /// Values of the section.
 #[derive(Clone, Debug, Serialize)]
@@ -121,7 +121,10 @@ fn is_at(a: f64, b: f64) -> bool {
 /// Answer in sentences: angles of attack with Level 1 for certain, most probable level elsewhere,
 /// and the paragraph that fails most.
 fn answer(levels: &[&LevelRow]) -> String {
-    let all: Vec<&&LevelRow> = levels.iter().filter(|row| row.paragraph == ALL).collect();
+    let all: Vec<&&LevelRow> = levels
+        .iter()
+        .filter(|row| row.paragraph == ALL_PARAGRAPHS)
+        .collect();
     let certain = |row: &&&&LevelRow, most: Level| {
         let shares = [row.level_1_pct, row.level_2_pct, row.level_3_pct];
         let count = most as usize + 1;
@@ -156,7 +159,7 @@ fn worst(levels: &[&LevelRow]) -> Option<String> {
         row.level_1_pct + 2.0 * row.level_2_pct + 3.0 * row.level_3_pct + 4.0 * row.worse_pct
     };
     let badness = |row: &LevelRow| (-row.level_1_pct, mean_level(row));
-    let own = levels.iter().filter(|row| row.paragraph != ALL);
+    let own = levels.iter().filter(|row| row.paragraph != ALL_PARAGRAPHS);
     let worst = own.max_by(|a, b| {
         let (a, b) = (badness(a), badness(b));
         // The first of equals stands at the lowest angle of attack.
@@ -186,7 +189,10 @@ pub fn least_certain<'a>(levels: &[&'a LevelRow]) -> Option<&'a LevelRow> {
             .map(|p| -p * p.ln())
             .sum()
     };
-    let own = levels.iter().copied().filter(|row| row.paragraph != ALL);
+    let own = levels
+        .iter()
+        .copied()
+        .filter(|row| row.paragraph != ALL_PARAGRAPHS);
     let most = own.max_by(|a, b| entropy(a).total_cmp(&entropy(b)))?;
     let largest = probabilities(most).into_iter().map(|(_, pct)| pct);
     (largest.fold(0.0, f64::max) < CERTAIN_PCT).then_some(most)

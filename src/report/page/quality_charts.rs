@@ -11,7 +11,9 @@ use crate::report::figure::xy_chart::{
     self, ChartAxis, ChartPoint, ChartSeries, LevelBox, XyChart, decades,
 };
 use crate::report::notation::angle;
-use crate::tables::{Airframe, FlyingQuality, Level, LevelRow, QualityRow, RootRow};
+use crate::tables::{
+    ALL_PARAGRAPHS, Airframe, FlyingQuality, Level, LevelRow, QualityRow, RootRow,
+};
 
 /// A chart with its caption.
 #[derive(Clone, Debug, Serialize)]
@@ -33,9 +35,6 @@ impl QualityChart {
         }
     }
 }
-
-/// Paragraph of the worst level of all.
-pub const ALL: &str = "all";
 
 /// Points of an ellipse's outline.
 const OUTLINE: u32 = 40;
@@ -91,7 +90,7 @@ pub fn charts(
     let levels = qualities
         .levels
         .iter()
-        .filter(|row| row.airframe == airframe && row.paragraph == ALL);
+        .filter(|row| row.airframe == airframe && row.paragraph == ALL_PARAGRAPHS);
     let levels = probabilities(&levels.collect::<Vec<_>>(), airframe);
     levels.into_iter().chain(pairs).chain(loci).collect()
 }

@@ -3,6 +3,7 @@
 
 use super::mismatch::Mismatch;
 use crate::maneuver::{Pulses, Sweep};
+use crate::numerics::mean::mean;
 use crate::segment::steps::step::Step;
 use crate::segment::steps::swings::Swing;
 
@@ -98,8 +99,8 @@ pub(super) fn fit_sweep(swings: &[Swing], wanted: &Sweep) -> Result<f64, Mismatc
         .map(|s| s[1].middle_s() - s[0].middle_s())
         .collect();
     let third = (intervals.len() / 3).max(1);
-    let first_third = mean(&intervals[..third]);
-    let last_third = mean(&intervals[intervals.len() - third..]);
+    let first_third = mean(intervals[..third].iter().copied());
+    let last_third = mean(intervals[intervals.len() - third..].iter().copied());
     let ratio = first_third / last_third;
     if ratio < wanted.ratio {
         return Err(Mismatch::contradiction(format!(
@@ -117,10 +118,6 @@ pub(super) fn fit_sweep(swings: &[Swing], wanted: &Sweep) -> Result<f64, Mismatc
         return Err(Mismatch::contradiction(reason));
     }
     Ok(ratio)
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 #[cfg(test)]

@@ -8,7 +8,9 @@ use crate::maneuver::Class;
 use crate::numerics::order_statistics::trimmed_range;
 use crate::segment::steps::step::Step;
 
-/// Share of the samples at either end of a signal's range that may be spikes or a short excursion.
+/// Share of the samples at either end of a signal's range that may be spikes or a short excursion. Trade-off: of
+/// a segment of 10 s it leaves out 0.2 s. A larger share would leave out a short pulse, a smaller one would
+/// count a spike of a few samples as motion.
 const OUTLYING: f64 = 0.02;
 
 /// Least range, in smallest steps, of a signal that moves: from side to side.

@@ -25,10 +25,7 @@ use crate::ingest::ColumnSource;
 use crate::store::atomic::Draft;
 use crate::store::import::tall::Tall;
 use crate::store::object;
-use crate::store::recorder::UNIT;
-
-/// Rows decoded at a time: a few MB for row groups of any size.
-const BATCH_ROWS: usize = 16_384;
+use crate::store::recorder::{BATCH_ROWS, UNIT};
 
 /// Largest number of numbers of a file, rows times mapped columns: more than ten hours of sixty
 /// channels at 200 Hz. A damaged file of a few kilobytes can claim any number of rows.

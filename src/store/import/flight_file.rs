@@ -11,10 +11,7 @@ use parquet::arrow::ArrowWriter;
 use super::imported_contents::{ImportedColumn, refused};
 use crate::error::{Error, Result};
 use crate::store::atomic::Draft;
-use crate::store::recorder::{array, properties, schema};
-
-/// Largest number of rows that are in memory at once.
-const BATCH_ROWS: usize = 16_384;
+use crate::store::recorder::{BATCH_ROWS, array, properties, schema};
 
 /// Numbers that are in memory at once: those of 256 columns.
 const BATCH_NUMBERS: usize = BATCH_ROWS << 8;
