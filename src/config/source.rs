@@ -73,6 +73,9 @@ impl Source {
 
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T> {
         serde_yaml::from_str(&self.text).map_err(|e| {
+            if self.is_empty() {
+                return Error::config(&self.path, Some(1), "the file is empty");
+            }
             let line = e.location().map(|l| l.line());
             Error::config(&self.path, line, message(&e.to_string()))
         })
@@ -109,6 +112,36 @@ impl Source {
         Error::config(&self.path, line, what)
     }
 
+    /// An error about an entry of a list: the one that has the key for the `index`-th time, from zero,
+    /// after the keys of `path`. Within the entry it names the line of a word.
+    pub fn error_in_entry(
+        &self,
+        path: &[&str],
+        (key, index): (&str, usize),
+        name: &str,
+        what: impl Into<String>,
+    ) -> Error {
+        let mut first = 0;
+        for outer in path {
+            first = self.line_of(outer, first).map_or(first, |line| line - 1);
+        }
+        let lines = self.text.lines().enumerate().skip(first);
+        let mut entries =
+            lines.flat_map(|(i, line)| std::iter::repeat_n(i, times_as_key(key, line)));
+        let entry = entries.nth(index);
+        let end = entries.find(|i| Some(*i) != entry);
+        let named = entry.and_then(|entry| self.line_of(name, entry));
+        let is_inside = |line: &usize| end.is_none_or(|end| *line <= end);
+        let line = named.filter(is_inside).or(entry.map(|i| i + 1));
+        Error::config(&self.path, line.or(Some(first + 1)), what)
+    }
+
+    /// `true` for a file of blank lines and comments.
+    fn is_empty(&self) -> bool {
+        let mut lines = self.text.lines();
+        lines.all(|line| without_comment(line).trim().is_empty())
+    }
+
     /// The first line from number `first` (from 0) on that holds a word, counted from 1.
     fn line_of(&self, name: &str, first: usize) -> Option<usize> {
         let word = |c: char| c.is_alphanumeric() || c == '_';
@@ -120,6 +153,19 @@ impl Source {
             .find(|(_, line)| holds(line))
             .map(|(i, _)| i + 1)
     }
+}
+
+/// Number of times that a line gives a key.
+fn times_as_key(key: &str, line: &str) -> usize {
+    let line = without_comment(line);
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let places = line.match_indices(key);
+    let given = places.filter(|(i, _)| {
+        let starts = !line[..*i].ends_with(is_word);
+        let rest = line[i + key.len()..].trim_start_matches('"').trim_start();
+        starts && rest.starts_with(':')
+    });
+    given.count()
 }
 
 /// A line without its comment.
@@ -137,6 +183,12 @@ fn message(parser: &str) -> String {
     let what = parser
         .rsplit_once(" at line ")
         .map_or(parser, |(what, _)| what);
+    for pair in ["a tuple of size 2", "sequence of 2 elements"] {
+        if let Some((head, _)) = what.split_once(&format!(", expected {pair}")) {
+            let (key, _) = head.split_once(": invalid ").unwrap_or((head, ""));
+            return format!("{key} must be a list of two numbers, such as [10, 40]");
+        }
+    }
     let Some((head, expected)) = what
         .split_once(", expected ")
         .filter(|(head, _)| head.contains("unknown "))

@@ -1329,3 +1329,90 @@ fn levels_of_flying_qualities_are_ranges_that_widen() {
         assert_eq!(copy.error(), place + said);
     }
 }
+
+#[test]
+fn parts_of_the_flying_qualities_that_have_no_effect_are_named() {
+    let requirement = "limits:
+      - { quantity: phugoid_damping, level_1: { min: 0.04 }, level_2: { min: 0 } }
+      - { quantity: phugoid_time_to_double, level_3: { min: 55 } }";
+    let feedback = "# feedback:";
+    let spiral = "spiral_time_to_double, categories: [A, C]";
+    for (from, to, said) in [
+        (
+            "{ de_deg: 1 }",
+            "{ de_deg: 0 }",
+            "`pitch_control` moves no pitching moment: its gearings are zero, or its surfaces have no derivative of Cm; \
+             n/α and 1/T_θ2 need one",
+        ),
+        (
+            "{ de_deg: 1 }",
+            "{ da_deg: 1 }",
+            "`pitch_control`: `da_deg` has no longitudinal derivative",
+        ),
+        (
+            "{ de_deg: 1 }",
+            "{ de_deg: 1000000000 }",
+            "`de_deg` must lie between -100 and 100, not 1000000000",
+        ),
+        (
+            feedback,
+            "feedback: { de_deg: { beta_deg: 1 } }",
+            "feedback of `beta_deg` to `de_deg` has no effect: `de_deg` has no lateral derivative",
+        ),
+        (
+            feedback,
+            "feedback: { de_deg: { q_deg_s: 1e9 } }",
+            "`q_deg_s` must lie between -100 and 100, not 1000000000",
+        ),
+        (
+            spiral,
+            "spiral_time_to_double, categories: []",
+            "a limit of `spiral_time_to_double`: `categories` is empty, so it never applies",
+        ),
+        (
+            spiral,
+            "spiral_time_to_double, classes: []",
+            "a limit of `spiral_time_to_double`: `classes` is empty, so it never applies",
+        ),
+        (
+            requirement,
+            "limits: []",
+            "paragraph 3.2.1.2: `limits` lists no limit",
+        ),
+        (
+            "- paragraph: 3.3.1.2 ",
+            "- paragraph: 3.3.1.1 ",
+            "paragraph 3.3.1.1 stands twice: put its limits in one list",
+        ),
+        (
+            "spiral_time_to_double, categories: [B]",
+            "spiral_time_to_double, categories: [A, C]",
+            "a limit of `spiral_time_to_double`: it stands twice in paragraph 3.3.1.3 for the same categories and classes",
+        ),
+        (
+            "by: dutch_roll_bank",
+            "by: phugoid_damping",
+            "a limit of `dutch_roll_decay`: `raised` is by `phugoid_damping`, a quantity of the longitudinal axis",
+        ),
+        (
+            "by: dutch_roll_bank",
+            "by: dutch_roll_decay",
+            "a limit of `dutch_roll_decay`: `raised` is by `dutch_roll_decay` itself",
+        ),
+    ] {
+        let copy = Copy::new();
+        let line = copy.spoil("qualities.yaml", from, to);
+        assert_eq!(
+            copy.error(),
+            format!("qualities.yaml:{line}: {said}"),
+            "{to}"
+        );
+    }
+    let copy = Copy::new();
+    let text = fs::read_to_string(copy.path("qualities.yaml")).unwrap();
+    let (head, _) = text.split_once("\nrequirements:").unwrap();
+    copy.write("qualities.yaml", &format!("{head}\nrequirements: []\n"));
+    let line = head.lines().count() + 1;
+    let said = "`requirements` lists no paragraph";
+    assert_eq!(copy.error(), format!("qualities.yaml:{line}: {said}"));
+}

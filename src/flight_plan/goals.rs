@@ -55,6 +55,9 @@ pub enum GoalSubject<'a> {
     Match(&'a str, Option<ModelSource>),
 }
 
+/// Largest angle of attack of either sign.
+const HIGHEST_ALPHA_DEG: f64 = 180.0;
+
 /// Probability that decides unless given.
 const DECIDED: f64 = 0.95;
 
@@ -133,6 +136,11 @@ impl Goal {
             .is_some_and(|(from, to)| from > to || (from - to).is_nan())
         {
             Some("`alpha_deg` must be a lowest and a highest angle of attack")
+        } else if self
+            .alpha_deg
+            .is_some_and(|(from, to)| from < -HIGHEST_ALPHA_DEG || to > HIGHEST_ALPHA_DEG)
+        {
+            Some("`alpha_deg` must lie between -180 and 180")
         } else {
             None
         }

@@ -105,7 +105,7 @@ pub fn plan_next_flight(
     let next = &cards.cards.next;
     let budget = Budget::of(next, request.minutes);
     let plan = plan(&state, &rehearsals, &goals, budget);
-    let page = kneeboard::page(config, &plan, request.minutes, next)
+    let page = kneeboard::page(config, &plan, request.minutes, &cards.cards)
         .map_err(|what| Error::store(&folder.join(PAGE), &what))?;
     let shelf = shelf_of_stage(folder, &campaign_lineage(&conductor), Stage::Model);
     Ok(PlannedFlight {

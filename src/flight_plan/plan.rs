@@ -282,6 +282,8 @@ impl PlanRows<'_> {
             lowest_an_g: Some(extremes.an_g.0),
             highest_an_g: Some(extremes.an_g.1),
             highest_qbar_psf: Some(extremes.qbar_psf.1),
+            mach: Some(extremes.mach),
+            calibrated_airspeed_kt: Some(extremes.calibrated_kt),
             teaches: self.most_informed_goals(card, nothing),
             ..self.of_candidate(candidate)
         }
@@ -307,6 +309,8 @@ impl PlanRows<'_> {
             lowest_an_g: None,
             highest_an_g: None,
             highest_qbar_psf: None,
+            mach: None,
+            calibrated_airspeed_kt: None,
             teaches: String::new(),
             refused: String::new(),
         }
@@ -335,9 +339,8 @@ impl PlanRows<'_> {
             if named.len() < NAMED_GOALS && !named.contains(&name) {
                 named.push(name);
                 let alpha_deg = goal.point.condition.alpha_deg;
-                parts.push(format!(
-                    "{name} at {alpha_deg}°: {before:.2e} to {after:.2e}"
-                ));
+                let fall_pct = 100.0 * (1.0 - after / before);
+                parts.push(format!("{name} at {alpha_deg}°: −{fall_pct:.0} %"));
             }
         }
         parts.join("; ")

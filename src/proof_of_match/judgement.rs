@@ -14,6 +14,8 @@ pub struct ToleranceFinding {
     pub subject: String,
     /// Number of the requirement within its test, from one.
     pub requirement: usize,
+    /// Number of the requirement among those of all tests of the maneuver.
+    place: usize,
     pub tolerance: Tolerance,
     /// Value of the Dutch roll's quantity in flight and by the model; `None` for a time history.
     pub flight_value: Option<f64>,
@@ -50,6 +52,8 @@ pub struct Judged<'a> {
     pub test: &'a Test,
     /// Number of the requirement within its test, from one.
     pub requirement: usize,
+    /// Number of the requirement among those of all tests of the maneuver.
+    place: usize,
     pub tolerance: Tolerance,
 }
 
@@ -57,7 +61,7 @@ impl Judged<'_> {
     /// `true` for alternatives of one requirement.
     #[must_use]
     pub fn is_alternative(&self, other: &Judged) -> bool {
-        self.test.test == other.test.test && self.requirement == other.requirement
+        self.place == other.place
     }
 }
 
@@ -65,18 +69,20 @@ impl Judged<'_> {
 /// not available.
 #[must_use]
 pub fn judged<'a>(tests: &[&'a Test], has_dutch_roll: bool) -> Vec<Judged<'a>> {
-    let of_test = |test: &&'a Test| {
-        let test = *test;
-        let requirements = (1..).zip(&test.all_of);
-        requirements.flat_map(move |(requirement, own)| {
+    let requirements = tests.iter().flat_map(|test| {
+        let own = (1..).zip(&test.all_of);
+        own.map(move |(number, requirement)| (*test, number, requirement))
+    });
+    let all = requirements
+        .enumerate()
+        .flat_map(|(place, (test, number, own))| {
             own.one_of.iter().map(move |tolerance| Judged {
                 test,
-                requirement,
+                requirement: number,
+                place,
                 tolerance: *tolerance,
             })
-        })
-    };
-    let all = tests.iter().flat_map(of_test);
+        });
     all.filter(|j| has_dutch_roll || !j.tolerance.quantity.is_of_dutch_roll())
         .collect()
 }
@@ -108,6 +114,7 @@ pub fn judge(
             test: own.test.test.clone(),
             subject: own.test.subject.clone(),
             requirement: own.requirement,
+            place: own.place,
             tolerance: *tolerance,
             flight_value: simulated.flight.and_then(|f| f.value(tolerance.quantity)),
             model_value: simulated.model.and_then(|m| m.value(tolerance.quantity)),
@@ -136,7 +143,7 @@ impl Simulated {
 /// Best alternative of the requirement with the smallest margin; `None` without findings.
 #[must_use]
 pub fn decisive(findings: &[ToleranceFinding]) -> Option<&ToleranceFinding> {
-    let requirements = findings.chunk_by(|a, b| a.test == b.test && a.requirement == b.requirement);
+    let requirements = findings.chunk_by(|a, b| a.place == b.place);
     let best =
         requirements.filter_map(|own| own.iter().max_by(|a, b| a.margin.total_cmp(&b.margin)));
     best.min_by(|a, b| a.margin.total_cmp(&b.margin))

@@ -15,7 +15,6 @@ use crate::aero::Axis;
 use crate::model::LocalPosterior;
 use crate::numerics::dual::Dual;
 use crate::numerics::normal::NORMAL_95;
-use crate::numerics::order_statistics::quantile;
 use crate::numerics::random::RandomStream;
 use crate::numerics::root::continuous_root;
 use crate::tables::{
@@ -29,6 +28,20 @@ const SEED: u64 = 21;
 /// Share of draws with another pattern of modes, above which the standard deviation is taken from
 /// the draws.
 const COALESCED: f64 = 0.01;
+
+/// Largest share of draws beyond either end of the interval by slopes: twice that of a normal
+/// distribution. A quotient reaches it when its denominator is ten standard deviations from zero.
+const BEYOND_AN_END: f64 = 0.05;
+
+/// Shares of draws within one standard deviation by slopes: that of a normal distribution is 0.683.
+/// Beside a pole the slopes are steep, and nearly all draws are within.
+const WITHIN_ONE_DEVIATION: std::ops::RangeInclusive<f64> = 0.6..=0.77;
+
+/// Largest share of draws that may lack a value: that of one tail of the 95 % interval.
+const UNDEFINED: f64 = 0.025;
+
+/// Quantiles of a normal distribution at minus and plus one standard deviation.
+const ONE_DEVIATION: [f64; 2] = [0.158_655, 0.841_345];
 
 /// Rows of one airframe at one angle of attack.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -44,7 +57,7 @@ pub struct AxisAnalysis {
     pub axis: Axis,
     pub mean: AxisQuantities,
     pub covariance: DMatrix<f64>,
-    /// Values of each draw.
+    /// Values of each draw; NaN if its equations have no finite roots.
     pub draws: Vec<BTreeMap<FlyingQuality, f64>>,
     /// Share of draws whose modes have another pattern than those at the mean.
     pub coalesced: f64,
@@ -62,16 +75,24 @@ impl AxisAnalysis {
         let mean = linear.quantities(axis, &posterior.mean, Differentiation::Slopes)?;
         let root = continuous_root(&posterior.covariance);
         let mut stream = RandomStream::new(SEED, axis.name());
-        let drawn = (0..draws).filter_map(|_| {
+        let drawn = (0..draws).map(|_| {
             let values = &posterior.mean + stream.deviations(&root);
             linear.quantities(axis, &values, Differentiation::ValuesAlone)
         });
-        let drawn: Vec<AxisQuantities> = drawn.collect();
-        let others = drawn
-            .iter()
-            .filter(|d| d.modes.pattern != mean.modes.pattern);
-        let coalesced = others.count() as f64 / drawn.len().max(1) as f64;
-        let values = |d: &AxisQuantities| d.quantities.iter().map(|(q, v)| (*q, v.value)).collect();
+        let drawn: Vec<Option<AxisQuantities>> = drawn.collect();
+        let is_other = |d: &&Option<AxisQuantities>| {
+            d.as_ref().map(|d| &d.modes.pattern) != Some(&mean.modes.pattern)
+        };
+        let others = drawn.iter().filter(is_other).count();
+        let coalesced = others as f64 / drawn.len().max(1) as f64;
+        let values = |d: &Option<AxisQuantities>| match d {
+            Some(d) => d.quantities.iter().map(|(q, v)| (*q, v.value)).collect(),
+            None => mean
+                .quantities
+                .iter()
+                .map(|(q, _)| (*q, f64::NAN))
+                .collect(),
+        };
         Some(AxisAnalysis {
             axis,
             draws: drawn.iter().map(values).collect(),
@@ -95,30 +116,25 @@ impl AxisAnalysis {
         (&self.covariance * slopes(a)).dot(&slopes(b))
     }
 
-    /// Standard deviation and 95 % interval of a quantity.
+    /// Standard deviation and 95 % interval of a quantity: by its slopes, if the draws confirm them.
     #[must_use]
     pub fn uncertainty(&self, quantity: FlyingQuality, dual: &Dual) -> Uncertainty {
         let deviation = self.covariance(dual, dual).sqrt();
-        if self.coalesced <= COALESCED && deviation.is_finite() {
-            return Uncertainty {
-                deviation,
-                lower: dual.value - NORMAL_95 * deviation,
-                upper: dual.value + NORMAL_95 * deviation,
-                basis: DeviationBasis::Slopes,
-            };
-        }
-        let drawn = || {
-            let drawn = self.draws.iter().filter_map(|d| d.get(&quantity).copied());
-            drawn.filter(|v| v.is_finite())
+        let by_slopes = Uncertainty {
+            deviation,
+            lower: dual.value - NORMAL_95 * deviation,
+            upper: dual.value + NORMAL_95 * deviation,
+            basis: DeviationBasis::Slopes,
         };
-        let count = drawn().count() as f64;
-        let mean = drawn().sum::<f64>() / count;
-        let square = drawn().map(|v| (v - mean) * (v - mean)).sum::<f64>();
-        Uncertainty {
-            deviation: (square / (count - 1.0)).sqrt(),
-            lower: quantile(drawn(), 0.025).unwrap_or(f64::NAN),
-            upper: quantile(drawn(), 0.975).unwrap_or(f64::NAN),
-            basis: DeviationBasis::Draws,
+        let values = self.draws.iter().filter_map(|d| d.get(&quantity));
+        let drawn = Drawn::of(values.copied(), self.draws.len());
+        let holds = deviation.is_finite()
+            && self.coalesced <= COALESCED
+            && drawn.confirms(dual.value, &by_slopes);
+        if holds {
+            by_slopes
+        } else {
+            drawn.uncertainty()
         }
     }
 
@@ -146,6 +162,86 @@ pub struct Uncertainty {
     pub lower: f64,
     pub upper: f64,
     pub basis: DeviationBasis,
+}
+
+/// Values of a quantity in draws.
+#[derive(Clone, Debug)]
+pub struct Drawn {
+    /// Ascending; a mode that never doubles has infinity.
+    values: Vec<f64>,
+    /// Number of all draws, with those that lack a value.
+    draws: usize,
+}
+
+impl Drawn {
+    /// Values of a quantity; NaN counts as no value.
+    pub fn of(values: impl Iterator<Item = f64>, draws: usize) -> Drawn {
+        let mut values: Vec<f64> = values.filter(|value| !value.is_nan()).collect();
+        values.sort_unstable_by(f64::total_cmp);
+        Drawn { values, draws }
+    }
+
+    /// Share of the draws.
+    fn share(&self, count: usize) -> f64 {
+        count as f64 / self.draws as f64
+    }
+
+    fn lacks_values(&self) -> bool {
+        self.share(self.draws - self.values.len()) > UNDEFINED
+    }
+
+    /// `true` if the draws are distributed as the slopes state. No draws refute nothing.
+    fn confirms(&self, value: f64, by_slopes: &Uncertainty) -> bool {
+        if self.draws == 0 {
+            return true;
+        }
+        let below = |limit: f64| self.values.partition_point(|own| *own < limit);
+        let not_above = |limit: f64| self.values.partition_point(|own| *own <= limit);
+        let under = below(by_slopes.lower);
+        let over = self.values.len() - not_above(by_slopes.upper);
+        let deviation = by_slopes.deviation;
+        let within = not_above(value + deviation) - below(value - deviation);
+        // Equal values have no distribution, and slopes of zero are right.
+        let is_certain = deviation == 0.0 && under + over == 0;
+        !self.lacks_values()
+            && self.share(under.max(over)) <= BEYOND_AN_END
+            && (is_certain || WITHIN_ONE_DEVIATION.contains(&self.share(within)))
+    }
+
+    /// Interval between quantiles. The standard deviation is half the width of the central 68 %: that
+    /// of all values is infinite for a quotient whose denominator may be zero. NaN for what draws
+    /// without a value leave open; an end is infinite if the quantile is.
+    pub fn uncertainty(&self) -> Uncertainty {
+        let at = |share: f64| {
+            let known = Some(share).filter(|_| !self.lacks_values());
+            known
+                .and_then(|share| self.quantile(share))
+                .unwrap_or(f64::NAN)
+        };
+        let [low, high] = ONE_DEVIATION.map(at);
+        Uncertainty {
+            deviation: 0.5 * (high - low),
+            lower: at(0.025),
+            upper: at(0.975),
+            basis: DeviationBasis::Draws,
+        }
+    }
+
+    /// Quantile, linear between neighbours; infinite if one of them is.
+    fn quantile(&self, share: f64) -> Option<f64> {
+        let rank = share * self.values.len().checked_sub(1)? as f64;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a share of a count"
+        )]
+        let below = rank as usize;
+        let (first, second) = (self.values[below], self.values.get(below + 1));
+        let second = second.copied().filter(|second| *second > first);
+        let step = |second: f64| (second - first) * rank.fract();
+        let is_between = rank.fract() > 0.0;
+        Some(first + second.filter(|_| is_between).map_or(0.0, step))
+    }
 }
 
 impl Analysis {

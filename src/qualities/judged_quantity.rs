@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::analysis::linearised;
 use super::judged_aircraft::JudgedAircraft;
-use super::levels::{meets, value_of};
+use super::levels::{meets, minimum};
 use super::linear::Differentiation;
 use super::linear::LinearModel;
 use super::specification::{LevelLimit, Specification};
@@ -114,12 +114,7 @@ fn level_changes(
 fn ends(limit: &LevelLimit, means: &[(FlyingQuality, f64)]) -> Vec<f64> {
     let of_level = |level: Level| {
         let range = limit.range(level).unwrap_or_default();
-        let rise = limit.raised.and_then(|raised| {
-            let by = value_of(means, raised.by)?;
-            Some(raised.rise(level, by))
-        });
-        let min = range.min.map(|min| min + rise.unwrap_or(0.0));
-        [min, range.max]
+        [minimum(limit, level, means), range.max]
     };
     let levels = [Level::One, Level::Two, Level::Three].into_iter();
     levels.flat_map(of_level).flatten().collect()

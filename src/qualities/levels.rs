@@ -28,15 +28,24 @@ pub fn meets(limit: &LevelLimit, level: Level, values: &Values) -> bool {
     let Some(range) = limit.range(level) else {
         return false;
     };
-    let raised = limit.raised.and_then(|raised| {
-        let by = value_of(values, raised.by)?;
-        Some(raised.rise(level, by))
-    });
     // A comparison with what is not a number is false.
-    range
-        .min
-        .is_none_or(|min| value >= min + raised.unwrap_or(0.0))
+    minimum(limit, level, values).is_none_or(|min| value >= min)
         && range.max.is_none_or(|max| value <= max)
+}
+
+/// Minimum of a level with its rise, which starts from zero if the level has no minimum of its own;
+/// `None` for a level without either.
+#[must_use]
+pub fn minimum(limit: &LevelLimit, level: Level, values: &Values) -> Option<f64> {
+    let own = limit.range(level)?.min;
+    let rise = limit.raised.and_then(|raised| {
+        let by = value_of(values, raised.by)?;
+        (raised.slope(level) > 0.0).then(|| raised.rise(level, by))
+    });
+    match (own, rise) {
+        (None, None) => None,
+        (own, rise) => Some(own.unwrap_or(0.0) + rise.unwrap_or(0.0)),
+    }
 }
 
 /// Value of a quantity; `None` if the mode does not exist.

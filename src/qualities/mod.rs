@@ -27,6 +27,7 @@ mod tests;
 
 use rayon::prelude::*;
 
+use crate::aero::Axis;
 use crate::maneuver::{Maneuver, Means};
 use crate::model::Model;
 use crate::tables::{LevelRow, QualityRow, RootRow};
@@ -35,7 +36,7 @@ use analysis::Analysis;
 pub use judged_aircraft::JudgedAircraft;
 pub use judged_quantity::judged_quantity;
 pub use linear::{Controls, Differentiation, LinearModel, SteadyFlight};
-pub use specification::{LevelLimit, Range, Specification};
+pub use specification::{LevelLimit, Range, Requirement, Specification};
 pub use trim::FlownConditions;
 
 /// States that the feedback of a specification may use.
@@ -48,6 +49,15 @@ pub const FEEDBACK_STATES: [&str; 7] = [
     "r_deg_s",
     "phi_deg",
 ];
+
+/// Axis in whose equations a state of [`FEEDBACK_STATES`] is.
+#[must_use]
+pub fn feedback_axis(state: &str) -> Axis {
+    match state {
+        "alpha_deg" | "q_deg_s" | "theta_deg" => Axis::Longitudinal,
+        _ => Axis::Lateral,
+    }
+}
 
 /// Flying qualities of a campaign.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -93,7 +93,8 @@ pub struct Range {
     pub max: Option<f64>,
 }
 
-/// Rise of a limit's minimum with another quantity beyond a value.
+/// Rise of a limit's minimum with another quantity beyond a value. A level without a minimum rises from
+/// zero.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Raised {
@@ -167,12 +168,17 @@ impl Raised {
     /// Rise of the minimum for a value of the other quantity.
     #[must_use]
     pub fn rise(&self, level: Level, value: f64) -> f64 {
-        let slope = match level {
+        self.slope(level) * (value - self.above).max(0.0)
+    }
+
+    /// Rise of a level's minimum per unit of the other quantity.
+    #[must_use]
+    pub fn slope(&self, level: Level) -> f64 {
+        match level {
             Level::One => self.level_1,
             Level::Two => self.level_2,
             Level::Three => self.level_3,
             Level::Worse => 0.0,
-        };
-        slope * (value - self.above).max(0.0)
+        }
     }
 }

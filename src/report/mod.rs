@@ -27,7 +27,9 @@ use minijinja::{AutoEscape, Environment};
 
 pub use contents::{ConfiguredClass, Contents};
 pub use history::thinned;
-pub use notation::{angle, count, fixed, symbol, unit, well_formed};
+pub use notation::{
+    angle, count, fixed, number, power_of_ten, symbol, unit, well_formed, without_unit,
+};
 use page::Page;
 pub use page_selection::maneuvers_with_page;
 pub use provenance::{Provenance, SourceFile};

@@ -34,6 +34,18 @@ impl AirData {
         }
     }
 
+    /// Calibrated airspeed, kt, from Mach number and dynamic pressure in subsonic flight: the speed that
+    /// has the same impact pressure at sea level. The static pressure is q̄/(0.7 M²).
+    #[must_use]
+    pub fn calibrated_kt(mach: f64, qbar_psf: f64) -> f64 {
+        const FT_S_PER_KT: f64 = 6_076.115_486 / 3600.0;
+        let sea_level = air(0.0);
+        let pressure_psf = qbar_psf / (0.7 * mach * mach);
+        let impact_psf = pressure_psf * ((1.0 + 0.2 * mach * mach).powf(3.5) - 1.0);
+        let ratio = (impact_psf / sea_level.pressure_psf + 1.0).powf(2.0 / 7.0);
+        sea_level.sound_ft_s * (5.0 * (ratio - 1.0)).sqrt() / FT_S_PER_KT
+    }
+
     /// α̇, rad/s, of a velocity relative to still air that changes by this rate, both in body axes.
     #[must_use]
     pub fn alpha_rate(relative: &Vector3<f64>, rate: &Vector3<f64>) -> f64 {

@@ -10,6 +10,7 @@ use super::{
     ReadingSlopes, StateChange, body,
 };
 use crate::aircraft::{Aircraft, Position, Sensors, Vane, VaneModel};
+use crate::earth;
 use crate::numerics::lanes::Lanes;
 
 const LOADING: Loading = Loading {
@@ -237,4 +238,16 @@ fn a_change_of_the_attitude_is_normalised_as_the_attitude_is() {
             assert_relative_eq!(value(own.0[i]), expected, epsilon = 1e-5);
         }
     }
+}
+
+#[test]
+fn calibrated_airspeed_is_that_of_the_same_impact_pressure_at_sea_level() {
+    let at = |mach: f64, altitude_ft: f64| {
+        let qbar_psf = 0.7 * earth::air(altitude_ft).pressure_psf * mach * mach;
+        AirData::calibrated_kt(mach, qbar_psf)
+    };
+    // At sea level the true airspeed: the speed of sound is 661.48 kt.
+    assert_relative_eq!(at(0.3, 0.0), 0.3 * 661.48, max_relative = 1e-4);
+    // Pressure of 0.2975 atmospheres: impact pressure of 0.5243 times that.
+    assert_relative_eq!(at(0.8, 30_000.0), 304.1, max_relative = 1e-3);
 }

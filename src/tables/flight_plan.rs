@@ -55,7 +55,11 @@ table! {
         pub highest_an_g: Option<f64> ["g"],
         /// Highest dynamic pressure over the card.
         pub highest_qbar_psf: Option<f64> ["lbf/ft²"],
-        /// Goals to which the card alone adds most, with their standard deviation before and after it.
+        /// Mach number of the card in trim.
+        pub mach: Option<f64> ["1"],
+        /// Calibrated airspeed of the card in trim.
+        pub calibrated_airspeed_kt: Option<f64> ["kt"],
+        /// Goals to which the card alone adds most, with the change of their standard deviations.
         pub teaches: String,
         /// Reason why the card is refused; empty for one that may be flown.
         pub refused: String,

@@ -1,5 +1,6 @@
 //! Tables of the proof of match: each maneuver flown again by a simulator.
 
+use crate::aero::Axis;
 use crate::schema::{table, words};
 
 words! {
@@ -60,6 +61,27 @@ impl MatchedQuantity {
                 | MatchedQuantity::DutchRollHalving
                 | MatchedQuantity::DutchRollDamping
         )
+    }
+
+    /// Axis whose equations it belongs to.
+    #[must_use]
+    pub fn axis(self) -> Axis {
+        match self {
+            MatchedQuantity::AlphaVane
+            | MatchedQuantity::Velocity
+            | MatchedQuantity::PitchRate
+            | MatchedQuantity::PitchAttitude
+            | MatchedQuantity::NormalAcceleration
+            | MatchedQuantity::AxialAcceleration => Axis::Longitudinal,
+            MatchedQuantity::BetaVane
+            | MatchedQuantity::RollRate
+            | MatchedQuantity::YawRate
+            | MatchedQuantity::Bank
+            | MatchedQuantity::LateralAcceleration
+            | MatchedQuantity::DutchRollPeriod
+            | MatchedQuantity::DutchRollHalving
+            | MatchedQuantity::DutchRollDamping => Axis::Lateral,
+        }
     }
 
     /// Unit of its values.

@@ -54,6 +54,30 @@ words! {
 }
 
 impl FlyingQuality {
+    /// Axis whose equations it belongs to.
+    #[must_use]
+    pub fn axis(self) -> Axis {
+        match self {
+            FlyingQuality::ShortPeriodFrequency
+            | FlyingQuality::ShortPeriodDamping
+            | FlyingQuality::PhugoidFrequency
+            | FlyingQuality::PhugoidDamping
+            | FlyingQuality::PhugoidTimeToDouble
+            | FlyingQuality::AttitudeZero
+            | FlyingQuality::LoadFactorPerAlpha
+            | FlyingQuality::ControlAnticipation => Axis::Longitudinal,
+            FlyingQuality::DutchRollFrequency
+            | FlyingQuality::DutchRollDamping
+            | FlyingQuality::DutchRollDecay
+            | FlyingQuality::PhiBeta
+            | FlyingQuality::DutchRollBank
+            | FlyingQuality::RollTimeConstant
+            | FlyingQuality::SpiralRate
+            | FlyingQuality::SpiralTimeToDouble
+            | FlyingQuality::RollSpiralDecay => Axis::Lateral,
+        }
+    }
+
     /// Unit of its values.
     #[must_use]
     pub fn unit(self) -> &'static str {
@@ -84,7 +108,8 @@ words! {
     pub enum DeviationBasis {
         /// Exact slopes along all derivatives, and their posterior covariance.
         Slopes = "slopes",
-        /// Draws from the posterior: modes coalesce within its uncertainty.
+        /// Draws from the posterior: modes coalesce within its uncertainty, or the quantity is not linear
+        /// there, as a quotient whose denominator may be zero.
         Draws = "draws",
     }
 }
@@ -116,11 +141,12 @@ table! {
         /// Value at the mean of the posterior; empty if undefined, as the time to double of a mode that
         /// decays or the frequency of a pair of roots that diverges.
         pub value: Option<f64>,
-        /// Standard deviation.
+        /// Standard deviation; of draws, half the width of their central 68 %.
         pub standard_deviation: Option<f64>,
-        /// Lower end of the 95 % interval.
+        /// Lower end of the 95 % interval; empty if the interval is open there, or if over 2.5 % of the
+        /// draws have no value.
         pub lower_95: Option<f64>,
-        /// Upper end of the 95 % interval.
+        /// Upper end of the 95 % interval; empty as the lower one.
         pub upper_95: Option<f64>,
         /// Source of the standard deviation.
         pub basis: DeviationBasis,

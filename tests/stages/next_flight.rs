@@ -87,6 +87,22 @@ fn the_cards_of_the_next_flight_are_chosen_priced_and_limited() {
         page.contains("OLAT") && page.contains("Limits kept: alpha 0"),
         "{page}"
     );
+    // What the pilot flies: speed, amplitude and length of the inputs.
+    for flown in [
+        "KCAS",
+        "da ±5° 4.9 s, dr ±10° 6.3 s",
+        "da 5° from 3 s for 0.8, 1.2, 0.6 s",
+    ] {
+        assert!(page.contains(flown), "{flown}: {page}");
+    }
+    assert!(!page.contains("bound reached"), "{page}");
+    let is_power = |w: &[u8]| w[0].is_ascii_digit() && &w[1..] == b"e-";
+    assert!(!page.as_bytes().windows(3).any(is_power), "{page}");
+    for row in &flown {
+        let (mach, speed) = (number(row, "mach"), number(row, "calibrated_airspeed_kt"));
+        assert!((0.1..0.6).contains(&mach), "{row:?}");
+        assert!((80.0..300.0).contains(&speed), "{row:?}");
+    }
     let printed = fs::read(campaign.path("reports/next/kneeboard.pdf")).unwrap();
     let printed = lopdf::Document::load_mem(&printed).unwrap();
     assert_eq!(printed.get_pages().len(), 1);
@@ -146,7 +162,16 @@ fn wrong_goals_are_refused_in_words() {
             "goals: [{ derivative: Cm_de, bond: 1 }]",
             "did you mean `bound`?",
         ),
-        ("goals: []", "lists no goal"),
+        ("goals: []", "goals.yaml:1: `goals` lists no goal"),
+        ("# none yet\n", "goals.yaml:1: the file is empty"),
+        (
+            "goals: [{ derivative: Cm_de, alpha_deg: [200] }]",
+            "goals.yaml:1: goals[0].alpha_deg must be a list of two numbers, such as [10, 40]",
+        ),
+        (
+            "goals: [{ derivative: Cm_de, alpha_deg: [10, 200] }]",
+            "`alpha_deg` must lie between -180 and 180",
+        ),
         (
             "goals: [{ derivative: Cm_de, quantity: phugoid_damping }]",
             "one of `derivative`, `quantity` and `match`",
@@ -244,6 +269,93 @@ fn levels_and_matches_are_goals() {
         "{page}"
     );
     assert!(page.contains("of 3 maneuvers"), "{page}");
+}
+
+#[test]
+fn conditions_and_limits_that_no_card_can_have_are_named_with_their_line() {
+    let campaign = Campaign::of_pitch_steps();
+    let file = cards(&campaign);
+    let text = fs::read_to_string(&file).unwrap();
+    let limits = "limits: { an_g: [-2, 4], alpha_deg: [0, 52] }";
+    for (right, wrong, said) in [
+        (
+            limits,
+            "limits: { surface_rates_deg_s: { der_deg: 1 } }",
+            "the aircraft of the cards has no surface `der_deg`; did you mean `de_deg`?",
+        ),
+        (
+            limits,
+            "limits: { surface_rates_deg_s: { elev: 1 } }",
+            "the aircraft of the cards has no surface `elev`",
+        ),
+        (
+            limits,
+            "limits: { surface_rates_deg_s: { de_deg: 0 } }",
+            "the highest rate of `de_deg` must be above 0, not 0",
+        ),
+        (
+            limits,
+            "limits: { an_g: [4, -1] }",
+            "`an_g` must be a lowest and a higher value, not 4 and -1",
+        ),
+        (
+            limits,
+            "limits: { an_g: [4] }",
+            "next.limits.an_g must be a list of two numbers",
+        ),
+        (
+            "settle_s: 20",
+            "settle_s: -5",
+            "`settle_s` must lie between 0 and 3600, not -5",
+        ),
+        (
+            "settle_s: 20",
+            "change_s_per_deg: -1",
+            "`change_s_per_deg` must lie between 0 and 3600, not -1",
+        ),
+        (
+            "repeats: 1",
+            "repeats: 0",
+            "`repeats` must lie between 1 and 100, not 0",
+        ),
+        (
+            "repeats: 1",
+            "altitude_ft: 250000",
+            "`altitude_ft` must lie between -2000 and 100000, not 250000",
+        ),
+        (
+            "repeats: 1",
+            "mass_slug: 0",
+            "`mass_slug` must lie between 0.001 and",
+        ),
+        (
+            "repeats: 1",
+            "mass_slug: 34000",
+            "`mass_slug` is 34000, but the loadings are of 982.7 to 1067.6 slug: is it in another unit?",
+        ),
+        (
+            "class: OLAT, alpha_deg: [15, 25]",
+            "class: OLAT, alpha_deg: []",
+            "OLAT: `alpha_deg` lists no angle of attack",
+        ),
+        (
+            "\"3211\", alpha_deg: [15, 60]",
+            "\"3211\", scale: 1000, alpha_deg: [15, 60]",
+            "3211: `scale` must lie between 0.01 and 10, or with the other sign, not 1000",
+        ),
+    ] {
+        let (head, tail) = text.split_once("\nnext:").unwrap();
+        assert!(tail.contains(right), "{right}");
+        let changed = tail.replacen(right, wrong, 1);
+        let before = changed.split(wrong).next().unwrap();
+        let line = head.matches('\n').count() + 2 + before.matches('\n').count();
+        fs::write(&file, format!("{head}\nnext:{changed}")).unwrap();
+        let outcome = run(&mut next(&campaign, &file));
+        assert_eq!(outcome.code, Some(1), "{outcome:?}");
+        let place = format!("cards.yaml:{line}: ");
+        let is_said = outcome.stderr.contains(said) && outcome.stderr.contains(&place);
+        assert!(is_said, "{wrong}: {place}: {}", outcome.stderr);
+    }
 }
 
 #[test]

@@ -130,6 +130,63 @@ fn a_tolerance_without_width_and_an_unknown_class_are_named_with_their_line() {
 }
 
 #[test]
+fn tests_and_tolerances_that_judge_nothing_are_named_with_their_line() {
+    for (right, wrong, said) in [
+        (
+            "- { quantity: r_deg_s, within: 2, within_pct: 10 }",
+            "- { quantity: q_deg_s, within: 2, within_pct: 10 }",
+            "`q_deg_s` is a longitudinal quantity, but test 2.d.6 is of the lateral axis",
+        ),
+        (
+            "- { quantity: theta_deg, within: 1.5 }",
+            "- { quantity: dutch_roll_period, within: 1.5 }",
+            "`dutch_roll_period` is a lateral quantity, but test 2.c.10 is of the longitudinal axis",
+        ),
+        (
+            "- test: 2.d.6",
+            "- test: 2.d.2",
+            "test 2.d.2 stands twice for class OLAT: put its requirements in one list, or give each its own number",
+        ),
+        (
+            "one_of:\n          - { quantity: r_deg_s, within: 2, within_pct: 10 }",
+            "one_of: []",
+            "test 2.d.6: `one_of` lists no tolerance",
+        ),
+        (
+            "trim_s: 1 ",
+            "trim_s: 0 ",
+            "`trim_s` must be above 0 and at most 5, not 0",
+        ),
+        (
+            "inside_pct: 100 ",
+            "inside_pct: 0 ",
+            "`inside_pct` must be above 0 and at most 100, not 0",
+        ),
+    ] {
+        let campaign = Campaign::of_pitch_steps();
+        campaign.copy_pipeline();
+        let line = campaign.edit("match.yaml", right, wrong);
+        let outcome = campaign.ends("check", 1);
+        let place = format!("match.yaml:{line}: {said}");
+        assert!(
+            outcome.stderr.contains(&place),
+            "{place}: {}",
+            outcome.stderr
+        );
+    }
+    let campaign = Campaign::of_pitch_steps();
+    campaign.copy_pipeline();
+    let file = campaign.path("pipeline/match.yaml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let (head, _) = text.split_once("\ntests:").unwrap();
+    std::fs::write(&file, format!("{head}\ntests: []\n")).unwrap();
+    let outcome = campaign.ends("check", 1);
+    let line = head.lines().count() + 1;
+    let place = format!("match.yaml:{line}: `tests` lists no test");
+    assert!(outcome.stderr.contains(&place), "{}", outcome.stderr);
+}
+
+#[test]
 fn a_pipeline_without_tolerances_has_no_proof() {
     let campaign = Campaign::of_pitch_steps();
     campaign.copy_pipeline();

@@ -43,3 +43,12 @@ pub(super) fn known_class(config: &Config, source: &Source, name: &str) -> Resul
     let near = did_you_mean(name, config.classes.iter().map(|c| c.name.as_str()));
     Err(source.error(name, format!("unknown class `{name}`{near}")))
 }
+
+/// Refuses a name that is not among those known; `kind` says what they are.
+pub(super) fn known_name(source: &Source, name: &str, known: &[&str], kind: &str) -> Result<()> {
+    if known.contains(&name) {
+        return Ok(());
+    }
+    let near = did_you_mean(name, known.iter().copied());
+    Err(source.error(name, format!("`{name}` is no {kind}{near}")))
+}

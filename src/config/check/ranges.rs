@@ -74,8 +74,9 @@ const OF_CLASS: [(&str, Range); 9] = [
     ("above_alpha_deg", (-180.0, 180.0)),
 ];
 
-/// Ranges of the numbers of test cards by the last name of a key: those that set the amount of work.
-const OF_CARDS: [(&str, Range); 8] = [
+/// Ranges of the numbers of test cards by the last name of a key: those that set the amount of work, and the
+/// conditions of a card. The standard atmosphere ends at 105,000 ft.
+const OF_CARDS: [(&str, Range); 14] = [
     ("seed", (0.0, 1.9e19)),
     ("rate_hz", (0.01, 1e4)),
     ("control_hz", (0.01, 1e5)),
@@ -84,6 +85,12 @@ const OF_CARDS: [(&str, Range); 8] = [
     ("gradient_ft", (1.0, 1e5)),
     ("per_s", (0.0, 100.0)),
     ("realisations", (1.0, 1e6)),
+    ("settle_s", (0.0, 3600.0)),
+    ("change_s_per_deg", (0.0, 3600.0)),
+    ("repeats", (1.0, 100.0)),
+    ("altitude_ft", (-2000.0, 100_000.0)),
+    ("mass_slug", (1e-3, 1e6)),
+    ("alpha_deg", (-180.0, 180.0)),
 ];
 
 /// Range of other sizes.

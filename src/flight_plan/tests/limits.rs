@@ -1,11 +1,13 @@
 //! Limits of the cards.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use crate::flight::record::Series;
 use crate::flight::{Mark, Record, signal};
+use crate::flight_plan::candidate::candidates;
 use crate::flight_plan::limits::{Extremes, broken};
-use crate::lab::campaign::FlightLimits;
+use crate::lab::campaign::{FlightLimits, SimulatedCampaign};
 
 /// A record at 10 Hz: α from 10 to 14 deg, 0.5 to 2 g, 90 to 100 psf, a surface that moves at 20 deg/s.
 fn record() -> Record {
@@ -62,7 +64,15 @@ fn each_limit_is_kept_on_both_sides() {
     ] {
         assert_eq!(reason(&kept), None, "{kept:?}");
     }
+    let unknown = FlightLimits {
+        surface_rates_deg_s: BTreeMap::from([("rudder_deg".to_owned(), 90.0)]),
+        ..FlightLimits::default()
+    };
     for (broken, said) in [
+        (
+            unknown,
+            "`rudder_deg` has a limit of its rate, but the rehearsal records none",
+        ),
         (
             rate(19.0),
             "`elevator_deg` moves at 20 deg/s; the limit is 19 deg/s",
@@ -89,5 +99,33 @@ fn each_limit_is_kept_on_both_sides() {
         ),
     ] {
         assert_eq!(reason(&broken).as_deref(), Some(said));
+    }
+}
+
+#[test]
+fn the_shipped_cards_keep_the_rates_of_all_surfaces() {
+    let shipped = SimulatedCampaign::load(Path::new("pipelines/harv/cards.yaml")).unwrap();
+    let rates = FlightLimits {
+        surface_rates_deg_s: shipped.cards.next.limits.surface_rates_deg_s.clone(),
+        ..FlightLimits::default()
+    };
+    let limited = rates.surface_rates_deg_s.keys();
+    assert!(limited.eq(shipped.cards.aircraft.surfaces.keys()));
+    let half = FlightLimits {
+        surface_rates_deg_s: rates
+            .surface_rates_deg_s
+            .iter()
+            .map(|(name, rate)| (name.clone(), 0.5 * rate))
+            .collect(),
+        ..FlightLimits::default()
+    };
+    let mut candidates = candidates(&shipped.cards, &shipped.config);
+    candidates.retain(|own| [20.0, 40.0].contains(&own.card.alpha_deg));
+    for candidate in candidates {
+        let flown = shipped.simulator.fly(&candidate.card).unwrap();
+        let extremes = Extremes::of(&flown.record);
+        let found = |limits: &FlightLimits| broken(limits, &flown.record, &extremes);
+        assert_eq!(found(&rates), None, "{:?}", candidate.card);
+        assert!(found(&half).is_some(), "{:?}", candidate.card);
     }
 }

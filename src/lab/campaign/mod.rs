@@ -8,6 +8,7 @@ mod study_condition;
 mod test_point;
 mod next_flight;
 mod cards;
+mod card_conditions;
 mod test_cards;
 mod recording;
 mod simulated_campaign;

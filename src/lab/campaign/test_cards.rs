@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::card_conditions;
 use super::cards::Cards;
 use crate::aero::WindTunnel;
 use crate::config::{Config, Source, cards_in_range};
@@ -53,7 +54,8 @@ impl TestCards {
             }
             self.check_program(class, program)?;
         }
-        self.check_points()
+        self.check_points()?;
+        card_conditions::check(&self.cards, &self.source)
     }
 
     fn check_program(&self, class: &str, program: &Program) -> Result<()> {

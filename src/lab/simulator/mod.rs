@@ -31,6 +31,7 @@ use crate::error::{Problem, ProblemStage};
 pub use card::{Card, DerivativeLookup, FlightCondition, Program};
 pub use discrete_gusts::DiscreteGusts;
 pub use flown::{FlownManeuver, TrueDerivative};
+pub use inputs::TestInput;
 pub use instruments::{Instrument, Instruments};
 pub use sensors::{AIR_TEMPERATURE, STATIC_PRESSURE};
 pub use settings::Settings;

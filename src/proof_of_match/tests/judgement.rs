@@ -65,6 +65,22 @@ fn one_of_two_alternatives_suffices() {
 }
 
 #[test]
+fn requirements_of_two_tests_with_one_number_are_no_alternatives() {
+    let flown = flown("OLAT", 20.0);
+    let mut record = flown.record.clone();
+    let sample = record.sample_at(flown.maneuver.start_s + 5.0);
+    record.signals.get_mut(signal::R).unwrap().values[sample] += 50.0;
+    let mut specification = specification();
+    let [_, roll, yaw, _] = specification.tests.as_mut_slice() else {
+        panic!("four tests");
+    };
+    yaw.test = roll.test.clone();
+    let matched = proof(&flown, &record, truth(&flown, "", 1.0), &specification);
+    assert_eq!(matched.verdicts[0].verdict, MatchVerdict::Outside);
+    assert_eq!(matched.verdicts[0].decided_by, "2.d.2 r_deg_s");
+}
+
+#[test]
 fn a_percentage_is_of_the_measured_value_and_the_larger_width_holds() {
     let tolerance = specification().tests[1].all_of[0].one_of[0];
     assert_eq!(tolerance.quantity, MatchedQuantity::RollRate);

@@ -84,6 +84,10 @@ fn a_dutch_roll_that_rolls_much_needs_more_damping() {
     assert_eq!(level(0.76, 8.0), Level::Two);
     assert_eq!(level(0.78, 8.0), Level::One);
     assert_eq!(level(0.31, 8.0), Level::Three);
+    // Level 3 has no minimum of its own and rises from zero: 0.005 · 30 = 0.15.
+    assert_eq!(level(0.151, 8.0), Level::Three);
+    assert_eq!(level(0.149, 8.0), Level::Worse);
+    assert_eq!(level(0.01, 1.0), Level::Three);
     // Damping ratio below 0.19.
     assert_eq!(level(0.40, 1.0), Level::Two);
     assert_eq!(level(-0.1, 1.0), Level::Worse);

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use approx::assert_relative_eq;
 use nalgebra::{DMatrix, DVector};
 
 use super::fixture::{linear, posterior, specification};
@@ -10,7 +11,7 @@ use crate::model::LocalPosterior;
 use crate::numerics::dual::Dual;
 use crate::numerics::random::RandomStream;
 use crate::numerics::root::{EXACT, root};
-use crate::qualities::analysis::AxisAnalysis;
+use crate::qualities::analysis::{AxisAnalysis, Drawn};
 use crate::qualities::levels::level;
 use crate::qualities::linear::Differentiation;
 use crate::tables::{DeviationBasis, FlyingQuality, Level};
@@ -96,6 +97,109 @@ fn modes_that_coalesce_have_the_standard_deviation_of_draws() {
     let drawn = basis(&found);
     assert_eq!(drawn.basis, DeviationBasis::Draws);
     assert!(drawn.lower < drawn.upper && drawn.deviation > 0.0);
+}
+
+/// One over a normal value with this mean and a standard deviation of one, in draws.
+fn reciprocals(mean: f64) -> Vec<f64> {
+    let mut stream = RandomStream::new(3, "reciprocals");
+    (0..200_000)
+        .map(|_| 1.0 / (mean + stream.normal()))
+        .collect()
+}
+
+#[test]
+fn the_interval_of_a_quotient_is_that_of_its_distribution() {
+    // A mean of 4: 1/(4 + 1.96), 1/(4 − 1.96), and half of 1/3 − 1/5.
+    let drawn = reciprocals(4.0);
+    let found = Drawn::of(drawn.iter().copied(), drawn.len()).uncertainty();
+    assert_eq!(found.basis, DeviationBasis::Draws);
+    assert_relative_eq!(found.lower, 0.167_79, max_relative = 0.01);
+    assert_relative_eq!(found.upper, 0.490_19, max_relative = 0.01);
+    assert_relative_eq!(found.deviation, 0.066_67, max_relative = 0.01);
+    // A mean of 0.5: 1/c with Φ(1/c − 0.5) = Φ(−0.5) ∓ 0.025.
+    let drawn = reciprocals(0.5);
+    let found = Drawn::of(drawn.iter().copied(), drawn.len()).uncertainty();
+    assert_relative_eq!(found.lower, -13.85, max_relative = 0.05);
+    assert_relative_eq!(found.upper, 14.31, max_relative = 0.05);
+}
+
+#[test]
+fn draws_without_a_finite_value_open_the_interval_or_remove_it() {
+    let with = |other: f64, count: usize| {
+        let values = (0..1000).map(|i| if i < count { other } else { i as f64 });
+        Drawn::of(values, 1000).uncertainty()
+    };
+    let few = with(f64::INFINITY, 20);
+    assert!(few.lower.is_finite() && few.upper.is_finite());
+    let many = with(f64::INFINITY, 30);
+    assert!(many.lower.is_finite() && many.upper == f64::INFINITY && many.deviation.is_finite());
+    assert_eq!(with(f64::INFINITY, 200).deviation, f64::INFINITY);
+    assert!(with(f64::NAN, 20).upper.is_finite());
+    let undefined = with(f64::NAN, 30);
+    assert!(undefined.lower.is_nan() && undefined.upper.is_nan() && undefined.deviation.is_nan());
+    // A mode that does not exist in a draw has no value there.
+    let missing = Drawn::of((0..970).map(f64::from), 1000).uncertainty();
+    assert!(missing.lower.is_nan() && missing.upper.is_nan());
+}
+
+#[test]
+fn control_anticipation_beside_a_load_factor_of_zero_has_the_interval_of_its_distribution() {
+    let axis = Axis::Longitudinal;
+    let mut unsure = posterior(axis, 0.0);
+    let place = unsure
+        .values
+        .iter()
+        .position(|v| v.derivative == "CN_alpha")
+        .unwrap();
+    let linear = linear(axis, &unsure);
+    let at = |slope: f64| {
+        let mut values = unsure.mean.clone();
+        values[place] = slope;
+        linear.quantities(axis, &values, Differentiation::ValuesAlone)
+    };
+    let value = |slope: f64, wanted: FlyingQuality| {
+        let found = at(slope).unwrap().quantities.into_iter();
+        found
+            .map(|(q, dual)| (q, dual.value))
+            .find(|own| own.0 == wanted)
+            .unwrap()
+            .1
+    };
+    // n/α is linear in the lift slope: its zero, and a mean three standard deviations above it.
+    let load_factor = |slope: f64| value(slope, FlyingQuality::LoadFactorPerAlpha);
+    let (low, high) = (load_factor(0.0), load_factor(0.05));
+    let zero = -0.05 * low / (high - low);
+    let deviation = 0.005;
+    let mean = zero + 3.0 * deviation;
+    let quantity = FlyingQuality::ControlAnticipation;
+    // Distribution over the lift slope, by its density.
+    let mut weighted: Vec<(f64, f64)> = (-50_000..50_000)
+        .map(|i| {
+            let z = (f64::from(i) + 0.5) * 1e-4;
+            (value(mean + z * deviation, quantity), (-0.5 * z * z).exp())
+        })
+        .collect();
+    weighted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let total: f64 = weighted.iter().map(|own| own.1).sum();
+    let quantile = |share: f64| {
+        let mut sum = 0.0;
+        let mut all = weighted.iter();
+        all.find(|own| {
+            sum += own.1;
+            sum >= share * total
+        })
+        .unwrap()
+        .0
+    };
+    unsure.mean[place] = mean;
+    unsure.covariance[(place, place)] = deviation * deviation;
+    let found = AxisAnalysis::of(axis, &linear, &unsure, 20_000).unwrap();
+    let mut quantities = found.mean.quantities.iter();
+    let (_, dual) = quantities.find(|(q, _)| *q == quantity).unwrap();
+    let own = found.uncertainty(quantity, dual);
+    assert_eq!(own.basis, DeviationBasis::Draws);
+    assert_relative_eq!(own.lower, quantile(0.025), max_relative = 0.05);
+    assert_relative_eq!(own.upper, quantile(0.975), max_relative = 0.05);
 }
 
 /// Reliability part of the Brier score: mean square of forecast less frequency over ten bins.
