@@ -133,7 +133,7 @@ fn draws_without_a_finite_value_open_the_interval_or_remove_it() {
     assert!(few.lower.is_finite() && few.upper.is_finite());
     let many = with(f64::INFINITY, 30);
     assert!(many.lower.is_finite() && many.upper == f64::INFINITY && many.deviation.is_finite());
-    assert_eq!(with(f64::INFINITY, 200).deviation, f64::INFINITY);
+    assert!(with(f64::INFINITY, 200).deviation.is_infinite());
     assert!(with(f64::NAN, 20).upper.is_finite());
     let undefined = with(f64::NAN, 30);
     assert!(undefined.lower.is_nan() && undefined.upper.is_nan() && undefined.deviation.is_nan());
