@@ -129,8 +129,8 @@ mod tests {
             let names = column.iter().map(|s| s.name.clone());
             names.collect::<Vec<_>>()
         };
-        assert_eq!(names(&columns[0]), ["a", "residual"]);
-        assert_eq!(names(&columns[1]), ["b", "residual", "input", "input"]);
+        assert_eq!(names(&columns[0]), ["a", "residual", "b", "residual"]);
+        assert_eq!(names(&columns[1]), ["input", "input"]);
         assert_eq!(in_two_columns(vec![vec![strip("a", 50.0)]]).len(), 1);
         assert!(in_two_columns(vec![]).is_empty());
         let columns = |n: usize| side_by_side(vec![strip("a", 50.0); n]).len();

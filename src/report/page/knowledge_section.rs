@@ -381,7 +381,7 @@ mod tests {
             section.answer.starts_with(
                 "Flights have brought the standard deviations of the derivatives to 40 % of those before flight, in \
                  the median; they gave least on Cn_dr at 30° (130 %; no class estimates it), CY_beta at 40° (40 %; \
-                 OLAT estimates it best)."
+                 PYRS estimates it best)."
             ),
             "{}",
             section.answer
