@@ -270,8 +270,8 @@ mod tests {
     #[test]
     fn a_recorded_temperature_replaces_that_of_the_standard_atmosphere() {
         let (altitude, velocity, kelvin) = (25_000.0, 500.0, 263.6);
-        // p = 785.33 lbf/ft² at 25,000 ft; R = 1716.56 ft lbf/(slug °R), γ = 1.4; °R = 1.8 K.
-        let density = 785.33 / (1_716.56 * 1.8 * kelvin);
+        // p = 786.33 lbf/ft² at 25,000 ft; R = 1716.56 ft lbf/(slug °R), γ = 1.4; °R = 1.8 K.
+        let density = 786.33 / (1_716.56 * 1.8 * kelvin);
         let sound = f64::sqrt(1.4 * 1_716.56 * 1.8 * kelvin);
         let all = [
             (s::ALTITUDE, altitude),

@@ -144,7 +144,7 @@ fn a_deficiency_of_the_posterior_is_expected_again_in_the_repeat_flight() {
     let record = noisy(&flown, 3);
     // The posterior is sure of a wrong derivative.
     let local = posterior(&flown, 1.0);
-    let mean = truth(&flown, "Cm_alpha", 1.6);
+    let mean = truth(&flown, "Cm_de", 1.8);
     let judged = |model: WindTunnel| {
         let models = (model, &mean, Some(&local));
         let verdict = proof_with(&flown, &record, models, &specification())

@@ -77,9 +77,10 @@ fn a_limit_rises_with_the_mean_of_another_quantity() {
     let decay = FlyingQuality::DutchRollDecay;
     let own = at_mean(Axis::Lateral, &linear, &about, &judged, decay);
     let limits = own.unwrap().limits;
-    // Category A: 0.35 and 0.05, with rises of 0.014, 0.009 and 0.005; Level 3 has no minimum.
-    let expected = [0.05 + 0.009 * 0.5 * bank, 0.35 + 0.014 * 0.5 * bank];
-    assert_eq!(limits.len(), 2);
+    // Category A: 0.35 and 0.05, with rises of 0.014, 0.009 and 0.005; that of Level 3 starts from zero.
+    let rise = |per_unit: f64| per_unit * 0.5 * bank;
+    let expected = [rise(0.005), 0.05 + rise(0.009), 0.35 + rise(0.014)];
+    assert_eq!(limits.len(), expected.len());
     for (found, expected) in limits.iter().zip(expected) {
         assert_relative_eq!(*found, expected, max_relative = 1e-12);
     }
