@@ -181,7 +181,7 @@ fn tests_and_tolerances_that_judge_nothing_are_named_with_their_line() {
     let (head, _) = text.split_once("\ntests:").unwrap();
     std::fs::write(&file, format!("{head}\ntests: []\n")).unwrap();
     let outcome = campaign.ends("check", 1);
-    let line = head.lines().count() + 1;
+    let line = head.matches('\n').count() + 2;
     let place = format!("match.yaml:{line}: `tests` lists no test");
     assert!(outcome.stderr.contains(&place), "{}", outcome.stderr);
 }
