@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use harvest::config::{Config, Overrides};
-use harvest::flight::RawFlight;
+use harvest::flight::{Channel, RawFlight};
 use harvest::ingest::compatibility::Compatibility;
 use harvest::ingest::{self, Ingested, OnFailedCheck, Settings};
 use harvest::store::archive;
@@ -165,4 +165,50 @@ fn a_wrong_unit_is_named_in_turbulence() {
         ("ay", 32.174),
     ];
     assert_eq!(misnamed(&units, &[]), [""; 0]);
+}
+
+/// Scale of a channel and whether it is corrected, in a demonstration flight on a day with 1.1 times
+/// the temperature of the standard atmosphere at the same pressures.
+fn scale_on_a_warm_day(channel: &str, temperature_is_recorded: bool) -> (f64, bool) {
+    const RATIO: f64 = 1.1;
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut config = Config::load(&root.join("pipelines/harv"), Overrides::default()).unwrap();
+    let files = archive::find(&root.join("data/demo/flights").to_string_lossy()).unwrap();
+    let of_standard = |altitude_ft: &f64| 288.15 - 0.0065 * 0.3048 * altitude_ft;
+    let read = archive::read(&files[0], &config.channels);
+    let mut flight = read.unwrap().swap_remove(0);
+    let mut air = flight.columns["altitude"].clone();
+    air.unit = Some("K".to_owned());
+    air.values = air.values.iter().map(|h| RATIO * of_standard(h)).collect();
+    for (name, factor) in [("qbar", 1.0 / RATIO), ("mach", RATIO.powf(-0.5))] {
+        let column = flight.columns.get_mut(name).unwrap();
+        column.values.iter_mut().for_each(|v| *v *= factor);
+    }
+    flight.columns.insert("OAT".to_owned(), air);
+    if temperature_is_recorded {
+        let channel = Channel::plain("air_kelvin", "K");
+        config.channels.insert("OAT".to_owned(), channel);
+    }
+    let ingested = ingest::record(
+        &flight,
+        &config.channels,
+        &config.constants,
+        &config.aircraft,
+        &Settings::default(),
+    )
+    .unwrap();
+    let rows = &ingested.instruments;
+    let row = rows.iter().find(|row| row.channel == channel).unwrap();
+    (row.scale.unwrap(), row.applied.contains("scale"))
+}
+
+#[test]
+fn the_recorded_temperature_of_a_warm_day_leaves_air_data_as_they_are() {
+    for (channel, scale) in [("qbar", 1.0 / 1.1), ("mach", 1.0 / 1.1_f64.sqrt())] {
+        let (found, _) = scale_on_a_warm_day(channel, true);
+        assert!((found - 1.0).abs() < 0.02, "{channel}: {found}");
+        let (found, is_applied) = scale_on_a_warm_day(channel, false);
+        assert!((found - scale).abs() < 0.02, "{channel}: {found}");
+        assert!(!is_applied, "{channel}");
+    }
 }

@@ -39,7 +39,12 @@ use window::{Window, choose_windows};
 pub fn signals() -> BTreeSet<String> {
     parameters::SIGNALS
         .iter()
-        .chain(&[signal::X_CG, signal::Y_CG, signal::Z_CG])
+        .chain(&[
+            signal::X_CG,
+            signal::Y_CG,
+            signal::Z_CG,
+            signal::AIR_TEMPERATURE,
+        ])
         .map(|s| (*s).to_owned())
         .collect()
 }

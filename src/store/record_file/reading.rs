@@ -18,7 +18,7 @@ use super::header::RecordHeader;
 use super::layout::{MARK, PAGE};
 use crate::error::Error;
 use crate::flight::record::{Series, with_margin};
-use crate::flight::{Correction, Mark, Record, StandIn};
+use crate::flight::{Correction, Mark, Record, StandIn, signal};
 use crate::store::regular;
 
 /// A record on the disk, read by signals and windows of time.
@@ -149,7 +149,8 @@ impl RecordFile {
     /// Some signals, and those from which the stand-ins of the record are computed.
     fn with_sources(&self, signals: &BTreeSet<String>) -> BTreeSet<String> {
         let sources = self.stand_ins.iter().flat_map(|(_, s)| s.sources());
-        let sources = sources.map(|name| (*name).to_owned());
+        let optional = (!self.stand_ins.is_empty()).then_some(&signal::AIR_TEMPERATURE);
+        let sources = sources.chain(optional).map(|name| (*name).to_owned());
         signals.iter().cloned().chain(sources).collect()
     }
 
