@@ -5,7 +5,8 @@ use std::ops::Range;
 
 use super::grid::Grid;
 use super::vocabulary::Input;
-use crate::numerics::order_statistics::quantile;
+use crate::numerics::differences;
+use crate::numerics::order_statistics::{median, quantile};
 use crate::units::{Quantity, Unit};
 
 /// Range of a surface that moves, deg.
@@ -29,9 +30,6 @@ const FEEDBACK_SHARE: f64 = 0.1;
 /// is beyond it. Controls of the demonstration that nobody touches have
 /// 3, and those that are stepped have 79 or more.
 const STEP_SIGMAS: f64 = 4.0;
-/// Median of the magnitude of the second difference of white noise in its standard deviations:
-/// 0.6745 √6.
-const SECOND_DIFFERENCE: f64 = 1.652;
 
 /// Size of the motion of an input.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,8 +89,9 @@ impl<'a> Excursions<'a> {
         let range = quantile(values.iter().copied(), 1.0 - rarely)
             .zip(quantile(values.iter().copied(), rarely));
         let changes = windows(grid, values, STEP_TIME + 1).map(|w| (w[STEP_TIME] - w[0]).abs());
-        let second = windows(grid, values, 3).map(|w| (w[2] - 2.0 * w[1] + w[0]).abs());
-        let noise = quantile(second, 0.5).map(|median| median / SECOND_DIFFERENCE);
+        let seconds =
+            windows(grid, values, 3).map(|w| differences::second(&[w[0], w[1], w[2]]).abs());
+        let noise = median(seconds).map(differences::noise_of_second);
         Excursions {
             column,
             is_surface: kind.is_surface(),
