@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::qualities_section;
-use super::quality_charts::QualityChart;
+use super::quality_charts::{QualityChart, level_in_words};
 use crate::aero::Axis;
 use crate::maneuver::Status;
 use crate::numerics::order_statistics::median;
@@ -136,18 +136,11 @@ fn level_to_decide(contents: &Contents) -> Option<String> {
     let levels = contents.qualities.levels.iter();
     let levels: Vec<&LevelRow> = levels.filter(|row| row.airframe == airframe).collect();
     let row = qualities_section::least_certain(&levels)?;
-    let shares = [
-        ("Level 1", row.level_1_pct),
-        ("Level 2", row.level_2_pct),
-        ("Level 3", row.level_3_pct),
-        ("worse than Level 3", row.worse_pct),
-    ];
-    let (level, pct) = shares
-        .into_iter()
-        .reduce(|a, b| if b.1 > a.1 { b } else { a })?;
+    let (level, pct) = qualities_section::most_probable(row);
     Some(format!(
-        "The level to decide first is that of {}: {level} with {} % probability only.",
+        "The level to decide first is that of {}: {} with {} % probability only.",
         qualities_section::place_in_words(row),
+        level_in_words(level, "worse than Level 3"),
         fixed(pct, 0)
     ))
 }

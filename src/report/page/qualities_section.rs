@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::quality_charts::{self, QualityChart};
+use super::quality_charts::{self, QualityChart, level_in_words};
 use crate::aero::Axis;
 use crate::qualities::{Qualities, Specification};
 use crate::report::contents::Contents;
@@ -194,17 +194,25 @@ pub fn least_certain<'a>(levels: &[&'a LevelRow]) -> Option<&'a LevelRow> {
         .copied()
         .filter(|row| row.paragraph != ALL_PARAGRAPHS);
     let most = own.max_by(|a, b| entropy(a).total_cmp(&entropy(b)))?;
-    let largest = probabilities(most).into_iter().map(|(_, pct)| pct);
-    (largest.fold(0.0, f64::max) < CERTAIN_PCT).then_some(most)
+    (most_probable(most).1 < CERTAIN_PCT).then_some(most)
 }
 
-fn probabilities(row: &LevelRow) -> [(&'static str, f64); 4] {
+/// Probability of each level, percent.
+fn probabilities(row: &LevelRow) -> [(Level, f64); 4] {
     [
-        ("Level 1", row.level_1_pct),
-        ("Level 2", row.level_2_pct),
-        ("Level 3", row.level_3_pct),
-        ("worse", row.worse_pct),
+        (Level::One, row.level_1_pct),
+        (Level::Two, row.level_2_pct),
+        (Level::Three, row.level_3_pct),
+        (Level::Worse, row.worse_pct),
     ]
+}
+
+/// Most probable level with its probability, percent; of equals the better one.
+#[must_use]
+pub fn most_probable(row: &LevelRow) -> (Level, f64) {
+    let better_of_equals = |a: (Level, f64), b: (Level, f64)| if b.1 > a.1 { b } else { a };
+    let [first, others @ ..] = probabilities(row);
+    others.into_iter().fold(first, better_of_equals)
 }
 
 /// Subject, paragraph and angle of attack: `Dutch roll (3.3.1.1) at 20°`.
@@ -224,7 +232,13 @@ fn probabilities_in_words(row: &LevelRow) -> String {
         .into_iter()
         .filter(|(_, pct)| *pct >= 0.5);
     let words: Vec<String> = likely
-        .map(|(level, pct)| format!("{level} with {} %", fixed(pct, 0)))
+        .map(|(level, pct)| {
+            format!(
+                "{} with {} %",
+                level_in_words(level, "worse"),
+                fixed(pct, 0)
+            )
+        })
         .collect();
     words.join(", ")
 }

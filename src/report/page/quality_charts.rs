@@ -212,7 +212,7 @@ impl PairChart {
         let boxes = levels.map(|level| {
             let sides = |quantity| sides(specification.range_of(quantity, level));
             LevelBox {
-                label: level_label(level),
+                label: level_in_words(level, ""),
                 x: sides(self.x.0),
                 y: sides(self.y.0),
             }
@@ -296,12 +296,14 @@ fn sides(range: Range) -> (Option<f64>, Option<f64>) {
     (range.min, range.max)
 }
 
-fn level_label(level: Level) -> &'static str {
+/// Level in words; `worse` is the text for a level below all.
+#[must_use]
+pub fn level_in_words(level: Level, worse: &'static str) -> &'static str {
     match level {
         Level::One => "Level 1",
         Level::Two => "Level 2",
         Level::Three => "Level 3",
-        Level::Worse => "",
+        Level::Worse => worse,
     }
 }
 
