@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use flate2::read::MultiGzDecoder;
 use tempfile::NamedTempFile;
 
-use super::imported_contents::refused;
+use super::imported_contents::{refused, scratch_in, unwritable};
 use crate::error::{Error, Result};
 use crate::store::regular;
 
@@ -30,16 +30,10 @@ pub fn unpacked_name(path: &Path) -> PathBuf {
 
 /// Unpacks a file into a temporary one in a folder, which has the extension of the unpacked name.
 pub fn unpacked(source: &Path, folder: &Path) -> Result<NamedTempFile> {
-    std::fs::create_dir_all(folder).map_err(Error::io(folder, "cannot create the folder"))?;
-    let failed = |e| Error::io(folder, "cannot write a temporary file in it")(e);
     let extension = unpacked_name(source)
         .extension()
         .map_or_else(String::new, |e| format!(".{}", e.to_string_lossy()));
-    let mut builder = tempfile::Builder::new();
-    let mut unpacked = builder
-        .suffix(&extension)
-        .tempfile_in(folder)
-        .map_err(failed)?;
+    let mut unpacked = scratch_in(folder, &extension)?;
     let packed = regular::open(source).map_err(Error::io(source, "cannot open it"))?;
     let mut decoder = MultiGzDecoder::new(BufReader::new(packed)).take(LARGEST);
     let mut bytes = vec![0; 1 << 16];
@@ -53,11 +47,11 @@ pub fn unpacked(source: &Path, folder: &Path) -> Result<NamedTempFile> {
         let Some(bytes) = bytes.get(..count).filter(|bytes| !bytes.is_empty()) else {
             break;
         };
-        unpacked.write_all(bytes).map_err(failed)?;
+        unpacked.write_all(bytes).map_err(unwritable(folder))?;
     }
     if decoder.limit() == 0 {
         return Err(refused(source, "it unpacks to more than 64 GiB"));
     }
-    unpacked.flush().map_err(failed)?;
+    unpacked.flush().map_err(unwritable(folder))?;
     Ok(unpacked)
 }

@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
+use tempfile::NamedTempFile;
 
-use crate::error::Error;
+use crate::error::{Error, Result};
 
 /// A file that was imported.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -42,6 +43,19 @@ pub fn refused(source: &Path, what: &str) -> Error {
         place: source.to_owned(),
         what: what.to_owned(),
     }
+}
+
+/// Temporary file in a folder, which is made if it is missing; its name ends in `suffix`.
+pub fn scratch_in(folder: &Path, suffix: &str) -> Result<NamedTempFile> {
+    std::fs::create_dir_all(folder).map_err(Error::io(folder, "cannot create the folder"))?;
+    let mut builder = tempfile::Builder::new();
+    let file = builder.suffix(suffix).tempfile_in(folder);
+    file.map_err(unwritable(folder))
+}
+
+/// Error of writing a temporary file in a folder.
+pub fn unwritable(folder: &Path) -> impl FnOnce(std::io::Error) -> Error {
+    Error::io(folder, "cannot write a temporary file in it")
 }
 
 /// Error of a temporary file as one of the source that it was made from.

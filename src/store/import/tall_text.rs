@@ -14,7 +14,7 @@ use super::calendar_time::CalendarTime;
 use super::delimited::{
     Delimiter, Failures, HEAD_ROWS, fields, is_missing, name_and_unit, next_line, number,
 };
-use super::imported_contents::{ImportedContents, of_scratch, refused};
+use super::imported_contents::{ImportedContents, of_scratch, refused, scratch_in, unwritable};
 use super::tall::{self, Role, Tall};
 use crate::error::{Error, Result};
 use crate::store::recorder::{UNIT, properties};
@@ -116,10 +116,8 @@ impl TallLayout {
     /// Imports a text of this layout.
     pub fn import(&self, source: &Path, file: &Path) -> Result<ImportedContents> {
         let folder = file.parent().unwrap_or(Path::new("."));
-        std::fs::create_dir_all(folder).map_err(Error::io(folder, "cannot create the folder"))?;
-        let failed = |e| Error::io(folder, "cannot write a temporary file in it")(e);
-        let scratch = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;
-        let handle = scratch.reopen().map_err(failed)?;
+        let scratch = scratch_in(folder, "")?;
+        let handle = scratch.reopen().map_err(unwritable(folder))?;
         let failures = self.write_parquet(source, handle)?;
         // The temporary file is gone when the message is read.
         let of_source = |error| of_scratch(error, source);
