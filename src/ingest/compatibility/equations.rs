@@ -18,7 +18,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use super::parameters::{INPUTS, OUTPUTS, input, output};
 use crate::aircraft::{Aircraft, Flow, Position};
 use crate::dynamics::lever;
-use crate::earth::air;
+use crate::earth::{Air, air};
 use crate::numerics::trig::sin_cos;
 use crate::units::DEG;
 
@@ -261,8 +261,7 @@ pub fn readings(
     let (v, _) = velocity_at_cg(x, omega, terms);
     let speed = v.norm();
     let flow = flow(v, speed, omega);
-    let air = air(x[state::ALTITUDE]);
-    let air = air.at_temperature(terms.temperature_ratio * air.kelvin);
+    let air = air_at(x[state::ALTITUDE], terms.temperature_ratio);
     [
         DEG * aircraft.sensors.alpha_reading(&flow, terms.cg).angle,
         DEG * aircraft.sensors.beta_reading(&flow, terms.cg).angle,
@@ -274,6 +273,13 @@ pub fn readings(
         0.5 * air.density_slug_ft3 * speed * speed,
         speed / air.sound_ft_s,
     ]
+}
+
+/// Air at an altitude, of so many times the temperature of the standard atmosphere.
+#[inline(always)]
+fn air_at(altitude_ft: f64, temperature_ratio: f64) -> Air {
+    let standard = air(altitude_ft);
+    standard.at_temperature(temperature_ratio * standard.kelvin)
 }
 
 /// Flow of a velocity in body axes.
@@ -352,10 +358,7 @@ struct AirWithSlopes {
 
 impl AirWithSlopes {
     fn at(altitude_ft: f64, temperature_ratio: f64) -> AirWithSlopes {
-        let air = |altitude_ft: f64| {
-            let standard = air(altitude_ft);
-            standard.at_temperature(temperature_ratio * standard.kelvin)
-        };
+        let air = |altitude_ft: f64| air_at(altitude_ft, temperature_ratio);
         let here = air(altitude_ft);
         let up = air(altitude_ft + SLOPE_REACH_FT);
         let down = air(altitude_ft - SLOPE_REACH_FT);
