@@ -8,7 +8,7 @@ use super::settings::Doubtful;
 use super::task::Task;
 use crate::aero::Output;
 use crate::dynamics::{Equations, OUTPUTS};
-use crate::numerics::student::NORMAL_95;
+use crate::numerics::normal::NORMAL_95;
 use crate::output_error::equation_error::Regression;
 use crate::output_error::theil::OutputAgreement;
 use crate::output_error::{Case, Fit, InitialState, Outcome};

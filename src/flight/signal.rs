@@ -40,6 +40,16 @@ pub const IZ: &str = "iz_slug_ft2";
 /// +∫ x z dm in body axes.
 pub const IXZ: &str = "ixz_slug_ft2";
 
+/// Signals that harvest uses where a recorder has them.
+const OPTIONAL: [&str; 2] = [PSI, AIR_TEMPERATURE];
+
+/// `true` for a signal of harvest's own, required or optional, other than time: no name of the
+/// analyst's.
+#[must_use]
+pub fn is_own(signal: &str) -> bool {
+    REQUIRED.contains(&signal) || OPTIONAL.contains(&signal)
+}
+
 /// Required signals that are greater than zero in flight.
 pub const POSITIVE: &[&str] = &[VELOCITY, QBAR, MASS, IX, IY, IZ];
 

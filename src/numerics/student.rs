@@ -2,7 +2,7 @@
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-pub use super::normal::NORMAL_95;
+use super::normal::NORMAL_95;
 
 /// Least number of degrees of freedom of [`widening_95`]. With fewer, the variance's standard error
 /// exceeds the variance, and the delta method behind the degrees of freedom fails.

@@ -132,10 +132,7 @@ fn mistake(column: &str, channel: &Channel) -> Option<String> {
 /// Signal of the channel map that is probably this required one, misspelt. Signals that harvest has
 /// are not.
 fn misspelt<'a>(required: &str, signals: &[&'a str]) -> Option<&'a str> {
-    let is_other = |name: &&str| {
-        let known = [signal::TIME, signal::PSI];
-        !signal::REQUIRED.contains(name) && !known.contains(name)
-    };
+    let is_other = |name: &&str| !signal::is_own(name) && *name != signal::TIME;
     let others = signals.iter().copied().filter(is_other);
     let near = others.filter(|name| similarity(name, required) >= MISSPELT);
     near.max_by(|a, b| similarity(a, required).total_cmp(&similarity(b, required)))

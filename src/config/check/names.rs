@@ -25,8 +25,7 @@ pub(super) fn known_signal(config: &Config, source: &Source, name: &str, user: &
         return Ok(());
     }
     // A signal of harvest's own is not another one misspelt.
-    let is_own = signal::REQUIRED.contains(&name) || name == signal::PSI;
-    let near = if is_own {
+    let near = if signal::is_own(name) {
         String::new()
     } else {
         did_you_mean(name, signals(config))

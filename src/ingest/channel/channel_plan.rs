@@ -47,11 +47,7 @@ fn plan<'a>(
 ) -> Result<(Vec<ChannelPlan<'a>>, Vec<Problem>), Refusal> {
     let mut plans: BTreeMap<&str, ChannelPlan> = BTreeMap::new();
     let mut absent: Vec<(&str, Refusal)> = Vec::new();
-    let is_useless = |signal: &str| {
-        let is_known = [signal::PSI, signal::AIR_TEMPERATURE].contains(&signal)
-            || signal::REQUIRED.contains(&signal);
-        is_known && !signal::is_indispensable(signal)
-    };
+    let is_useless = |signal: &str| signal::is_own(signal) && !signal::is_indispensable(signal);
     let time = context
         .channels
         .iter()
