@@ -68,14 +68,31 @@ pub const SIGNALS: [&str; INSTRUMENTS] = [
 ];
 
 /// Outputs that depend on the motion along each input. Without the input their equations lack a
-/// term, and they are not compared.
+/// term, and they are not compared. Forward and downward velocity turn into each other with the pitch
+/// rate, so each needs both accelerations and the pitch attitude.
 const DECIDED_BY: [(&str, &[&str]); INPUTS] = [
     (s::P, &[s::PHI]),
-    (s::Q, &[s::THETA, s::ALPHA_VANE]),
+    (
+        s::Q,
+        &[
+            s::THETA,
+            s::ALPHA_VANE,
+            s::ALTITUDE,
+            s::VELOCITY,
+            s::QBAR,
+            s::MACH,
+        ],
+    ),
     (s::R, &[s::PSI, s::BETA_VANE]),
-    (s::AX, &[s::VELOCITY, s::QBAR, s::MACH]),
+    (
+        s::AX,
+        &[s::ALPHA_VANE, s::ALTITUDE, s::VELOCITY, s::QBAR, s::MACH],
+    ),
     (s::AY, &[s::BETA_VANE]),
-    (s::AN, &[s::ALPHA_VANE, s::ALTITUDE]),
+    (
+        s::AN,
+        &[s::ALPHA_VANE, s::ALTITUDE, s::VELOCITY, s::QBAR, s::MACH],
+    ),
 ];
 
 /// `true` for an output that depends on an input that is not recorded.

@@ -1011,6 +1011,25 @@ fn a_stand_in_is_no_instrument() {
     }
 }
 
+#[test]
+fn without_an_acceleration_no_other_instrument_is_blamed() {
+    let exact = flight(65.0);
+    for lacking in [s::AX, s::AN, s::AY] {
+        let (within, count) = coverage(&exact, 2, &[lacking]);
+        assert!(within > 0.9, "without {lacking}: {within:.3} of {count}");
+    }
+    let mut record = recorded(&exact, &ordinary(5), 5);
+    assume(&mut record, s::AN);
+    for window in windows(&record) {
+        let compared = window
+            .outputs
+            .iter()
+            .map(|v| v.iter().any(|v| v.is_finite()));
+        let expected = [false, true, false, true, true, true, false, false, false];
+        assert_eq!(compared.collect::<Vec<_>>(), expected);
+    }
+}
+
 /// One window of an exact flight, in which everything moves.
 fn exact_window() -> Window {
     windows(&flight(24.0)).remove(0)
