@@ -88,6 +88,17 @@ impl Coefficient {
     pub fn is_moment(self) -> bool {
         matches!(self, Coefficient::Cm | Coefficient::Cl | Coefficient::Cn)
     }
+
+    /// Output of the accelerometer that measures a force; `None` for a moment.
+    #[must_use]
+    pub fn accelerometer(self) -> Option<Output> {
+        match self {
+            Coefficient::CN => Some(Output::An),
+            Coefficient::CA => Some(Output::Ax),
+            Coefficient::CY => Some(Output::Ay),
+            Coefficient::Cm | Coefficient::Cl | Coefficient::Cn => None,
+        }
+    }
 }
 
 words! {
@@ -132,6 +143,13 @@ impl Output {
             Output::Phi => signal::PHI,
             Output::Ay => signal::AY,
         }
+    }
+
+    /// Returns true for a measured state. Without one its axis is not estimated; an acceleration
+    /// that is not recorded is only left out of the likelihood.
+    #[must_use]
+    pub fn is_state(self) -> bool {
+        !matches!(self, Output::An | Output::Ax | Output::Ay)
     }
 
     /// Returns true for an attitude, the integral of the rates.

@@ -46,33 +46,35 @@ impl Config {
     /// One line for all absent signals that cost the same.
     fn absent_signals(&self) -> Vec<String> {
         let required = signal::REQUIRED.iter().copied();
-        let lacking = required.filter(|signal| !self.has_signal(signal));
+        let has = |signal: &str| self.has_signal(signal);
+        let lacking = required.filter(|signal| !has(signal));
         // Without a rotor's inertia its speed has no effect.
         let has_rotors = self.aircraft.engine_inertia_slug_ft2 > 0.0;
         let is_rotor = |signal: &str| [signal::RPM_LEFT, signal::RPM_RIGHT].contains(&signal);
         let mut costs: Vec<(&str, Vec<(&str, String)>)> = Vec::new();
         for signal in lacking.filter(|signal| has_rotors || !is_rotor(signal)) {
-            let Some(stand_in) = StandIn::of(signal, |other| self.has_signal(other)) else {
+            let Some(stand_in) = StandIn::of(signal, has) else {
                 continue;
             };
-            let (own, absent) = (cost(signal), (signal, stand_in.in_words()));
+            let (own, absent) = (cost(signal, has), (signal, stand_in.in_words()));
             match costs.iter_mut().find(|(cost, _)| *cost == own) {
                 Some((_, signals)) => signals.push(absent),
                 None => costs.push((own, vec![absent])),
             }
         }
         let mut lines: Vec<String> = costs.iter().map(|(cost, s)| absence(s, cost)).collect();
-        if !self.has_signal(signal::PSI) {
-            lines.push(format!("no `{}`: {}", signal::PSI, cost(signal::PSI)));
+        if !has(signal::PSI) {
+            let cost = cost(signal::PSI, has);
+            lines.push(format!("no `{}`: {cost}", signal::PSI));
         }
         lines
     }
 
-    /// Axes whose outputs are not all recorded, with the classes that no maneuver can have.
+    /// Axes whose states are not all recorded, with the classes that no maneuver can have.
     fn lost_axes(&self) -> Vec<String> {
         let line = |axis: Axis| {
-            let outputs = axis.outputs().into_iter();
-            let lacking = outputs.map(Output::signal);
+            let states = axis.outputs().into_iter().filter(|o| o.is_state());
+            let lacking = states.map(Output::signal);
             let lacking = lacking.filter(|signal| !self.is_recorded(signal));
             let lacking: Vec<&str> = lacking.collect();
             let classes = self.classes.iter().filter(|class| class.axis == axis);

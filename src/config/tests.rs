@@ -502,7 +502,7 @@ fn a_regressor_in_another_spelling_is_answered_with_harvest_s() {
 fn a_required_signal_without_a_source_has_its_remedies() {
     let copy = Copy::new();
     let lines = [
-        "  an: { signal: an_g, unit: g }\n",
+        "  theta: { signal: theta_deg, unit: deg }\n",
         "  phi: { signal: phi_deg, unit: deg }\n",
     ];
     for line in lines {
@@ -510,9 +510,9 @@ fn a_required_signal_without_a_source_has_its_remedies() {
     }
     let error = copy.error();
     for words in [
-        "gives the signal `phi_deg`: give a line",
+        "gives the signal `theta_deg`: give a line",
         "formula",
-        "all of `q_deg_s`",
+        "all of `beta_vane_deg`",
     ] {
         assert!(error.contains(words), "`{words}` is not in {error}");
     }

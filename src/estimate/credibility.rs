@@ -38,12 +38,8 @@ impl<const NX: usize, E: Equations<NX>> Credibility<'_, '_, NX, E> {
     pub fn add_to(&self, estimated: &mut Estimated) {
         let outputs = self.explanation.outputs;
         let agreements = outputs.map(|y| OutputAgreement::of_outputs(&self.case.measurements, y));
-        let named = E::AXIS
-            .outputs()
-            .into_iter()
-            .zip(agreements.iter().flatten());
         let rows = RowMaker::new(self.task);
-        estimated.fit_outputs = named.map(|(o, a)| rows.agreement_row(o, a)).collect();
+        estimated.fit_outputs = agreements.map_or_else(Vec::new, |a| rows.agreement_rows(&a));
         let distance = Distance::between(self.fit, self.explanation.second_opinion);
         let row = &mut estimated.fit;
         row.equation_error_distance = distance.map(|d| d.per_derivative());

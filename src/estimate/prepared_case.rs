@@ -3,8 +3,8 @@
 use super::task::Task;
 use crate::aero::Output;
 use crate::aircraft::Aircraft;
+use crate::dynamics::Equations;
 use crate::dynamics::motion::Window;
-use crate::dynamics::{Equations, OUTPUTS};
 use crate::maneuver::Maneuver;
 use crate::output_error::surface_noise::noisy_surfaces;
 use crate::output_error::{Case, Model, NoisyInputs, pressure_noise};
@@ -16,7 +16,7 @@ pub(super) struct PreparedCase<'a, const NX: usize, E: Equations<NX>> {
     pub surfaces: Vec<&'a str>,
     pub window: Window,
     pub case: Case<NX, E>,
-    /// Share of the output samples that the cost leaves out.
+    /// Share of the recorded output samples that the cost leaves out.
     pub left_out: f64,
 }
 
@@ -45,7 +45,8 @@ impl<'a, const NX: usize, E: Equations<NX>> PreparedCase<'a, NX, E> {
         let measurements = task.measurements(&range)?;
         let mut case = Case::<NX, E>::new(task.context.aircraft, &window, measurements, &model);
         let counted: usize = case.used().iter().sum();
-        let left_out = 1.0 - counted as f64 / (OUTPUTS * case.samples()).max(1) as f64;
+        let recorded = task.recorded_outputs().count() * case.samples();
+        let left_out = 1.0 - counted as f64 / recorded.max(1) as f64;
         if counted <= case.parameters() {
             return Err(format!(
                 "{counted} output samples for {} parameters",
@@ -77,11 +78,8 @@ impl<'a, const NX: usize, E: Equations<NX>> PreparedCase<'a, NX, E> {
 fn check_marked_share(task: &Task, surfaces: &[&str]) -> Result<(), String> {
     let Maneuver { start_s, end_s, .. } = *task.maneuver;
     let most = task.context.settings.max_marked_share;
-    let outputs = task.record.marked_share(
-        task.class.axis.outputs().map(Output::signal),
-        start_s,
-        end_s,
-    );
+    let outputs = task.recorded_outputs().map(Output::signal);
+    let outputs = task.record.marked_share(outputs, start_s, end_s);
     if outputs > most {
         return Err(format!(
             "{:.0}% of its output samples are marked",

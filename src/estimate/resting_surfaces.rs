@@ -27,7 +27,8 @@ pub(super) fn class_of_moving_surfaces(task: &Task) -> (Class, BTreeSet<String>)
         Hold::Table => derivatives_at_rest(task),
         Hold::Evidence => BTreeSet::new(),
     };
-    (task.class.with_inactive(&resting), resting)
+    let class = task.class.with_status(&resting, Status::Inactive);
+    (class, resting)
 }
 
 /// Derivatives to be estimated whose surfaces rest.

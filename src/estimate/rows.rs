@@ -128,8 +128,19 @@ impl<'t, 'a> RowMaker<'t, 'a> {
         }
     }
 
+    /// Rows of the recorded outputs' agreements with computed ones, in the order of the axis.
+    pub fn agreement_rows(&self, agreements: &[OutputAgreement]) -> Vec<AgreementRow> {
+        let outputs = self.task.class.axis.outputs().into_iter();
+        let recorded = outputs
+            .zip(agreements)
+            .filter(|(output, _)| !self.task.is_absent(*output));
+        recorded
+            .map(|(output, agreement)| self.agreement_row(output, agreement))
+            .collect()
+    }
+
     /// Row of an output's agreement with a computed one.
-    pub fn agreement_row(&self, output: Output, agreement: &OutputAgreement) -> AgreementRow {
+    fn agreement_row(&self, output: Output, agreement: &OutputAgreement) -> AgreementRow {
         let theil = agreement.theil();
         AgreementRow {
             maneuver_id: self.task.maneuver.maneuver_id.clone(),
@@ -163,8 +174,9 @@ impl<'t, 'a> RowMaker<'t, 'a> {
         window: &Window,
         surfaces: &[&str],
     ) -> History {
-        let outputs = self.task.class.axis.outputs().into_iter();
-        let outputs = outputs.enumerate().map(|(o, output)| HistoryOutput {
+        let outputs = self.task.class.axis.outputs().into_iter().enumerate();
+        let recorded = outputs.filter(|(_, output)| !self.task.is_absent(*output));
+        let outputs = recorded.map(|(o, output)| HistoryOutput {
             label: output.signal().to_owned(),
             unit: Unit::of_signal(output.signal()).name.to_owned(),
             measured: measured.values.iter().map(|z| z[o]).collect(),

@@ -13,8 +13,8 @@ use super::estimated::{Covariance, Estimated};
 use super::filter_minimum::NoMinimum;
 use super::fitting::{StartingPoints, fit_output_error};
 use super::held_by_evidence::{choose_held, undetermined_without_tunnel};
+use super::maneuver_class::class_of_maneuver;
 use super::prepared_case::PreparedCase;
-use super::resting_surfaces::class_of_moving_surfaces;
 use super::rows::RowMaker;
 use super::second_opinion::add_second_opinion;
 use super::settings::Hold;
@@ -34,9 +34,6 @@ use crate::tables::{EstimationMethod, StartingValues};
 /// sensors, and not gusts.
 const OF_SENSORS: &str = "; the residuals are coloured noise of the sensors";
 
-/// Reason why a derivative that the class estimates is inactive in a maneuver.
-const RESTS: &str = "its surface rests";
-
 /// Estimates one maneuver. A failure is reported in the outcome.
 #[must_use]
 pub fn maneuver(
@@ -54,10 +51,20 @@ pub fn maneuver(
     if maneuver.is_rejected() {
         return RowMaker::new(&task).rejected(maneuver.quality.reason.clone());
     }
-    match context.settings.hold {
-        Hold::Table => estimate_by_moving_surfaces(&task),
+    let (class, reasons) = class_of_maneuver(&task);
+    let task = Task {
+        class: &class,
+        ..task
+    };
+    let mut estimated = match context.settings.hold {
+        Hold::Table => estimate_by_class(&task),
         Hold::Evidence => estimate_by_evidence(&task),
+    };
+    for row in &mut estimated.estimates {
+        let reason = reasons.get(&row.derivative).cloned();
+        row.held_because = reason.or_else(|| row.held_because.take());
     }
+    estimated
 }
 
 /// Estimates with the derivatives held that the class holds.
@@ -67,21 +74,6 @@ fn estimate_by_class(task: &Task) -> Estimated {
         Axis::Lateral => estimate::<4, Lateral, 6, LateralInGusts>(task),
     };
     estimated.unwrap_or_else(|reason| RowMaker::new(task).rejected(reason))
-}
-
-/// Estimates as the class does, without the derivatives of surfaces that rest.
-fn estimate_by_moving_surfaces(task: &Task) -> Estimated {
-    let (class, resting) = class_of_moving_surfaces(task);
-    let task = Task {
-        class: &class,
-        ..*task
-    };
-    let mut estimated = estimate_by_class(&task);
-    let rows = estimated.estimates.iter_mut();
-    for row in rows.filter(|row| resting.contains(&row.derivative)) {
-        row.held_because = Some(RESTS.to_owned());
-    }
-    estimated
 }
 
 /// Estimates with the derivatives held that the maneuver's own evidence holds.

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use super::context::Context;
 use super::settings::InactiveSurfaces;
-use crate::aero::{Bias, Derivative, Regressor};
+use crate::aero::{Bias, Derivative, Output, Regressor};
 use crate::dynamics::OUTPUTS;
 use crate::flight::{Mark, Record};
 use crate::maneuver::{Class, Maneuver, Status};
@@ -79,7 +79,9 @@ impl<'a> Task<'a> {
                 Some(Status::Estimated) => model.free.push(derivative),
                 Some(Status::Held) => model.held.push((derivative, self.held_value(derivative)?)),
                 Some(Status::Inactive) | None => {
-                    if basis.settings.inactive_surfaces == InactiveSurfaces::WindTunnel {
+                    let acts = basis.settings.inactive_surfaces == InactiveSurfaces::WindTunnel
+                        && self.has_regressor(derivative);
+                    if acts {
                         model.held.extend(
                             self.tunnel_value(&derivative.name)
                                 .map(|value| (derivative, value)),
@@ -95,6 +97,30 @@ impl<'a> Task<'a> {
             .filter(free)
             .collect();
         Ok(model)
+    }
+
+    /// Absent output that the regressor of a derivative follows from: the measured α̇ (2.1) needs
+    /// normal and axial acceleration.
+    pub(super) fn absent_of_regressor(&self, derivative: &Derivative) -> Option<Output> {
+        let needs = derivative.regressor.has_alpha_rate();
+        let mut accelerations = [Output::An, Output::Ax].into_iter();
+        accelerations.find(|output| needs && self.is_absent(*output))
+    }
+
+    /// Returns true if the regressor of a derivative follows from recorded signals.
+    fn has_regressor(&self, derivative: &Derivative) -> bool {
+        self.absent_of_regressor(derivative).is_none()
+    }
+
+    /// Returns true for an output that is not recorded: the record has a stand-in for it.
+    pub(super) fn is_absent(&self, output: Output) -> bool {
+        self.record.is_assumed(output.signal())
+    }
+
+    /// Outputs of the axis that are recorded.
+    pub(super) fn recorded_outputs(&self) -> impl Iterator<Item = Output> {
+        let outputs = self.class.axis.outputs().into_iter();
+        outputs.filter(|output| !self.is_absent(*output))
     }
 
     /// Model with everything free that the class estimates or holds.

@@ -61,8 +61,11 @@ pub(super) fn white_cost(measurements: &Measurements, fit: &Fit) -> Option<f64> 
         let both = measurements.values.iter().zip(&fit.response.outputs);
         let counted = both.zip(&measurements.used).filter(|(_, used)| used[o]);
         let squares: Vec<f64> = counted.map(|((z, y), _)| (z[o] - y[o]).powi(2)).collect();
+        if squares.is_empty() {
+            continue;
+        }
         let count = squares.len() as f64;
-        let variance = squares.iter().sum::<f64>() / count.max(1.0);
+        let variance = squares.iter().sum::<f64>() / count;
         cost += 0.5 * count * (variance.ln() + 1.0);
     }
     cost.is_finite().then_some(cost)

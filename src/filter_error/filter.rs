@@ -193,6 +193,12 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         &self.noise_parameters
     }
 
+    /// Returns true if a sample of an output counts.
+    #[must_use]
+    pub fn measures(&self, output: usize) -> bool {
+        self.patterns.iter().any(|pattern| pattern.used[output])
+    }
+
     /// Noise of these parameters.
     #[must_use]
     pub fn noise(&self, parameters: &[f64]) -> Noise {

@@ -200,15 +200,25 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
         own.into_iter().chain(noise).collect()
     }
 
-    /// Marks parameters as fixed: all noise if it is known; else corner and correlations of those
-    /// rotary gusts whose size is fixed.
+    /// Marks parameters as fixed: all noise if it is known; else the noise of outputs that never count,
+    /// and corner and correlations of those rotary gusts whose size is fixed.
     pub(super) fn fix_noise(&self, free: &mut [bool]) {
         if self.noise_is_known {
             free[self.first_noise()..].fill(false);
         }
         for (member, filter) in self.filters.iter().enumerate() {
             let noise = &mut free[self.noise_places(member)];
+            fix_unmeasured(filter, noise);
             fix_without_effect(filter.noise_parameters(), E::FELT_RATES.len(), noise);
+        }
+    }
+}
+
+/// Marks the noise of outputs that never count as fixed.
+fn fix_unmeasured<const NX: usize, E: InGusts<NX>>(filter: &Filter<NX, E>, free: &mut [bool]) {
+    for (kind, free) in filter.noise_parameters().iter().zip(free) {
+        if let NoiseParameter::Output(output) = kind {
+            *free &= filter.measures(*output);
         }
     }
 }

@@ -61,7 +61,17 @@ impl<const NX: usize> Linearised<NX> {
         for sample in samples {
             linearised.add_sample(case, sample, share);
         }
+        for output in (0..OUTPUTS).filter(|&o| !case.measurements.have(o)) {
+            linearised.clear_output(output);
+        }
         linearised
+    }
+
+    /// Clears the slopes of an output that never counts, so that the steady filter takes nothing from it.
+    fn clear_output(&mut self, output: usize) {
+        for slopes in self.free.iter_mut().chain([&mut self.held]) {
+            slopes.outputs.row_mut(output).fill(0.0);
+        }
     }
 
     fn add_sample<E: Equations<NX>>(&mut self, case: &Case<NX, E>, sample: usize, share: f64) {

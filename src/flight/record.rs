@@ -132,6 +132,12 @@ impl Record {
         self.signals.get(signal).is_some_and(|s| !s.is_assumed())
     }
 
+    /// `true` for a constant, or for the stand-in of a signal that is not recorded.
+    #[must_use]
+    pub fn is_assumed(&self, signal: &str) -> bool {
+        self.signals.get(signal).is_some_and(Series::is_assumed)
+    }
+
     /// Share of samples with a fault among some signals from one time to another. A signal that the
     /// record does not have counts as missing throughout.
     #[must_use]

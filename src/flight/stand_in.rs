@@ -30,13 +30,13 @@ pub enum StandIn {
     ThetaOfAlpha,
 }
 
-/// Signals that only the lateral derivatives need. Without one of them the longitudinal equations
+/// States that only the lateral derivatives need. Without one of them the longitudinal equations
 /// assume straight flight with level wings.
-pub const LATERAL: [&str; 5] = [s::BETA_VANE, s::P, s::R, s::PHI, s::AY];
+pub const LATERAL: [&str; 4] = [s::BETA_VANE, s::P, s::R, s::PHI];
 
-/// Signals that only the longitudinal derivatives need. α is not among them: the lateral equations
+/// States that only the longitudinal derivatives need. α is not among them: the lateral equations
 /// need it, at least as a constant.
-pub const LONGITUDINAL: [&str; 4] = [s::Q, s::THETA, s::AN, s::AX];
+pub const LONGITUDINAL: [&str; 2] = [s::Q, s::THETA];
 
 impl StandIn {
     /// Stand-in of a signal, if it can have one. `has` is `true` for a signal that is recorded or
@@ -54,8 +54,9 @@ impl StandIn {
             }
             s::ALTITUDE if has_all(&[s::VELOCITY, s::QBAR]) => Some(StandIn::AltitudeOfPressure),
             s::THETA if has_all(&LATERAL) => Some(StandIn::ThetaOfAlpha),
-            s::AN if has_all(&LATERAL) => Some(StandIn::Value(1.0)),
-            s::Q | s::AX if has_all(&LATERAL) => Some(StandIn::Value(0.0)),
+            s::Q if has_all(&LATERAL) => Some(StandIn::Value(0.0)),
+            s::AN => Some(StandIn::Value(1.0)),
+            s::AX | s::AY => Some(StandIn::Value(0.0)),
             lateral if LATERAL.contains(&lateral) => {
                 has_all(&LONGITUDINAL).then_some(StandIn::Value(0.0))
             }
@@ -168,9 +169,11 @@ pub fn stand_ins(has: impl Fn(&str) -> bool) -> Result<Vec<(String, StandIn)>, &
     lacking.map(of_signal).collect()
 }
 
-/// Cost of the absence of a signal, in words.
+/// Cost of the absence of a signal, in words. `has` is `true` for a signal that is recorded or given
+/// as a constant.
 #[must_use]
-pub fn cost(signal: &str) -> &'static str {
+pub fn cost(signal: &str, has: impl Fn(&str) -> bool) -> &'static str {
+    let has_all = |signals: &[&str]| signals.iter().all(|signal| has(signal));
     match signal {
         s::RPM_LEFT | s::RPM_RIGHT => {
             "the gyroscopic moment of this engine is charged to the moments of q and r"
@@ -185,10 +188,19 @@ pub fn cost(signal: &str) -> &'static str {
         }
         s::ALTITUDE => "gravity and the density have the error of the other air data",
         s::PSI => "the errors of the other instruments are found with larger bounds",
-        signal if LATERAL.contains(&signal) => {
+        s::AY if has_all(&LATERAL) => {
+            "the CY derivatives follow from the motion of beta alone, with larger bounds"
+        }
+        s::AN if has_all(&LONGITUDINAL) => {
+            "the CN derivatives follow from the motion of alpha alone, with larger bounds"
+        }
+        s::AX if has_all(&LONGITUDINAL) => {
+            "the CA derivatives are not estimated: they are held at the tunnel's values, and count as zero without one"
+        }
+        signal if LATERAL.contains(&signal) || signal == s::AY => {
             "there are no lateral derivatives; the longitudinal ones take level wings without sideslip"
         }
-        signal if LONGITUDINAL.contains(&signal) => {
+        signal if LONGITUDINAL.contains(&signal) || [s::AN, s::AX].contains(&signal) => {
             "there are no longitudinal derivatives; the lateral ones take level flight"
         }
         _ => "nothing stands for it",
@@ -237,6 +249,18 @@ mod tests {
         for needed in [s::MASS, s::IX, s::IY, s::IZ, s::X_CG, s::ALPHA_VANE] {
             assert_eq!(StandIn::of(needed, all_but(&[needed])), None, "{needed}");
         }
+    }
+
+    #[test]
+    fn an_acceleration_costs_its_own_derivatives_and_no_axis_while_the_states_are_recorded() {
+        let all = [s::AN, s::AX, s::AY];
+        for (absent, coefficient) in all.into_iter().zip(["CN", "CA", "CY"]) {
+            assert!(StandIn::of(absent, all_but(&all)).is_some(), "{absent}");
+            let alone = cost(absent, all_but(&[absent]));
+            assert!(alone.contains(coefficient), "{alone}");
+        }
+        let with_axis = cost(s::AY, all_but(&[s::AY, s::BETA_VANE]));
+        assert_eq!(with_axis, cost(s::P, all_but(&[s::P])));
     }
 
     #[test]

@@ -192,16 +192,16 @@ impl Class {
         class
     }
 
-    /// The class with these derivatives inactive at all angles of attack.
+    /// The class with these derivatives and biases of one status at all angles of attack.
     #[must_use]
-    pub fn with_inactive(&self, names: &BTreeSet<String>) -> Class {
+    pub fn with_status(&self, names: &BTreeSet<String>, own: Status) -> Class {
         let mut class = self.clone();
         let overrides = class.overrides.iter_mut().map(|o| &mut o.statuses);
         for statuses in std::iter::once(&mut class.statuses).chain(overrides) {
             let named = statuses
                 .iter_mut()
                 .filter(|(name, _)| names.contains(*name));
-            named.for_each(|(_, status)| *status = Status::Inactive);
+            named.for_each(|(_, status)| *status = own);
         }
         class
     }

@@ -14,7 +14,7 @@ use super::recording::ManeuverRecording;
 use super::repeat_flight::{self, Probabilities, Repeats};
 use super::specification::{Specification, Test};
 use super::start::{self, MatchedStart};
-use crate::aero::{Axis, Buildup, WindTunnel};
+use crate::aero::{Axis, Buildup, Coefficient, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::flight::Record;
 use crate::maneuver::{Maneuver, Means};
@@ -195,6 +195,14 @@ impl<'a> RepeatableManeuver<'a> {
             .collect();
         if tests.is_empty() {
             return Err("no test judges its class".to_owned());
+        }
+        let coefficients = maneuver.axis.coefficients().into_iter();
+        let absent = coefficients
+            .filter_map(Coefficient::accelerometer)
+            .find(|output| record.is_assumed(output.signal()));
+        if let Some(output) = absent {
+            let signal = output.signal();
+            return Err(format!("its trim needs `{signal}`, which is not recorded"));
         }
         let aircraft = (basis.aircraft, basis.buildup);
         Ok(RepeatableManeuver {

@@ -6,7 +6,6 @@ use std::ops::RangeInclusive;
 
 use super::settings::{Actuator, QualityLimits};
 use crate::aero::{Axis, Output};
-use crate::flight::record::Series;
 use crate::flight::{Record, signal};
 use crate::maneuver::{Acceptance, Class, Maneuver, Quality};
 use crate::numerics::differences;
@@ -67,7 +66,7 @@ pub(super) fn measure(
         marked_share: marked_share(record, class, maneuver),
         ..Quality::default()
     };
-    let not_recorded = outputs_not_recorded(record, class.axis);
+    let not_recorded = states_not_recorded(record, class.axis);
     let beyond = reasons(&measured, limits);
     let all: Vec<&str> = not_recorded
         .iter()
@@ -87,11 +86,12 @@ pub(super) fn measure(
     }
 }
 
-/// The reason for which the axis cannot be estimated: outputs that have stand-ins in the record.
-fn outputs_not_recorded(record: &Record, axis: Axis) -> Option<String> {
-    let outputs = axis.outputs().into_iter().map(Output::signal);
-    let lacking: Vec<&str> = outputs
-        .filter(|signal| record.signals.get(*signal).is_some_and(Series::is_assumed))
+/// The reason for which the axis cannot be estimated: states that have stand-ins in the record.
+fn states_not_recorded(record: &Record, axis: Axis) -> Option<String> {
+    let states = axis.outputs().into_iter().filter(|o| o.is_state());
+    let lacking: Vec<&str> = states
+        .map(Output::signal)
+        .filter(|signal| record.is_assumed(signal))
         .collect();
     (!lacking.is_empty()).then(|| format!("{} is not recorded", lacking.join(", ")))
 }
@@ -293,10 +293,9 @@ fn is_at_full_rate(actuator: &Actuator, values: &[f64], step_s: f64) -> bool {
 /// Share of flagged samples in the recorded signals among the axis's outputs and the class's
 /// inputs.
 fn marked_share(record: &Record, class: &Class, maneuver: &Maneuver) -> Option<f64> {
-    let outputs = class.axis.outputs();
+    let outputs = class.axis.outputs().map(Output::signal).into_iter();
     let names = outputs
-        .iter()
-        .map(|o| o.signal())
+        .filter(|signal| !record.is_assumed(signal))
         .chain(class.recognition.inputs());
     let recorded: Vec<&str> = names
         .filter(|name| record.signals.contains_key(*name))

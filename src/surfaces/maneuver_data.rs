@@ -11,7 +11,7 @@ use crate::aero::{Axis, Buildup, Derivative, Regressor, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::{MassProperties, Window, slope_reach};
 use crate::dynamics::{COEFFICIENTS, Equations, Lateral, Longitudinal};
-use crate::flight::Record;
+use crate::flight::{Record, signal};
 use crate::maneuver::Maneuver;
 use crate::output_error::{Case, InitialState, Measurements, Model};
 
@@ -104,8 +104,13 @@ impl ManeuverData {
         };
         let implied = |k: usize| case.motion.implied.iter().map(|c| c[k]).collect();
         let implied: Vec<Vec<f64>> = (0..COEFFICIENTS).map(implied).collect();
+        let is_measured = |k: usize| {
+            let accelerometer = E::AXIS.coefficients()[k].accelerometer();
+            accelerometer.is_none_or(|output| !record.is_assumed(output.signal()))
+        };
         let coefficients = band.spectra(&implied).into_iter().enumerate();
         let coefficients = coefficients
+            .filter(|(k, _)| is_measured(*k))
             .map(|(k, mut implied)| {
                 if E::AXIS.coefficients()[k].is_moment() {
                     divide(&mut implied, &slope_response);
@@ -138,12 +143,16 @@ fn regressors<const NX: usize, E: Equations<NX>>(
     first.into_keys().zip(band.shifted(&series)).collect()
 }
 
-/// Derivatives of an axis without the constants, which the mean removes, and without surfaces that
-/// are not recorded.
+/// Derivatives of an axis without the constants, which the mean removes, and without those whose
+/// regressors follow from signals that are not recorded.
 fn derivatives<'a>(record: &Record, axis: Axis, buildup: &'a Buildup) -> Vec<&'a Derivative> {
+    let has_alpha_rate = [signal::AN, signal::AX]
+        .iter()
+        .all(|s| record.is_recorded(s));
     let is_recorded = |d: &&Derivative| {
         let mut signals = d.regressor.signals();
-        signals.all(|s| record.signals.contains_key(s))
+        let has_regressor = has_alpha_rate || !d.regressor.has_alpha_rate();
+        has_regressor && signals.all(|s| record.signals.contains_key(s))
     };
     buildup
         .derivatives_of(axis)

@@ -76,6 +76,74 @@ fn a_flight_without_what_its_axis_does_not_need_is_estimated_all_the_same() {
 }
 
 #[test]
+fn an_acceleration_that_is_not_recorded_costs_its_derivatives_only() {
+    let whole = Campaign::of_pitch_steps();
+    whole.ends("estimate", 0);
+    let whole = whole.table("estimates");
+    for (channel, cost) in [
+        ("ax", "CA derivatives are not estimated"),
+        ("an", "from the motion of alpha alone"),
+    ] {
+        let estimates = estimates_without(&pitch_steps(), &[channel], cost);
+        for derivative in ["Cm_de", "Cm_alpha", "CN_alpha"] {
+            let (own, with_all) = (
+                estimate(&estimates, derivative),
+                estimate(&whole, derivative),
+            );
+            let apart = (number(own, "value") - number(with_all, "value")).abs();
+            let bound = number(own, "bound_corrected");
+            assert!(apart < 2.0 * bound, "{channel}: {own:?} {with_all:?}");
+            assert!(
+                bound > 0.9 * number(with_all, "bound_corrected"),
+                "{own:?} {with_all:?}"
+            );
+        }
+        let axial = estimate(&estimates, "CA_alpha");
+        let status = if channel == "ax" { "held" } else { "estimated" };
+        assert_eq!(axial["status"], status, "{axial:?}");
+    }
+}
+
+#[test]
+fn a_pipeline_without_accelerometers_is_valid_and_check_reports_the_cost_of_each() {
+    let campaign = Campaign::of_pitch_steps();
+    campaign.copy_pipeline();
+    for (channel, uncertainty) in [("an", 0.01), ("ax", 0.005), ("ay", 0.005)] {
+        let line = format!("  {channel}: {{ signal: {channel}_g, unit: g }}\n");
+        let instrument = format!(
+            "  {channel}_g:\n    uncertainty: {{ bias: {uncertainty}, scale_pct: 0.1 }}\n    \
+             ordinary: {{ bias: 0.01, scale_pct: 0.3 }}\n    fault: {{ bias: 0.05, scale_pct: 5 }}\n"
+        );
+        campaign.edit("aircraft.yaml", &line, "");
+        campaign.edit("aircraft.yaml", &instrument, "");
+    }
+    let check = campaign.ends("check", 0).stdout;
+    for words in [
+        "without    no `an_g`: it is taken as 1; the CN derivatives follow from the motion of alpha",
+        "without    no `ax_g`: it is taken as 0; the CA derivatives are not estimated",
+        "without    no `ay_g`: it is taken as 0; the CY derivatives follow from the motion of beta",
+    ] {
+        assert!(check.contains(words), "`{words}` is not in\n{check}");
+    }
+    assert!(!check.contains("found and not estimated"), "{check}");
+}
+
+#[test]
+fn a_lateral_maneuver_does_without_lateral_acceleration() {
+    let whole = Campaign::new();
+    whole.add("flight_001", &yaw_and_roll_steps());
+    whole.ends("estimate", 0);
+    let whole = whole.table("estimates");
+    let cost = "from the motion of beta alone";
+    let estimates = estimates_without(&yaw_and_roll_steps(), &["ay"], cost);
+    for derivative in ["Cl_da", "Cn_dr", "Cn_beta"] {
+        agree(&estimates, &whole, derivative, 3.0);
+    }
+    let bound = |rows: &[Row]| number(estimate(rows, "CY_beta"), "bound_corrected");
+    assert!(bound(&estimates) > bound(&whole));
+}
+
+#[test]
 fn a_lateral_maneuver_does_without_the_longitudinal_channels() {
     let whole = Campaign::new();
     whole.add("flight_001", &yaw_and_roll_steps());

@@ -13,11 +13,13 @@ mod bins;
 mod by_filter_error;
 mod by_output_error;
 mod member;
+mod recorded_alike;
 
 use serde::{Deserialize, Serialize};
 
 use self::by_filter_error::OwnEstimate;
 use self::member::{Fitted, Member};
+use self::recorded_alike::RecordedAlike;
 use super::context::Context;
 use super::estimated::{Estimated, rejected_fit};
 use super::rows::RowMaker;
@@ -54,16 +56,22 @@ pub fn estimate(
 ) -> Joined {
     let all: Vec<&Maneuver> = members.iter().map(|(_, m)| *m).collect();
     let class = class.at(mean_of(&all, |m| m.alpha_deg));
+    let group = RecordedAlike::new(members, &class, context);
     let request = Request {
         joint_id,
-        members,
-        class: &class,
+        members: &group.members,
+        class: &group.class,
         context,
     };
-    match class.axis {
-        Axis::Longitudinal => request.estimate::<3, Longitudinal, 4, LongitudinalInGusts>(doubtful),
-        Axis::Lateral => request.estimate::<4, Lateral, 6, LateralInGusts>(doubtful),
+    let left_out = [doubtful, &group.left_out].concat();
+    let mut joined = match class.axis {
+        Axis::Longitudinal => request.estimate::<3, Longitudinal, 4, LongitudinalInGusts>(left_out),
+        Axis::Lateral => request.estimate::<4, Lateral, 6, LateralInGusts>(left_out),
+    };
+    for row in &mut joined.estimated.estimates {
+        row.held_because = group.reasons.get(&row.derivative).cloned();
     }
+    joined
 }
 
 /// Maneuvers to be joined.
@@ -87,9 +95,9 @@ impl<'r> Request<'r> {
     /// all residuals of output error are white.
     fn estimate<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
         &self,
-        doubtful: &[(&'r Maneuver, String)],
+        mut left_out: LeftOut<'r>,
     ) -> Joined {
-        let (mut members, mut left_out) = (Vec::new(), doubtful.to_vec());
+        let mut members = Vec::new();
         for &(record, maneuver) in self.members {
             match Member::<NX, E>::new(self.task(record, maneuver)) {
                 Ok(member) => members.push(member),

@@ -20,9 +20,9 @@ use serde::{Deserialize, Serialize};
 use self::mean_of_others::mean_derivatives;
 use super::context::Context;
 use super::estimated::Estimated;
+use super::maneuver_class::class_of_maneuver;
 use super::maneuver_filter::new_filter;
 use super::prepared_case::PreparedCase;
-use super::resting_surfaces::class_of_moving_surfaces;
 use super::rows::RowMaker;
 use super::settings::Hold;
 use super::settings::PredictionSettings;
@@ -114,7 +114,7 @@ pub fn maneuver(
         class,
         context,
     };
-    let (class, _) = class_of_moving_surfaces(&task);
+    let (class, _) = class_of_maneuver(&task);
     let task = Task {
         class: &class,
         ..task
@@ -282,7 +282,6 @@ fn prediction_rows<const NX: usize, E: Equations<NX>>(
     let weighted: Vec<(OutputAgreement, f64)> =
         agreements.iter().copied().zip(prediction.weights).collect();
     let named = || task.class.axis.outputs().into_iter().zip(&agreements);
-    let row_maker = RowMaker::new(task);
     let whole = theil::theil(&weighted);
     let summary = PredictedRow {
         prediction: Some(PredictionStatus::Predicted),
@@ -301,8 +300,6 @@ fn prediction_rows<const NX: usize, E: Equations<NX>>(
     };
     Predicted {
         summary,
-        outputs: named()
-            .map(|(o, a)| row_maker.agreement_row(o, a))
-            .collect(),
+        outputs: RowMaker::new(task).agreement_rows(&agreements),
     }
 }

@@ -1,5 +1,6 @@
 //! Joint estimates and predictions on simulated maneuvers of known derivatives.
 
+mod absent_outputs;
 mod calibration;
 mod doubt;
 mod evidence;

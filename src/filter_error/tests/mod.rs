@@ -174,6 +174,41 @@ fn assert_gradient_matches_differences<const NX: usize, E: InGusts<NX>>() {
 }
 
 #[test]
+fn the_noise_of_an_output_that_never_counts_has_no_effect() {
+    let truth = truth(Axis::Longitudinal);
+    let mut simulated = prepared::<4, LongitudinalInGusts>(&truth, &[]);
+    simulated.fly(&light(), &mut Draws(3));
+    let mut measurements = simulated.filter.case.measurements.clone();
+    for used in &mut measurements.used {
+        used[3] = false;
+    }
+    let model = Model {
+        free: truth.iter().map(|(d, _)| d).collect(),
+        initial_state: InitialState::Estimated,
+        ..Model::default()
+    };
+    let filter =
+        Filter::<4, LongitudinalInGusts>::new(&aircraft(), &window(), measurements, &model, &[]);
+    let respond = |an: f64| {
+        let mut noise = light();
+        noise.outputs[3] = an;
+        let response = filter.respond(&filter.with_noise(&simulated.own, &noise));
+        response.unwrap()
+    };
+    let (quiet, loud) = (respond(1e-6), respond(1.0));
+    assert_relative_eq!(quiet.cost, loud.cost, max_relative = 1e-9);
+    let an = filter.parameters() - 2;
+    assert_eq!(
+        filter.noise_parameters()[an - filter.first_noise()],
+        NoiseParameter::Output(3)
+    );
+    for response in [quiet, loud] {
+        assert_abs_diff_eq!(response.gradient()[an], 0.0, epsilon = 1e-12);
+        assert_abs_diff_eq!(response.information()[(an, an)], 0.0, epsilon = 1e-12);
+    }
+}
+
+#[test]
 fn the_gradient_is_that_of_finite_differences_for_every_parameter() {
     assert_gradient_matches_differences::<4, LongitudinalInGusts>();
     assert_gradient_matches_differences::<6, LateralInGusts>();

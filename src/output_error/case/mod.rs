@@ -38,6 +38,14 @@ pub struct Measurements {
     pub used: Vec<[bool; OUTPUTS]>,
 }
 
+impl Measurements {
+    /// Returns true if a sample of an output counts.
+    #[must_use]
+    pub fn have(&self, output: usize) -> bool {
+        self.used.iter().any(|used| used[output])
+    }
+}
+
 /// One maneuver prepared for estimation.
 #[derive(Debug)]
 pub struct Case<const NX: usize, E: Equations<NX>> {

@@ -51,7 +51,10 @@ pub fn start<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>, prior: &[f64
     let regression = regression(case, case, &BTreeMap::new());
     for k in 0..COEFFICIENTS {
         let range = case.ranges[k].clone();
-        if regression.values[range.clone()].iter().any(Option::is_some) {
+        if !is_measured(case, k) {
+            // The stand-in of its accelerometer has the mean of trimmed flight, and no motion.
+            shift_constant(case, k, &mut values);
+        } else if regression.values[range.clone()].iter().any(Option::is_some) {
             for j in range {
                 values[j] = regression.values[j].unwrap_or(values[j]);
             }
@@ -63,6 +66,16 @@ pub fn start<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>, prior: &[f64
         }
     }
     values
+}
+
+/// Returns true if the measured motion implies a coefficient: a moment, or a force whose accelerometer
+/// is recorded.
+fn is_measured<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>, coefficient: usize) -> bool {
+    let Some(accelerometer) = E::AXIS.coefficients()[coefficient].accelerometer() else {
+        return true;
+    };
+    let output = E::AXIS.outputs().iter().position(|o| *o == accelerometer);
+    output.is_some_and(|output| case.measurements.have(output))
 }
 
 /// Shifts the constant of a coefficient so that its mean is the implied one.
@@ -144,7 +157,8 @@ pub struct Regression {
     ///
     /// - biases, initial states and constants, which appear in no harmonic;
     /// - regressors that do not move;
-    /// - coefficients with proportional regressors or too few harmonics.
+    /// - coefficients with proportional regressors or too few harmonics;
+    /// - forces whose accelerometer is not recorded.
     pub values: Vec<Option<f64>>,
     /// Covariance of the errors; zero for parameters without a value. It includes the residuals'
     /// spectrum and the uncertainty of held values, but no errors of calibration.
@@ -170,7 +184,7 @@ pub fn regression<const NX: usize, E: Equations<NX>>(
     let Some(spectra) = Spectra::transform(case, wide) else {
         return found;
     };
-    for k in 0..COEFFICIENTS {
+    for k in (0..COEFFICIENTS).filter(|&k| is_measured(case, k)) {
         let regressor = |j: usize| spectra.regressor(&case.names[j]);
         let free = case.ranges[k].clone().filter(|&j| regressor(j).is_some());
         let free: Vec<usize> = free.collect();
@@ -356,12 +370,13 @@ fn slope_window(reach: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Samples outside gaps that are too long to bridge, and further from them than a slope reaches.
+/// Samples outside gaps that are too long to bridge, and further from them than a slope reaches. Outputs
+/// that are not recorded have no gaps.
 fn kept_samples(measurements: &Measurements, step_s: f64) -> Vec<bool> {
     let samples = measurements.used.len();
     let reach = slope_reach(step_s);
     let mut kept = vec![true; samples];
-    for o in 0..OUTPUTS {
+    for o in (0..OUTPUTS).filter(|&o| measurements.have(o)) {
         let mut start = 0;
         for end in 0..=samples {
             if measurements.used.get(end).is_none_or(|used| used[o]) {

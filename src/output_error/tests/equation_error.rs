@@ -165,6 +165,33 @@ fn samples_of_a_gap_do_not_count() {
 }
 
 #[test]
+fn a_force_whose_accelerometer_is_not_recorded_has_no_second_opinion_and_the_moment_keeps_its_own()
+{
+    let whole = all_free(&flown(), nothing_measured());
+    let mut lacking = flown();
+    let an = lacking.signals.get_mut(signal::AN).unwrap();
+    an.values.fill(1.0);
+    let mut measurements = nothing_measured();
+    for used in &mut measurements.used {
+        used[3] = false;
+    }
+    let case = all_free(&lacking, measurements);
+    let regression = regress(&case);
+    let moment = found(&case, &regression, "Cm_de");
+    assert_eq!(moment, found(&whole, &regress(&whole), "Cm_de"));
+    let at = |name: &str| case.names.iter().position(|n| n == name).unwrap();
+    assert_eq!(regression.values[at("CN_de")], None);
+    // The start keeps the prior slopes and carries the weight.
+    let start = start(&case, &case.starting_values(|_| 0.0));
+    assert_abs_diff_eq!(start[at("CN_alpha")], 0.0);
+    assert!(
+        (1.0..2.0).contains(&start[at("CN_0")]),
+        "{}",
+        start[at("CN_0")]
+    );
+}
+
+#[test]
 fn the_covariance_counts_the_held_values_error() {
     let (truth, error) = (truth(Axis::Longitudinal), 1e-5);
     // Noise well above the effect of the wrong value, which then leaves the weights alone.
