@@ -185,7 +185,8 @@ table! {
         /// Class whose inputs explain the most steps.
         pub nearest_class: String,
         /// Difference from that class: too few steps, pulses of other lengths, the pilot's hand. Or
-        /// the classes that fit alike.
+        /// the classes that fit alike. Or the maneuver whose inputs overlap, with the reason for a
+        /// rejection.
         pub reason: String,
     }
 }

@@ -25,8 +25,10 @@ use std::collections::BTreeSet;
 
 use crate::aircraft::Aircraft;
 use crate::flight::Record;
-use crate::maneuver::Class;
+use crate::maneuver::{Acceptance, Class};
 use recognition::detections::Detections;
+use recognition::found::FoundManeuver;
+use recognition::overlaps::without_overlaps;
 use recognition::recognise::recognise;
 use recognition::stand_ins::with_surfaces_for_controls;
 use recognition::unclassified::nothing_found;
@@ -71,8 +73,23 @@ pub fn maneuvers(
 ) -> Segmented {
     let detections = Detections::of(record, settings);
     let recognised_as = with_surfaces_for_controls(record, classes, settings);
-    let mut recognition = recognise(&detections, &recognised_as);
-    recognition.remove_overlaps();
+    let recognition = recognise(&detections, &recognised_as);
+    let maneuver = |found: &FoundManeuver, window: (f64, f64)| {
+        let recognised = Some(found.recognised.clone());
+        let limits = &settings.quality;
+        condition::maneuver(record, aircraft, found.class, window, recognised, limits)
+    };
+    let rejection = |found: &FoundManeuver| {
+        let alone = windows(&detections, std::slice::from_ref(found));
+        let maneuver = maneuver(found, *alone.first()?);
+        let quality = maneuver.map(|maneuver| maneuver.quality);
+        match quality {
+            Ok(quality) if quality.verdict == Acceptance::Accepted => None,
+            Ok(quality) => Some(quality.reason),
+            Err(reason) => Some(reason),
+        }
+    };
+    let mut recognition = without_overlaps(&detections, recognition, rejection);
     let nothing = nothing_found(&detections, &recognition);
     recognition.unknown.extend(nothing);
     let windows = windows(&detections, &recognition.found);
@@ -80,19 +97,10 @@ pub fn maneuvers(
     problems.extend(problems::of_missing_signals(record, classes, settings));
     problems.extend(problems::of_stuck_flags(record, &recognition.found));
     let mut maneuvers = Vec::new();
-    for (found, window) in recognition.found.into_iter().zip(windows) {
-        let first_s = found.first_s;
-        let maneuver = condition::maneuver(
-            record,
-            aircraft,
-            found.class,
-            window,
-            Some(found.recognised),
-            &settings.quality,
-        );
-        match maneuver {
+    for (found, window) in recognition.found.iter().zip(windows) {
+        match maneuver(found, window) {
             Ok(maneuver) => maneuvers.push(maneuver),
-            Err(reason) => problems.push(problems::at_time(record, first_s, reason)),
+            Err(reason) => problems.push(problems::at_time(record, found.first_s, reason)),
         }
     }
     problems.sort_by(|a, b| a.place.cmp(&b.place));

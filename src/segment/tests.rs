@@ -1032,6 +1032,48 @@ fn a_maneuver_of_an_axis_whose_state_is_not_recorded_is_rejected_and_named() {
     assert!(rejected.reason.contains("theta_deg is not recorded"));
 }
 
+/// A flight in which the pilot steps pedals and lateral stick for longer than the pitch stick, at the
+/// same time.
+fn flown_in_both_axes() -> Record {
+    let mut r = flight(90);
+    let last_s = pilot_steps(&mut r, "pedal_in", 20.0, 2.0, 3, 1.5);
+    pilot_steps(&mut r, "stick_lat_in", last_s + 0.5, 2.0, 6, 1.5);
+    pilot_steps(&mut r, "stick_pitch_in", 26.0, 2.0, 5, 1.0);
+    r
+}
+
+#[test]
+fn a_candidate_that_is_rejected_displaces_none_and_is_unknown_with_its_reason() {
+    let mut r = flown_in_both_axes();
+    let samples = r.samples;
+    let stand_in = Series::assumed(vec![0.0; samples]);
+    r.signals.insert(signal::PHI.into(), stand_in);
+    let segmented = found(&r);
+    assert_eq!(classes_of(&segmented), ["PITCH"], "{segmented:?}");
+    let quality = &segmented.maneuvers[0].quality;
+    assert_eq!(quality.verdict, Acceptance::Accepted);
+    assert_eq!(segmented.unknown.len(), 1, "{segmented:?}");
+    let row = &segmented.unknown[0];
+    assert_eq!(row.nearest_class, "YAW_ROLL");
+    assert!(row.reason.contains("overlap those of the PITCH"), "{row:?}");
+    assert!(row.reason.contains("phi_deg is not recorded"), "{row:?}");
+    assert!(row.inputs.contains("pedal_in 5"), "{row:?}");
+    assert_eq!(segmented.problems.len(), 1, "{segmented:?}");
+}
+
+#[test]
+fn a_candidate_of_the_other_axis_that_a_maneuver_displaces_is_unknown() {
+    let segmented = found(&flown_in_both_axes());
+    assert_eq!(classes_of(&segmented), ["YAW_ROLL"], "{segmented:?}");
+    assert_eq!(segmented.unknown.len(), 1, "{segmented:?}");
+    let row = &segmented.unknown[0];
+    assert_eq!(row.nearest_class, "PITCH");
+    assert!(
+        row.reason.contains("overlap those of the YAW_ROLL"),
+        "{row:?}"
+    );
+}
+
 /// A sine whose frequency rises evenly, its size as given, from one time to another.
 fn sweep(
     record: &mut Record,
