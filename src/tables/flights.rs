@@ -249,7 +249,7 @@ table! {
         pub completed_flights: usize ["flights"],
         /// Verdict on the order of the flights.
         pub verdict: InstrumentTrend,
-        /// First flight of a step or drift.
+        /// First flight of a step or drift, also of a possible one.
         pub since: Option<String>,
         /// Largest step, or drift from the first flight to the last: the less probable of the two.
         pub change: Option<f64>,
@@ -281,6 +281,11 @@ words! {
         Step = "step",
         /// The error changes from flight to flight.
         Drift = "drift",
+        /// The error may be another since a flight: too small a step to be sure. One campaign in four has
+        /// a possible step or drift by chance.
+        PossibleStep = "possible step",
+        /// The error may change from flight to flight.
+        PossibleDrift = "possible drift",
         /// Fewer than six flights.
         TooFewFlights = "too few flights",
     }

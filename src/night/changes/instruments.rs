@@ -17,7 +17,7 @@ pub fn instruments(before: &NightTables, now: &NightTables) -> Vec<InstrumentCha
     now.filter(is_new).filter_map(change).collect()
 }
 
-/// Error and the kind of its change; `None` for a steady error.
+/// Error and the kind of its change; `None` for a steady error, and for a change that is only possible.
 fn kind_of_change(row: &InstrumentTrendRow) -> Option<(&str, InstrumentError, InstrumentTrend)> {
     let changes = matches!(row.verdict, InstrumentTrend::Step | InstrumentTrend::Drift);
     changes.then_some((row.channel.as_str(), row.error, row.verdict))

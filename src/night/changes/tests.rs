@@ -252,6 +252,11 @@ fn an_instrument_that_steps_is_an_alert_with_its_channel_and_flight_once() {
     );
     let again = between("0002", &now.tables(), &now.tables());
     assert!(!again.alert && again.instruments.is_empty());
+    // A possible step is no alert, and is one as soon as it is sure.
+    let mut possible = campaign();
+    possible.instrument_trends = vec![trend(InstrumentTrend::PossibleStep, Some("f2"))];
+    assert!(!between("0001", &before.tables(), &possible.tables()).alert);
+    assert!(between("0002", &possible.tables(), &now.tables()).alert);
 }
 
 #[test]

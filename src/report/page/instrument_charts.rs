@@ -23,11 +23,11 @@ pub fn charts(contents: &Contents) -> Vec<QualityChart> {
 }
 
 fn is_remarkable(trend: &InstrumentTrendRow) -> bool {
-    matches!(
+    let changes = !matches!(
         trend.verdict,
-        InstrumentTrend::Step | InstrumentTrend::Drift
-    ) || trend.common == CommonErrorVerdict::Wrong
-        || !trend.far_flights.is_empty()
+        InstrumentTrend::Steady | InstrumentTrend::TooFewFlights
+    );
+    changes || trend.common == CommonErrorVerdict::Wrong || !trend.far_flights.is_empty()
 }
 
 fn chart(contents: &Contents, number: usize, trend: &InstrumentTrendRow) -> Option<QualityChart> {
@@ -154,13 +154,23 @@ mod tests {
             instruments: vec![row(1, 1.0), row(2, 1.02), row(3, 1.021)],
             ..Campaign::default()
         };
-        let trends = [trend(InstrumentTrend::Steady), trend(InstrumentTrend::Step)];
+        let verdicts = [
+            InstrumentTrend::Steady,
+            InstrumentTrend::Step,
+            InstrumentTrend::PossibleStep,
+        ];
+        let trends = verdicts.map(trend);
         let contents = Contents {
             instrument_trends: &trends,
             ..campaign.contents()
         };
         let charts = charts(&contents);
-        assert_eq!(charts.len(), 1);
+        assert_eq!(charts.len(), 2);
+        let possible = &charts[1].caption;
+        assert!(
+            possible.starts_with("A possible step since f2."),
+            "{possible}"
+        );
         assert!(
             charts[0].caption.starts_with("A step since f2."),
             "{}",
