@@ -3,6 +3,7 @@
 use approx::assert_relative_eq;
 
 use super::fixture::{flown, proof, shipped, specification, truth};
+use crate::flight::record::Series;
 use crate::flight::{Mark, signal};
 use crate::tables::{MatchVerdict, MatchedQuantity};
 
@@ -133,6 +134,14 @@ fn a_maneuver_without_a_signal_or_a_test_has_a_reason() {
         "{matched:?}"
     );
     assert!(matched.rows.is_empty() && matched.history.is_none());
+    let mut record = flown.record.clone();
+    for absent in [signal::AX, signal::AY] {
+        let stand_in = Series::assumed(vec![0.0; record.samples]);
+        record.signals.insert(absent.to_owned(), stand_in);
+    }
+    let matched = proof(&flown, &record, truth(&flown, "", 1.0), &specification());
+    let reason = &matched.verdicts[0].reason;
+    assert_eq!(reason, "its trim needs `ax_g`, which is not recorded");
     let mut other = specification();
     other.tests[0].classes = Some(vec!["OLON".to_owned()]);
     let matched = proof(&flown, &flown.record, truth(&flown, "", 1.0), &other);
