@@ -520,6 +520,29 @@ fn a_required_signal_without_a_source_has_its_remedies() {
 }
 
 #[test]
+fn the_value_in_place_of_a_signal_without_a_source_may_have_an_uncertainty() {
+    let copy = Copy::new();
+    copy.spoil(
+        "aircraft.yaml",
+        "  thrust: { signal: thrust_lbf, unit: lbf }\n",
+        "",
+    );
+    copy.spoil(
+        "aircraft.yaml",
+        "  thrust_lbf: { uncertainty: { scale_pct: 1 } }\n",
+        "  thrust_lbf: { uncertainty: { bias: 9000 } }\n",
+    );
+    let config = copy.load(Overrides::default()).unwrap();
+    let stated = config.estimate.calibration["thrust_lbf"];
+    assert!((stated.bias - 9000.0).abs() < 1e-9);
+    let absences = config.absences();
+    assert!(
+        absences.iter().any(|line| line.contains("no `thrust_lbf`")),
+        "{absences:?}"
+    );
+}
+
+#[test]
 fn a_required_signal_without_a_source_is_named() {
     let copy = Copy::new();
     copy.spoil(

@@ -178,7 +178,11 @@ pub fn cost(signal: &str, has: impl Fn(&str) -> bool) -> &'static str {
         s::RPM_LEFT | s::RPM_RIGHT => {
             "the gyroscopic moment of this engine is charged to the moments of q and r"
         }
-        s::THRUST => "the constant of CA is that of the axial force less the thrust",
+        s::THRUST => {
+            "the constant of CA is that of the axial force less the thrust, and the CN derivatives take its part \
+             across the path; bounds contain it only if `instruments: thrust_lbf: uncertainty: { bias: … }` of \
+             aircraft.yaml states how large it may be"
+        }
         s::IXZ => {
             "roll and yaw are taken as uncoupled: Cl and Cn derivatives take a share of each other"
         }

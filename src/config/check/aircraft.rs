@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::names::known_signal;
+use super::names::{is_given, known_signal};
 use super::numbers;
 use crate::aircraft::ThrustLine;
 use crate::config::checked::Config;
@@ -192,6 +192,13 @@ fn list(signals: &[&str]) -> String {
     names.join(", ")
 }
 
+/// `true` for a signal without a source in whose place harvest puts an assumed value. That value may
+/// have a stated uncertainty: that of a thrust which is not recorded.
+fn has_stand_in(config: &Config, name: &str) -> bool {
+    let is_required = signal::REQUIRED.contains(&name);
+    is_required && StandIn::of(name, |other| is_given(config, other)).is_some()
+}
+
 /// Sizes of instrument errors: known signals, no negative sizes.
 pub(super) fn instruments(
     errors: &BTreeMap<String, InstrumentErrors>,
@@ -201,7 +208,9 @@ pub(super) fn instruments(
     let mut examined = ingest::Settings::default().compatibility.ordinary;
     for (name, instrument) in errors {
         let error = |what: String| Err(source.error_under("instruments", name, what));
-        known_signal(config, source, name, "instruments")?;
+        if !has_stand_in(config, name) {
+            known_signal(config, source, name, "instruments")?;
+        }
         let uncertainty = instrument.uncertainty;
         let (ordinary, fault) = (instrument.ordinary.given(), instrument.fault.given());
         let sizes = [uncertainty.bias, uncertainty.scale_pct].map(Some);

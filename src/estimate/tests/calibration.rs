@@ -65,6 +65,38 @@ fn a_signal_that_the_maneuver_does_not_use_adds_nothing() {
 }
 
 #[test]
+fn a_thrust_that_is_not_recorded_is_in_the_bounds_where_its_size_is_stated() {
+    let thrust_lbf = 5_000.0;
+    let stated = Calibration {
+        bias: thrust_lbf,
+        scale_pct: 0.0,
+    };
+    let maneuver = maneuver("m", 20.0);
+    let estimate = |bench: &Bench| {
+        let mut record = bench.flown(5, 1.0, 0.0);
+        // The other thrust is recorded: half of the true one is not.
+        let half = vec![thrust_lbf; record.samples];
+        let stand_in = crate::flight::record::Series::assumed(half);
+        record.signals.insert(signal::THRUST.to_owned(), stand_in);
+        bench.estimate(&record, &maneuver)
+    };
+    let with = estimate(&calibrated(&[(signal::THRUST, stated)]));
+    let without = estimate(&bench());
+    let truth = truth(Axis::Longitudinal);
+    let off = |estimated: &Estimated, name: &str| {
+        let row = row(estimated, name);
+        let (_, truth) = truth.iter().find(|(d, _)| d.name == name).unwrap();
+        (row.value.unwrap() - truth).abs() / row.bound_corrected.unwrap()
+    };
+    assert!(off(&without, "CA_0") > 4.0, "{}", off(&without, "CA_0"));
+    for name in ["CN_0", "CN_alpha", "CA_0"] {
+        assert!(off(&with, name) < 2.0, "{name}: {}", off(&with, name));
+        let bound = |estimated| row(estimated, name).bound_corrected.unwrap();
+        assert!(bound(&with) > bound(&without), "{name}");
+    }
+}
+
+#[test]
 fn an_error_common_to_maneuvers_does_not_average_out() {
     let mut bench = calibrated(&[(
         "de_deg",
