@@ -60,7 +60,7 @@ pub fn check(options: &Options) -> anyhow::Result<ExitCode> {
         out!("without    {absence}");
     }
     for column in &config.unused_columns {
-        out!("note       channel `{column}`: it has no `signal`, and no formula uses it");
+        out!("note       channel `{column}`: it has no `signal`, and no formula or table uses it");
     }
     let of_hold = config.estimate.hold.warning().map(str::to_owned);
     for warning in of_hold.into_iter().chain(config.buildup.lag_warning()) {

@@ -1,15 +1,16 @@
-//! The channel map: its lines, checked, become channels of columns and of formulas.
+//! The channel map: its lines, checked, become channels of columns, of formulas and of tables.
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::channel_table::checked_table;
 use super::source::Source;
-use super::written::ChannelLine;
+use super::written::{ChannelLine, TableLine};
 use crate::error::{Error, Result, did_you_mean};
 use crate::flight::formula::Operand;
 use crate::flight::{Channel, Formula, signal};
 use crate::units::Unit;
 
-/// Channels of a map: the lines that give a signal. Formulas are parsed and checked for units.
+/// Channels of a map: the lines that give a signal. Formulas and tables are parsed and checked for units.
 ///
 /// # Errors
 /// [`Error::Config`] with the line of the first mistake.
@@ -38,8 +39,18 @@ impl ChannelMap<'_> {
         self.source.error_under("channels", name, what)
     }
 
+    /// An error at a key of a channel's table.
+    fn table_error(&self, name: &str, key: &str, what: &str) -> Error {
+        let path = ["channels", name, "table", key].map(str::to_owned);
+        let what = format!("channel `{name}`: {what}");
+        self.source.error_at(&path, what)
+    }
+
     /// Channel of a line; `None` for a column that only formulas use.
     fn channel(&self, name: &str, line: &ChannelLine) -> Result<Option<Channel>> {
+        if let Some(table) = &line.table {
+            return self.of_table(name, line, table).map(Some);
+        }
         if let Some(text) = &line.formula {
             return self.computed(name, line, text).map(Some);
         }
@@ -89,6 +100,41 @@ impl ChannelMap<'_> {
         })
     }
 
+    /// Channel of a table, in the unit of its values.
+    fn of_table(&self, name: &str, line: &ChannelLine, table: &TableLine) -> Result<Channel> {
+        let (Some(signal), Some(unit)) = (&line.signal, &line.unit) else {
+            let what = "a table needs a `signal`, and a `unit`, which is that of `value`";
+            return Err(self.error(name, what));
+        };
+        let further = [
+            ("formula", line.formula.is_some()),
+            ("sign", line.sign.is_some()),
+            ("scale", line.scale.is_some()),
+            ("wraps_at", line.wraps_at.is_some()),
+        ];
+        if let Some((key, _)) = further.iter().find(|(_, is_given)| *is_given) {
+            let what = format!("a channel with a table has no `{key}`");
+            return Err(self.error(name, &what));
+        }
+        if signal == signal::TIME {
+            return Err(self.error(name, "the clock is a column, not a table"));
+        }
+        let parsed = Unit::parse_for(unit, Unit::of_signal(signal));
+        parsed.map_err(|what| self.error(name, &what))?;
+        let values = checked_table(signal, table)
+            .map_err(|(key, what)| self.table_error(name, key, &what))?;
+        let over = Formula::over(&table.over, &table.at_unit, values, |column| {
+            self.operand(column)
+        });
+        let formula = over.map_err(|what| {
+            self.table_error(name, "over", &format!("`over: {}`: {what}", table.over))
+        })?;
+        Ok(Channel {
+            formula: Some(formula),
+            ..Channel::plain(signal, unit)
+        })
+    }
+
     /// Column of a formula with its unit.
     fn operand(&self, column: &str) -> std::result::Result<Operand, String> {
         let Some(line) = self.lines.get(column) else {
@@ -101,6 +147,11 @@ impl ChannelMap<'_> {
         };
         if line.formula.is_some() {
             return Err(format!("`{column}` is a formula itself: write it out"));
+        }
+        if line.table.is_some() {
+            return Err(format!(
+                "`{column}` is a table itself: a formula has columns"
+            ));
         }
         if line.wraps_at.is_some() {
             return Err(format!("`{column}` wraps around: a formula cannot have it"));

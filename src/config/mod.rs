@@ -7,6 +7,7 @@
 
 mod absences;
 mod channel_map;
+mod channel_table;
 mod check;
 mod checked;
 mod cluster;

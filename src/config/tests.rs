@@ -499,6 +499,135 @@ fn a_regressor_in_another_spelling_is_answered_with_harvest_s() {
 }
 
 #[test]
+fn a_table_over_fuel_is_a_channel_in_the_unit_of_its_values() {
+    let copy = Copy::new();
+    copy.spoil(
+        "aircraft.yaml",
+        "  Iy: { signal: iy_slug_ft2, unit: slug ft2 }",
+        "  FUEL: { unit: lb }\n  Iy: { signal: iy_slug_ft2, unit: kg m2, table: { over: FUEL, at_unit: kg, at: [0, \
+         1000, 4000], value: [200000, 205000, 214000] } }",
+    );
+    let config = copy.load(Overrides::default()).unwrap();
+    let channel = &config.channels["Iy"];
+    assert_eq!(channel.unit, "kg m2");
+    let table = channel.formula.as_ref().unwrap();
+    assert_eq!(table.operands()[0].column, "FUEL");
+    // 2204.6226 lb are 1000 kg.
+    for (pounds, inertia) in [
+        (-1.0, 200_000.0),
+        (1_102.311_3, 202_500.0),
+        (2_204.622_6, 205_000.0),
+        (99_999.0, 214_000.0),
+    ] {
+        assert_relative_eq!(table.value(&[pounds]), inertia, max_relative = 1e-7);
+    }
+    assert!(!config.channels.contains_key("FUEL"));
+}
+
+#[test]
+fn a_mistake_of_a_table_is_named_at_its_line() {
+    let good = [
+        ("over", "FUEL"),
+        ("at_unit", "kg"),
+        ("at", "[0, 1000, 4000]"),
+        ("value", "[200000, 205000, 214000]"),
+    ];
+    for (key, wrong, words) in [
+        ("over", "FEUL", "`over: FEUL`: no column `FEUL`"),
+        ("over", "FUEL * FUEL", "which is no kg"),
+        ("over", "Iz", "`Iz` is a table itself"),
+        ("at_unit", "m", "it is in slug, which is no m"),
+        ("at_unit", "stone", "unknown unit `stone`"),
+        (
+            "at",
+            "[0, 4000, 1000]",
+            "`at` must increase: 1000 comes after 4000",
+        ),
+        ("at", "[0, 1000]", "`value` has 3 numbers and `at` 2"),
+        ("at", "[0, .nan, 2]", "finite"),
+        ("at", "[-5, 1000, 4000]", "no mass is -5 kg"),
+        ("value", "[200000, 205000, -214000]", "is greater than zero"),
+        (
+            "value",
+            "[200000, 205000, 21400]",
+            "is a digit or a decimal point wrong?",
+        ),
+        ("value", "[2e5]", "`value` has 1 numbers"),
+    ] {
+        let copy = Copy::new();
+        let line = |(own, text): &(&str, &str)| {
+            let text = if *own == key { wrong } else { text };
+            format!("      {own}: {text}\n")
+        };
+        let lines: String = good.iter().map(line).collect();
+        let iz = "  Iz: { signal: iz_slug_ft2, unit: slug ft2 }\n";
+        copy.spoil("aircraft.yaml", iz, "");
+        let first = copy.spoil(
+            "aircraft.yaml",
+            "  Iy: { signal: iy_slug_ft2, unit: slug ft2 }",
+            &format!(
+                "  FUEL: {{ unit: kg }}\n  Iy:\n    signal: iy_slug_ft2\n    unit: kg m2\n    table:\n{lines}  \
+                 Iz: {{ signal: iz_slug_ft2, unit: kg m2, table: {{ over: FUEL, at_unit: kg, at: [0, 1], value: [1, 2] \
+                 }} }}"
+            ),
+        );
+        let error = copy.error();
+        let named = match words {
+            words if words.starts_with("`value` has") => "value",
+            words if words.ends_with("which is no m") => "over",
+            _ => key,
+        };
+        let at = good.iter().position(|(own, _)| *own == named).unwrap();
+        let place = format!("aircraft.yaml:{}: ", first + 5 + at);
+        assert!(
+            error.starts_with(&place) && error.contains(words),
+            "{place} {words}: {error}"
+        );
+    }
+}
+
+#[test]
+fn a_table_has_a_unit_and_nothing_of_a_column_or_a_formula() {
+    let table = "table: { over: V, at_unit: ft/s, at: [0, 1], value: [1, 2] }";
+    for (line, words) in [
+        (
+            "signal: iy_slug_ft2",
+            "a table needs a `signal`, and a `unit`",
+        ),
+        ("unit: slug ft2", "a table needs a `signal`, and a `unit`"),
+        (
+            "signal: iy_slug_ft2, unit: slug ft2, sign: -1",
+            "has no `sign`",
+        ),
+        (
+            "signal: iy_slug_ft2, unit: ft, formula: V",
+            "has no `formula`",
+        ),
+        (
+            "signal: iy_slug_ft2, unit: ft",
+            "`ft` cannot become slug ft2",
+        ),
+        (
+            "signal: time_s, unit: s",
+            "the clock is a column, not a table",
+        ),
+    ] {
+        let copy = Copy::new();
+        let at = copy.spoil(
+            "aircraft.yaml",
+            "  Iy: { signal: iy_slug_ft2, unit: slug ft2 }",
+            &format!("  Iy: {{ {line}, {table} }}"),
+        );
+        let error = copy.error();
+        let place = format!("aircraft.yaml:{at}: channel `Iy`: ");
+        assert!(
+            error.starts_with(&place) && error.contains(words),
+            "{words}: {error}"
+        );
+    }
+}
+
+#[test]
 fn a_required_signal_without_a_source_has_its_remedies() {
     let copy = Copy::new();
     let lines = [

@@ -102,8 +102,8 @@ pub struct AircraftFile {
     pub instruments: BTreeMap<String, InstrumentErrors>,
 }
 
-/// Line of the channel map: a column with its signal; a formula with its signal; or a column that
-/// only formulas use, without one.
+/// Line of the channel map: a column with its signal; a formula or a table with its signal; or a column
+/// that only formulas and tables use, without one.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ChannelLine {
@@ -113,6 +113,19 @@ pub struct ChannelLine {
     pub scale: Option<f64>,
     pub wraps_at: Option<f64>,
     pub formula: Option<String>,
+    pub table: Option<TableLine>,
+}
+
+/// Table of a channel: its values, in the channel's unit, over the result of a formula.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TableLine {
+    /// Formula of columns.
+    pub over: String,
+    /// Unit of `at`.
+    pub at_unit: String,
+    pub at: Vec<f64>,
+    pub value: Vec<f64>,
 }
 
 /// `model.yaml`.

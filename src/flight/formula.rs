@@ -6,6 +6,7 @@
 
 use serde::Serialize;
 
+use super::linear_table::LinearTable;
 use crate::units::{Conversion, Dimensions, Unit, UnitProduct, name_of};
 
 /// Largest number of characters of a formula.
@@ -41,6 +42,16 @@ pub struct Formula {
     /// Conversion of the result to the target's unit.
     #[serde(skip)]
     of_base: Conversion,
+    /// Table in which the result is the place.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    table: Option<PlacesIn>,
+}
+
+/// Table of a formula with the unit of its places.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+struct PlacesIn {
+    unit: String,
+    table: LinearTable,
 }
 
 /// Part of a formula.
@@ -96,7 +107,36 @@ impl Formula {
             to_base: parser.to_base,
             root,
             of_base: target.of_base(),
+            table: None,
         })
+    }
+
+    /// Parses a formula whose result, in the unit `at_unit`, is the place in a table. The result is then
+    /// the table's value, in the unit of its values.
+    ///
+    /// # Errors
+    /// As [`Formula::parse`], and for an unknown unit.
+    pub fn over(
+        text: &str,
+        at_unit: &str,
+        table: LinearTable,
+        operand: impl Fn(&str) -> Result<Operand, String>,
+    ) -> Result<Formula, String> {
+        let target = Unit::parse(at_unit)?;
+        let unit = at_unit.to_owned();
+        Ok(Formula {
+            table: Some(PlacesIn { unit, table }),
+            ..Formula::parse(text, target, operand)?
+        })
+    }
+
+    /// Range of the places in words, for a value that is held at an end of the table. `None` for a value
+    /// between the ends, for a table that is level at that end, and for a formula without a table.
+    #[must_use]
+    pub fn held_at_end(&self, value: f64) -> Option<String> {
+        let PlacesIn { unit, table } = self.table.as_ref()?;
+        let [low, high] = table.held_at(value)?;
+        Some(format!("`{}` is outside {low} to {high} {unit}", self.text))
     }
 
     /// Columns of the formula.
@@ -116,7 +156,9 @@ impl Formula {
         {
             *own = to_base.of(value * operand.factor);
         }
-        self.of_base.of(self.root.value(&base))
+        let result = self.of_base.of(self.root.value(&base));
+        let table = self.table.as_ref();
+        table.map_or(result, |places| places.table.value(result))
     }
 }
 
@@ -469,6 +511,20 @@ mod tests {
         let formula = Formula::parse("M + 1", Unit::of_signal("mach"), half).unwrap();
         assert_relative_eq!(formula.value(&[0.4]), 0.8);
         assert!(formula.value(&[f64::NAN]).is_nan());
+    }
+
+    #[test]
+    fn a_table_is_read_at_the_result_in_the_unit_of_its_places() {
+        let table = LinearTable::new(vec![0.0, 200.0], vec![1000.0, 1200.0]).unwrap();
+        let inertia = Formula::over("FUEL / 2", "kg", table.clone(), operand).unwrap();
+        assert_relative_eq!(inertia.value(&[100.0]), 1050.0, max_relative = 1e-9);
+        assert_relative_eq!(inertia.value(&[900.0]), 1200.0, max_relative = 1e-9);
+        assert!(inertia.value(&[f64::NAN]).is_nan());
+        let of_pounds = Formula::over("FUEL", "lb", table.clone(), operand).unwrap();
+        // 45.359237 kg are 100 lb.
+        assert_relative_eq!(of_pounds.value(&[45.359_237]), 1100.0, max_relative = 1e-6);
+        let refused = Formula::over("FUEL", "m", table, operand).unwrap_err();
+        assert!(refused.contains("in slug, which is no m"), "{refused}");
     }
 
     #[test]

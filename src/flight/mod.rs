@@ -4,6 +4,7 @@ pub mod channel;
 pub mod correction;
 pub mod formula;
 pub mod interpolation_kernel;
+pub mod linear_table;
 pub mod record;
 pub mod signal;
 pub mod stand_in;
@@ -11,6 +12,7 @@ pub mod stand_in;
 pub use channel::{Channel, RawFlight};
 pub use correction::Correction;
 pub use formula::Formula;
+pub use linear_table::LinearTable;
 pub use record::{Mark, Record};
 pub use stand_in::StandIn;
 

@@ -21,6 +21,7 @@ use super::compatibility::{self, ErrorEvidence, Findings, OnFault};
 use super::context::Context;
 use super::refusal::Refusal;
 use super::settings::OnFailedCheck;
+use super::table_ends::held_throughout;
 use crate::error::Problem;
 use crate::flight::{Channel, Correction, Mark, Record, StandIn, signal};
 use crate::tables::{ChannelRow, ChannelVerdict, CheckRow, FlightRow, InstrumentRow};
@@ -76,6 +77,9 @@ pub fn assess(
         read,
     };
     let blocks = examination.blocks(std::mem::take(&mut recording.block_means));
+    let channels = recording.channels.iter();
+    let at_ends = channels.filter_map(|(name, channel, _)| held_throughout(name, channel, &blocks));
+    problems.extend(at_ends.map(|refusal| refusal.into_problem(flight_id)));
     let (mut relations, findings) = examination.reconcile(&blocks);
     if relations.impossible.is_empty() {
         relations.impossible = examination.impossible(&blocks, &relations.faulty);

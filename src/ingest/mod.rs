@@ -18,6 +18,7 @@ mod refusal;
 mod settings;
 mod column_source;
 mod computed_columns;
+mod table_ends;
 
 #[cfg(test)]
 mod tests;

@@ -9,9 +9,10 @@ use crate::aircraft::Aircraft;
 use crate::aircraft::{Position, Sensors, Vane, VaneModel};
 use crate::error::{Problem, ProblemStage};
 use crate::flight::channel::RawColumn;
+use crate::flight::formula::Operand;
 use crate::flight::record::Series;
 use crate::flight::signal::TIME;
-use crate::flight::{Channel, Mark, RawFlight, signal};
+use crate::flight::{Channel, Formula, LinearTable, Mark, RawFlight, signal};
 use crate::tables::{ChannelVerdict, CheckVerdict};
 use crate::units::DEG;
 use std::collections::BTreeMap;
@@ -291,6 +292,57 @@ fn a_channel_that_nothing_requires_is_left_out_by_name() {
     assert!(reasons[1].contains("larger bounds"), "{reasons:?}");
     assert!(!ingested.record.is_recorded(signal::MACH));
     assert!(!ingested.record.signals.contains_key(signal::PSI));
+}
+
+/// A flight whose inertia about x is a table over fuel that burns from 300 kg to 100 kg.
+fn with_inertia_over(at: [f64; 2]) -> Flight {
+    let mut flight = Flight::steady();
+    let table = LinearTable::new(at.to_vec(), vec![30_000.0, 34_000.0]).unwrap();
+    let fuel = |column: &str| {
+        Ok(Operand {
+            column: column.to_owned(),
+            unit: "kg".to_owned(),
+            factor: 1.0,
+        })
+    };
+    let inertia = flight.channel("Ix");
+    inertia.unit = "kg m2".to_owned();
+    inertia.formula = Some(Formula::over("FUEL", "kg", table, fuel).unwrap());
+    flight.raw.columns.remove("Ix");
+    let burnt = |k: usize| 300.0 - 200.0 * k as f64 / (ROWS - 1) as f64;
+    let column = RawColumn {
+        unit: Some("kg".to_owned()),
+        values: (0..ROWS).map(burnt).collect(),
+    };
+    flight.raw.columns.insert("FUEL".to_owned(), column);
+    flight
+}
+
+#[test]
+fn an_inertia_follows_its_table_over_fuel() {
+    let ingested = with_inertia_over([0.0, 400.0]).ingest().unwrap();
+    assert_eq!(ingested.problems, []);
+    let inertia = ingested.record.values(signal::IX).unwrap();
+    // A slug ft² is 1.3558179 kg m².
+    for (sample, kg_m2) in [(0, 33_000.0), (ROWS - 1, 31_000.0)] {
+        assert_relative_eq!(inertia[sample], kg_m2 / 1.355_817_9, max_relative = 1e-6);
+    }
+}
+
+#[test]
+fn a_table_that_a_flight_never_enters_is_a_problem_and_costs_no_flight() {
+    let ingested = with_inertia_over([0.0, 50.0]).ingest().unwrap();
+    let [problem] = &ingested.problems[..] else {
+        panic!("{:?}", ingested.problems)
+    };
+    assert_eq!(problem.place, "channel `Ix`");
+    assert!(
+        problem.reason.contains("`FUEL` is outside 0 to 50 kg"),
+        "{problem:?}"
+    );
+    // Half of the flight is in the table: the rest is at its end.
+    let half = with_inertia_over([200.0, 400.0]).ingest().unwrap();
+    assert_eq!(half.problems, []);
 }
 
 #[test]

@@ -373,7 +373,7 @@ fn reason(facts: &ColumnFacts, candidates: &Candidates, assignment: &Assignment)
         }
         (None, Some(signal)) => format!("it may be {signal}, but its range or unit does not fit"),
         (None, None) if facts.spelling.has("fuel") && !facts.spelling.has("flow") => {
-            "with the empty mass it gives mass_slug by a formula (docs/recorder.md)".to_owned()
+            "with the empty mass it gives mass_slug by a formula, and inertias by tables (docs/recorder.md)".to_owned()
         }
         (None, None) if kind_of(facts).is_some() => {
             "an input; nothing can be inferred from it".to_owned()

@@ -138,6 +138,17 @@ fn misspelt<'a>(required: &str, signals: &[&'a str]) -> Option<&'a str> {
     near.max_by(|a, b| similarity(a, required).total_cmp(&similarity(b, required)))
 }
 
+/// Signals that follow from the fuel.
+const OF_FUEL: [&str; 7] = [
+    signal::MASS,
+    signal::IX,
+    signal::IY,
+    signal::IZ,
+    signal::X_CG,
+    signal::Y_CG,
+    signal::Z_CG,
+];
+
 /// Places where the source of a required signal may stand, in words.
 fn remedies(required: &str) -> String {
     let constant = match required {
@@ -160,6 +171,9 @@ fn remedies(required: &str) -> String {
         remedies.push(format!(
             "or its value under `constants` (`{required}: {example}`)"
         ));
+    }
+    if OF_FUEL.contains(&required) {
+        remedies.push("or a table of it over the fuel (`table: …`, docs/recorder.md)".to_owned());
     }
     let otherwise = match required {
         signal::ALTITUDE => format!("`{}` and `{}` are given", signal::VELOCITY, signal::QBAR),
