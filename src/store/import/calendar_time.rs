@@ -1,4 +1,5 @@
-//! Calendar times of text, as ISO 8601 writes them: `2024-05-01T12:30:05.25Z`.
+//! Calendar times of text, as ISO 8601 writes them, `2024-05-01T12:30:05.25Z`, or with points and the day first,
+//! `25.11.2026 13:45:12,5`.
 
 /// A calendar time. Days and seconds are apart, so that a difference keeps every digit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,14 +14,24 @@ impl CalendarTime {
     /// Parses a date and a time of day with `T` or a space between them, and perhaps `Z` or an offset from
     /// UTC. Without an offset the time counts as UTC.
     pub fn parse(field: &str) -> Option<CalendarTime> {
-        let (date, rest) = (field.get(..10)?, field.get(11..)?);
-        if !field.get(10..11)?.starts_with(['T', 't', ' ']) {
-            return None;
-        }
-        let (time, offset_s) = without_offset(rest)?;
+        let (date, time) = date_and_time(field)?;
+        CalendarTime::of(date, time)
+    }
+
+    /// Parses a date and a time of day.
+    pub fn of(date: &str, time: &str) -> Option<CalendarTime> {
+        let (time, offset_s) = without_offset(time)?;
         Some(CalendarTime {
             day: day_of(date)?,
             second: time_of_day(time)? - offset_s,
+        })
+    }
+
+    /// Beginning of a date.
+    pub fn midnight(date: &str) -> Option<CalendarTime> {
+        Some(CalendarTime {
+            day: day_of(date)?,
+            second: 0.0,
         })
     }
 
@@ -28,6 +39,31 @@ impl CalendarTime {
     pub fn since(self, first: CalendarTime) -> f64 {
         (self.day - first.day) as f64 * 86_400.0 + (self.second - first.second)
     }
+}
+
+/// `true` for a time of day such as `12:30:05.25`.
+pub fn is_time_of_day(field: &str) -> bool {
+    without_offset(field).is_some_and(|(time, _)| time_of_day(time).is_some())
+}
+
+/// `true` for a date and a time of day whose day, month or year cannot be distinguished, such as
+/// `01/02/2026 13:45`.
+pub fn is_ambiguous(field: &str) -> bool {
+    let Some((date, time)) = date_and_time(field) else {
+        return false;
+    };
+    let parts: Vec<&str> = date.split(['/', '.', '-']).collect();
+    let is_number = |part: &&str| whole(part, 9999).is_some();
+    parts.len() == 3
+        && parts.iter().all(is_number)
+        && is_time_of_day(time.split(' ').next().unwrap_or_default())
+        && day_of(date).is_none()
+}
+
+/// Date and time of day of a field.
+fn date_and_time(field: &str) -> Option<(&str, &str)> {
+    let (date, time) = field.trim().split_once(['T', 't', ' '])?;
+    Some((date.trim_end_matches(','), time.trim_start()))
 }
 
 /// Time of day without its offset from UTC, and the offset in seconds.
@@ -63,12 +99,25 @@ fn time_of_day(text: &str) -> Option<f64> {
     (seconds < 61.0).then(|| (3600 * hours + 60 * minutes) as f64 + seconds)
 }
 
+/// Year, month and day of a date: the year first between `-` or `/`, or the day first between points.
+fn parts_of(date: &str) -> Option<[&str; 3]> {
+    let separator = date.chars().find(|c| !c.is_ascii_digit())?;
+    let mut parts = date.splitn(3, separator);
+    let [first, second, third] = [parts.next()?, parts.next()?, parts.next()?];
+    let (year, day) = match separator {
+        '-' | '/' => (first, third),
+        '.' => (third, first),
+        _ => return None,
+    };
+    (year.len() == 4 && second.len() <= 2 && day.len() <= 2).then_some([year, second, day])
+}
+
 /// Days from 1970-01-01 to a date of the Gregorian calendar (after Hinnant, `days_from_civil`).
 fn day_of(date: &str) -> Option<i64> {
-    let mut parts = date.splitn(3, '-');
-    let year = whole(parts.next()?, 9999)?;
-    let month = whole(parts.next()?, 12).filter(|month| *month >= 1)?;
-    let day = whole(parts.next()?, 31).filter(|day| *day >= 1)?;
+    let [year, month, day] = parts_of(date.trim())?;
+    let year = whole(year, 9999)?;
+    let month = whole(month, 12).filter(|month| *month >= 1)?;
+    let day = whole(day, 31).filter(|day| *day >= 1)?;
     // A year from March on, so that the leap day is its last.
     let year = if month <= 2 { year - 1 } else { year };
     let day_of_year = (153 * ((month + 9) % 12) + 2) / 5 + day - 1;
@@ -105,6 +154,48 @@ mod tests {
         assert_eq!(since("1900-03-01T00:00", "1900-02-28T00:00"), 86_400.0);
         // Unix time 1,000,000,000.
         assert_eq!(since("2001-09-09T01:46:40Z", "1970-01-01T00:00:00Z"), 1e9);
+    }
+
+    #[test]
+    fn dates_with_points_have_the_day_first_and_those_with_slashes_the_year() {
+        let iso = CalendarTime::parse("2026-11-05T13:45:12.5").unwrap();
+        for text in [
+            "05.11.2026 13:45:12,5",
+            "5.11.2026 13:45:12.5",
+            "05.11.2026, 13:45:12,5",
+            "2026/11/05 13:45:12.5",
+        ] {
+            assert_eq!(CalendarTime::parse(text), Some(iso), "{text}");
+        }
+        assert_eq!(CalendarTime::of("05.11.2026", "13:45:12,5"), Some(iso));
+        let midnight = CalendarTime::midnight("05.11.2026").unwrap();
+        assert_eq!(iso.since(midnight), 49_512.5);
+        assert!(CalendarTime::midnight("13:45:12").is_none());
+        assert!(is_time_of_day("13:45:12,5") && !is_time_of_day("05.11.2026"));
+    }
+
+    #[test]
+    fn a_date_that_may_be_another_is_ambiguous_and_no_calendar_time() {
+        for text in [
+            "01/02/2026 13:45:12",
+            "25/11/2026 13:45",
+            "01-02-2026 13:45:12,5",
+            "25.11.26 13:45:12",
+            "1/2/26 1:45:12 PM",
+        ] {
+            assert!(is_ambiguous(text), "{text}");
+            assert_eq!(CalendarTime::parse(text), None, "{text}");
+        }
+        for text in [
+            "05.11.2026 13:45",
+            "2026/11/05 13:45",
+            "1.5",
+            "12:30:05",
+            "1/2",
+            "a/b/c 12:30",
+        ] {
+            assert!(!is_ambiguous(text), "{text}");
+        }
     }
 
     #[test]

@@ -5,13 +5,14 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
-use super::calendar_time::CalendarTime;
+use super::calendar_time::{CalendarTime, is_ambiguous, is_time_of_day};
 use super::delimited::{
     Delimiter, Failures, HEAD_ROWS, fields, is_missing, is_number, name_and_unit, next_line,
     number, plain_unit,
 };
 use super::flight_file::{FlightWriter, batch_rows};
 use super::imported_contents::{ImportedColumn, ImportedContents, refused};
+use super::tall::Role;
 use super::tall_text::TallLayout;
 use crate::error::{Error, Result};
 
@@ -36,8 +37,30 @@ struct NumberColumn {
     /// Its place in a row.
     at: usize,
     head: ImportedColumn,
-    /// First of its values, if these are calendar times.
-    origin: Option<CalendarTime>,
+    /// Origin of its values, if these are calendar times.
+    origin: Option<Origin>,
+}
+
+/// Origin of calendar times.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Origin {
+    /// First of the values.
+    First(CalendarTime),
+    /// Beginning of the first date, which stands in the column `date`.
+    Midnight { first: CalendarTime, date: usize },
+}
+
+impl Origin {
+    /// Seconds from the origin to the time in the column `at` of a row.
+    fn seconds(self, fields: &[String], at: usize) -> Option<f64> {
+        let time = fields.get(at)?;
+        match self {
+            Origin::First(first) => CalendarTime::parse(time).map(|time| time.since(first)),
+            Origin::Midnight { first, date } => {
+                CalendarTime::of(fields.get(date)?, time).map(|time| time.since(first))
+            }
+        }
+    }
 }
 
 /// Imports a delimited text.
@@ -89,14 +112,7 @@ pub fn import(source: &Path, file: &Path) -> Result<ImportedContents> {
             layout.dropped.join(", ")
         ));
     }
-    let calendar = layout.columns.iter().filter(|c| c.origin.is_some());
-    let calendar: Vec<&str> = calendar.map(|c| c.head.name.as_str()).collect();
-    if !calendar.is_empty() {
-        notes.push(format!(
-            "calendar times are seconds from the first row's: {}",
-            calendar.join(", ")
-        ));
-    }
+    notes.extend(layout.notes_on_times());
     Ok(ImportedContents {
         rows,
         columns,
@@ -142,7 +158,11 @@ impl Layout {
             .filter_map(|(delimiter, comma)| Layout::with(lines, delimiter, comma))
             // Of layouts that read as many numbers the first counts: a space also separates `1, 2`.
             .reduce(|best, other| if other.0 > best.0 { other } else { best });
-        let layout = best.map(|(_, layout)| layout).ok_or_else(|| {
+        let layout = best.map(|(_, layout)| layout);
+        if let Some(what) = ambiguous_dates(lines, layout.as_ref()) {
+            return Err(what);
+        }
+        let layout = layout.ok_or_else(|| {
             "no table of numbers: harvest imports text with one row a sample and a header, MATLAB, HDF5 and tall Parquet"
                 .to_owned()
         })?;
@@ -164,7 +184,11 @@ impl Layout {
         let is_data = |line: &&str| {
             let fields = fields(line);
             let numbers = fields.iter().filter(|f| value(f).is_some()).count();
-            let has_text = || fields.iter().any(|f| value(f).is_none() && !is_missing(f));
+            let is_dated = fields.iter().any(|f| CalendarTime::midnight(f).is_some())
+                && fields.iter().any(|f| is_time_of_day(f));
+            let is_date = |f: &String| is_dated && CalendarTime::midnight(f).is_some();
+            let is_text = |f: &String| value(f).is_none() && !is_missing(f) && !is_date(f);
+            let has_text = || fields.iter().any(is_text);
             fields.len() >= 2 && (numbers * 2 > fields.len() || numbers > 0 && !has_text())
         };
         let first = lines.iter().position(is_data)?;
@@ -192,7 +216,9 @@ impl Layout {
                     .iter()
                     .any(|row| row.get(*at).is_some_and(|f| !is_missing(f)))
         };
-        let (dropped, kept): (Vec<usize>, Vec<usize>) = (0..width).partition(is_text);
+        let (mut dropped, kept): (Vec<usize>, Vec<usize>) = (0..width).partition(is_text);
+        let dated = date_beside_time(&rows, width);
+        dropped.retain(|at| dated.is_none_or(|dated| dated.date != *at));
         let column = |at: usize| {
             let (name, own) = name_and_unit(&names[at]);
             let unit = units
@@ -201,7 +227,9 @@ impl Layout {
                 .filter(|unit| !unit.is_empty())
                 .or(own);
             let calendar = |row: &Vec<String>| CalendarTime::parse(row.get(at)?);
-            let origin = rows.iter().find_map(calendar);
+            let first = rows.iter().find_map(calendar).map(Origin::First);
+            let own_date = dated.filter(|dated| dated.time == at);
+            let origin = own_date.map_or(first, |dated| Some(dated.origin));
             let unit = if origin.is_some() {
                 Some("s".to_owned())
             } else {
@@ -246,6 +274,31 @@ impl Layout {
         })
     }
 
+    /// Origins of the columns of calendar times, in words.
+    fn notes_on_times(&self) -> Vec<String> {
+        let of = |is_own: fn(&Origin) -> bool| {
+            let own = self
+                .columns
+                .iter()
+                .filter(|c| c.origin.is_some_and(|o| is_own(&o)));
+            let names: Vec<&str> = own.map(|c| c.head.name.as_str()).collect();
+            names.join(", ")
+        };
+        let first = of(|origin| matches!(origin, Origin::First(_)));
+        let midnight = of(|origin| matches!(origin, Origin::Midnight { .. }));
+        [
+            ("calendar times are seconds from the first row's", first),
+            (
+                "times with a date are seconds from the first date's midnight",
+                midnight,
+            ),
+        ]
+        .into_iter()
+        .filter(|(_, names)| !names.is_empty())
+        .map(|(what, names)| format!("{what}: {names}"))
+        .collect()
+    }
+
     /// Appends a row to a batch; a field that is no number is missing.
     fn append(
         &self,
@@ -257,10 +310,10 @@ impl Layout {
         let fields = fields(line, self.delimiter);
         for (column, NumberColumn { at, origin, .. }) in batch.iter_mut().zip(&self.columns) {
             let field = fields.get(*at);
-            let value = field.and_then(|field| match origin {
-                Some(first) => CalendarTime::parse(field).map(|time| time.since(*first)),
-                None => number(field, self.decimal_comma),
-            });
+            let value = match origin {
+                Some(origin) => origin.seconds(&fields, *at),
+                None => field.and_then(|field| number(field, self.decimal_comma)),
+            };
             match (field, value) {
                 (None, _) => failures.short_rows += 1,
                 (Some(field), None) if !is_missing(field) => {
@@ -271,6 +324,61 @@ impl Layout {
             column.push(value.unwrap_or(f64::NAN));
         }
     }
+}
+
+/// A column of dates and the column of times of day that belongs to it.
+#[derive(Clone, Copy, Debug)]
+struct DateBesideTime {
+    date: usize,
+    time: usize,
+    origin: Origin,
+}
+
+/// The only column of dates, with the times of day beside it, or with the only ones.
+fn date_beside_time(rows: &[Vec<String>], width: usize) -> Option<DateBesideTime> {
+    let all = |at: usize, is_own: &dyn Fn(&str) -> bool| {
+        let given = rows.iter().filter_map(|row| row.get(at));
+        let mut given = given.filter(|field| !is_missing(field)).peekable();
+        given.peek().is_some() && given.all(|field| is_own(field))
+    };
+    let is_date = |field: &str| CalendarTime::midnight(field).is_some();
+    let columns = |is_own: &dyn Fn(&str) -> bool| -> Vec<usize> {
+        (0..width).filter(|at| all(*at, is_own)).collect()
+    };
+    let [date] = columns(&is_date)[..] else {
+        return None;
+    };
+    let times = columns(&is_time_of_day);
+    let beside = times.iter().find(|at| **at == date + 1);
+    let before = times.iter().find(|at| **at + 1 == date);
+    let only = times.first().filter(|_| times.len() == 1);
+    let time = *beside.or(before).or(only)?;
+    let first = rows
+        .iter()
+        .find_map(|row| CalendarTime::midnight(row.get(date)?))?;
+    let origin = Origin::Midnight { first, date };
+    Some(DateBesideTime { date, time, origin })
+}
+
+/// Message for dates that may be others, in a text without another clock.
+fn ambiguous_dates(lines: &[&str], layout: Option<&Layout>) -> Option<String> {
+    let has_clock = |layout: &Layout| layout.columns.iter().any(|c| Role::Time.has(&c.head.name));
+    if layout.is_some_and(has_clock) {
+        return None;
+    }
+    let separators = ['\t', ';', ',', '|', '"'];
+    let ambiguous = |line: &&str| {
+        let mut fields = line.split(separators);
+        fields.find(|field| is_ambiguous(field)).map(str::to_owned)
+    };
+    let head = lines.iter().take(HEAD_ROWS);
+    let found: Vec<String> = head.clone().filter_map(ambiguous).collect();
+    let first = found.first().filter(|_| 2 * found.len() > head.len())?;
+    Some(format!(
+        "`{}` may have the day or the month first: write 2026-02-01, or 01.02.2026 with the day first and four digits of \
+         the year",
+        first.trim()
+    ))
 }
 
 /// A line above the numbers.
@@ -482,6 +590,62 @@ mod tests {
         assert_eq!(batch[0][0].to_bits(), 41_400.0_f64.to_bits());
         assert!(batch[0][1].is_nan());
         assert!(failures.notes()[0].contains("line 3: `05.25`"));
+    }
+
+    /// First column of some lines in a layout.
+    fn first_column(layout: &Layout, lines: &[&str]) -> Vec<f64> {
+        let mut batch = vec![Vec::new(); layout.columns.len()];
+        let mut failures = Failures::default();
+        for line in lines {
+            layout.append(line, 2, &mut batch, &mut failures);
+        }
+        batch.swap_remove(0)
+    }
+
+    #[test]
+    fn dates_with_points_are_calendar_times() {
+        let rows = ["25.11.2026 13:45:12,5;1,5", "25.11.2026 13:45:12,6;1,6"];
+        let layout = layout(&format!("Zeit;q\n{}\n", rows.join("\n")));
+        assert_eq!(names(&layout), [("Zeit", "s"), ("q", "")]);
+        let times = first_column(&layout, &rows);
+        assert!(
+            times[0].abs() < 1e-9 && (times[1] - 0.1).abs() < 1e-9,
+            "{times:?}"
+        );
+    }
+
+    #[test]
+    fn a_date_beside_its_time_counts_days_from_the_first_midnight() {
+        for (first, second) in [("25.11.2026", "26.11.2026"), ("2026-11-25", "2026-11-26")] {
+            let rows = [
+                format!("{first};23:59:59,5;1,5"),
+                format!("{second};00:00:00,5;1,6"),
+            ];
+            let layout = layout(&format!("Datum;Uhrzeit;q\n{}\n", rows.join("\n")));
+            assert_eq!(names(&layout), [("Uhrzeit", "s"), ("q", "")]);
+            assert!(layout.dropped.is_empty());
+            assert!(layout.notes_on_times()[0].contains("midnight: Uhrzeit"));
+            let rows = rows.each_ref().map(String::as_str);
+            let times = first_column(&layout, &rows);
+            assert!((times[0] - 86_399.5).abs() < 1e-9, "{times:?}");
+            assert!((times[1] - 86_400.5).abs() < 1e-9, "{times:?}");
+        }
+        // Without a date the times of day are as they were.
+        let plain = layout("Uhrzeit;q\n13:45:12,5;1\n13:45:12,6;2\n");
+        let times = first_column(&plain, &["13:45:12,5;1"]);
+        assert!((times[0] - 49_512.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_date_that_may_be_another_is_refused_where_it_is_the_clock() {
+        let stamped = "stamp;q\n01/02/2026 13:45:12;1,5\n01/02/2026 13:45:13;1,6\n";
+        let refused = Layout::of(stamped).unwrap_err();
+        assert!(
+            refused.contains("`01/02/2026 13:45:12` may have the day or the month first"),
+            "{refused}"
+        );
+        let with_clock = "time;stamp;q\n0;01/02/2026 13:45:12;1,5\n1;01/02/2026 13:45:13;1,6\n";
+        assert_eq!(layout(with_clock).dropped, ["stamp"]);
     }
 
     #[test]
