@@ -9,9 +9,9 @@
 
 /// Size above which glibc requests a block from the kernel and returns it when freed, bytes.
 /// Buffers of the archive's files are such blocks.
-pub const LARGEST_KEPT: i32 = 1 << 20;
+const LARGEST_KEPT: i32 = 1 << 20;
 /// Free bytes at the end of a heap beyond which it shrinks.
-pub const MOST_KEPT: i32 = 16 << 20;
+const MOST_KEPT: i32 = 16 << 20;
 
 /// Sets the limits of glibc's allocator; does nothing with another allocator.
 pub fn keep_freed_memory() {

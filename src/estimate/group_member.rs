@@ -46,7 +46,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
     }
 
     /// The maneuver in the window of its slopes.
-    pub fn case_with(&self, model: &Model) -> Case<NX, E> {
+    fn case_with(&self, model: &Model) -> Case<NX, E> {
         let aircraft = self.task.context.aircraft;
         self.prepared
             .case

@@ -56,7 +56,7 @@ const DERIVED: &[&str] = &[
 ];
 
 /// Pairs of engines, left before right.
-pub const SIDES: [(&str, &str); 8] = [
+const SIDES: [(&str, &str); 8] = [
     ("l", "r"),
     ("left", "right"),
     ("lh", "rh"),

@@ -21,7 +21,7 @@ use crate::store::{Fingerprint, atomic};
 use crate::tables::{PublishedTrend, PublishedVerdict};
 
 /// Name of the published file with the changes since the night before, for machines to read.
-pub const ALERT: &str = "alert.json";
+const ALERT: &str = "alert.json";
 
 /// End of a run.
 #[derive(Clone, Debug)]

@@ -29,7 +29,7 @@ pub fn continuous_root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
 
 /// The symmetric root, S S = C.
 #[must_use]
-pub fn symmetric_root(matrix: DMatrix<f64>) -> DMatrix<f64> {
+fn symmetric_root(matrix: DMatrix<f64>) -> DMatrix<f64> {
     if matrix.is_empty() {
         return matrix;
     }
@@ -50,7 +50,7 @@ pub fn root_of_some(covariance: &DMatrix<f64>, places: &[usize], least: f64) -> 
 /// Root as by [`root`], with the row of each column's pivot. These rows are a lower triangular
 /// matrix, the exact root of their own covariance.
 #[must_use]
-pub fn root_with_pivots(covariance: &DMatrix<f64>, least: f64) -> (DMatrix<f64>, Vec<usize>) {
+fn root_with_pivots(covariance: &DMatrix<f64>, least: f64) -> (DMatrix<f64>, Vec<usize>) {
     let all: Vec<usize> = (0..covariance.nrows()).collect();
     pivoted(covariance, &all, least)
 }

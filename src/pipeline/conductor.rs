@@ -197,7 +197,7 @@ impl<'a> Conductor<'a> {
     ///
     /// # Errors
     /// As [`Conductor::campaign`].
-    pub fn campaign_of(&self, files: &[FlightFiles], until: Stage) -> Result<Campaign> {
+    fn campaign_of(&self, files: &[FlightFiles], until: Stage) -> Result<Campaign> {
         let (runner, config) = (&self.runner, self.runner.config);
         let mut campaign = Campaign::default();
         ingest_step::ingest(runner, files, &self.flight_contents, &mut campaign)?;

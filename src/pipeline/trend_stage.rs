@@ -31,7 +31,7 @@ pub fn read_earlier(config: &Config) -> Result<Vec<Earlier>> {
 
 /// Estimates and combined sums of the maneuvers that converged, without biases.
 #[must_use]
-pub fn converged_estimates(config: &Config, campaign: &Campaign) -> Vec<EstimateRow> {
+fn converged_estimates(config: &Config, campaign: &Campaign) -> Vec<EstimateRow> {
     let converged: BTreeSet<&str> = campaign
         .fits
         .iter()

@@ -34,7 +34,7 @@ pub struct Root {
 
 impl Root {
     #[must_use]
-    pub fn is_complex(&self) -> bool {
+    fn is_complex(&self) -> bool {
         self.value.im.abs() > REAL * self.value.norm()
     }
 

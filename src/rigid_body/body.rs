@@ -70,7 +70,7 @@ impl BodyState {
 
     /// Rotation matrix from body to earth axes.
     #[must_use]
-    pub fn earth_from_body(&self) -> Matrix3<f64> {
+    fn earth_from_body(&self) -> Matrix3<f64> {
         UnitQuaternion::from_quaternion(self.attitude)
             .to_rotation_matrix()
             .into_inner()

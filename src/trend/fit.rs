@@ -205,11 +205,7 @@ impl TrendFit {
     }
 
     /// The fit of one basis; `None` if the normal equations have no solution.
-    pub(super) fn fit_basis(
-        points: &[TrendPoint],
-        basis: Basis,
-        criterion: Criterion,
-    ) -> Option<TrendFit> {
+    fn fit_basis(points: &[TrendPoint], basis: Basis, criterion: Criterion) -> Option<TrendFit> {
         let (n, p) = (points.len(), basis.size());
         let rows: Vec<_> = points.iter().map(|q| basis.row(q.alpha_deg)).collect();
         let design = DMatrix::from_rows(&rows);

@@ -320,6 +320,58 @@ fn only_the_command_line_prints() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
+/// Files of program, tests and benchmarks that name a word, by word.
+fn files_by_word(texts: &[String]) -> BTreeMap<&str, usize> {
+    let mut files_of = BTreeMap::new();
+    for text in texts {
+        for word in words(text).collect::<BTreeSet<_>>() {
+            *files_of.entry(word).or_default() += 1;
+        }
+    }
+    files_of
+}
+
+/// Name of the function or constant that a line makes visible to other files.
+fn visible(line: &str) -> Option<&str> {
+    let line = line.trim_start();
+    let line = ["pub ", "pub(crate) ", "pub(super) "]
+        .iter()
+        .find_map(|visibility| line.strip_prefix(visibility))?;
+    ["const fn ", "fn ", "const ", "static "]
+        .iter()
+        .find_map(|item| words(line.strip_prefix(item)?).next())
+}
+
+/// Is the item called through a module, one inside the file or the one that a macro names?
+fn is_reached_by_module(bare: &str, name: &str) -> bool {
+    bare.match_indices(&format!("::{name}")).any(|(at, _)| {
+        let before = words(&bare[..at]).last();
+        before.is_some_and(|word| word.starts_with(char::is_lowercase))
+    })
+}
+
+#[test]
+fn a_function_or_constant_of_one_file_is_private() {
+    assert_eq!(visible("    pub const fn f(&self) {}"), Some("f"));
+    let texts: Vec<String> = ["src", "tests", "benches"]
+        .iter()
+        .flat_map(|folder| files(&root().join(folder)))
+        .filter(|file| file.extension().is_some_and(|e| e == "rs"))
+        .map(|file| fs::read_to_string(file).unwrap())
+        .collect();
+    let files_of = files_by_word(&texts);
+    let mut wrong = Vec::new();
+    for source in sources() {
+        for (number, name) in lines(&source.bare).filter_map(|(n, line)| Some((n, visible(line)?)))
+        {
+            if files_of[name] == 1 && !is_reached_by_module(&source.bare, name) {
+                wrong.push(format!("src/{}:{number}: {name}", source.path));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
 #[test]
 fn every_file_has_a_header() {
     for file in files(&root().join("src"))

@@ -31,7 +31,7 @@ pub enum Detail {
 }
 
 /// Step of a coarse response, s: it follows the airframe's motion well, but not the surfaces.
-pub const COARSE_STEP_S: f64 = 0.1;
+const COARSE_STEP_S: f64 = 0.1;
 /// Least number of samples per parameter of a coarse response.
 const SAMPLES_PER_PARAMETER: usize = 8;
 

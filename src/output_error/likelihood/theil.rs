@@ -46,7 +46,7 @@ pub struct OutputAgreement {
 impl OutputAgreement {
     /// Moments of pairs (measured, computed).
     #[must_use]
-    pub fn of_pairs(pairs: &[(f64, f64)]) -> OutputAgreement {
+    fn of_pairs(pairs: &[(f64, f64)]) -> OutputAgreement {
         let mean_measured = mean_of(pairs, |z, _| z);
         let mean_computed = mean_of(pairs, |_, y| y);
         OutputAgreement {

@@ -38,7 +38,7 @@ impl Columns {
 
     /// Width of a column, s.
     #[must_use]
-    pub fn width_s(self) -> f64 {
+    fn width_s(self) -> f64 {
         (self.to_s - self.from_s) / self.count.max(1) as f64
     }
 }
