@@ -37,8 +37,8 @@ impl LinearTable {
                     .to_owned(),
             ));
         }
-        if let Some(pair) = at.windows(2).find(|pair| pair[1] <= pair[0]) {
-            let what = format!("`at` must increase: {} comes after {}", pair[1], pair[0]);
+        if let Some([before, after]) = at.array_windows().find(|[before, after]| after <= before) {
+            let what = format!("`at` must increase: {after} comes after {before}");
             return Err(("at", what));
         }
         if value.len() != at.len() {
