@@ -41,7 +41,7 @@ pub const IZ: &str = "iz_slug_ft2";
 pub const IXZ: &str = "ixz_slug_ft2";
 
 /// Signals that harvest uses where a recorder has them.
-const OPTIONAL: [&str; 2] = [PSI, AIR_TEMPERATURE];
+pub const OPTIONAL: [&str; 2] = [PSI, AIR_TEMPERATURE];
 
 /// `true` for a signal of harvest's own, required or optional, other than time: no name of the
 /// analyst's.
@@ -53,11 +53,14 @@ pub fn is_own(signal: &str) -> bool {
 /// Required signals that are greater than zero in flight.
 pub const POSITIVE: &[&str] = &[VELOCITY, QBAR, MASS, IX, IY, IZ];
 
+/// Required signals whose stand-in costs no derivative of either axis.
+const REPLACEABLE: [&str; 5] = [MACH, ALTITUDE, THRUST, RPM_LEFT, RPM_RIGHT];
+
 /// `true` for a signal whose fault refuses a flight. Any other faulty signal is left out, and a
 /// stand-in replaces it at little cost.
 #[must_use]
 pub fn is_indispensable(signal: &str) -> bool {
-    REQUIRED.contains(&signal) && ![MACH, RPM_LEFT, RPM_RIGHT].contains(&signal)
+    REQUIRED.contains(&signal) && !REPLACEABLE.contains(&signal)
 }
 
 /// Signals that the equations of motion need: each is a channel, a constant or a stand-in.

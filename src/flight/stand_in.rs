@@ -28,6 +28,9 @@ pub enum StandIn {
     AltitudeOfPressure,
     /// Pitch attitude of level flight: θ = α.
     ThetaOfAlpha,
+    /// No value: the record is as if the signal were not recorded. For a signal that no equation of
+    /// motion reads.
+    Absent,
 }
 
 /// States that only the lateral derivatives need. Without one of them the longitudinal equations
@@ -76,6 +79,7 @@ impl StandIn {
             }
             StandIn::AltitudeOfPressure => "is computed from V and q̄".to_owned(),
             StandIn::ThetaOfAlpha => "is taken as α, as in level flight".to_owned(),
+            StandIn::Absent => "is left out".to_owned(),
         }
     }
 
@@ -83,7 +87,7 @@ impl StandIn {
     #[must_use]
     pub fn sources(self) -> &'static [&'static str] {
         match self {
-            StandIn::Value(_) => &[],
+            StandIn::Value(_) | StandIn::Absent => &[],
             StandIn::MachOfVelocity | StandIn::PressureOfVelocity => &[s::VELOCITY, s::ALTITUDE],
             StandIn::VelocityOfMach => &[s::MACH, s::ALTITUDE],
             StandIn::VelocityOfPressure => &[s::QBAR, s::ALTITUDE],
@@ -105,11 +109,16 @@ impl StandIn {
             StandIn::PressureOfVelocity => 0.5 * air(b).density_slug_ft3 * a * a,
             StandIn::AltitudeOfPressure => altitude_ft(2.0 * b / (a * a), kelvin),
             StandIn::ThetaOfAlpha => a,
+            StandIn::Absent => f64::NAN,
         }
     }
 
     /// Puts the stand-in in the place of the signal.
     pub fn fill(self, signal: &str, record: &mut Record) {
+        if self == StandIn::Absent {
+            record.signals.remove(signal);
+            return;
+        }
         let sources: Option<Vec<&[f64]>> = self
             .sources()
             .iter()
@@ -192,6 +201,9 @@ pub fn cost(signal: &str, has: impl Fn(&str) -> bool) -> &'static str {
         }
         s::ALTITUDE => "gravity and the density have the error of the other air data",
         s::PSI => "the errors of the other instruments are found with larger bounds",
+        s::AIR_TEMPERATURE => {
+            "the air has the temperature of the standard atmosphere: q̄ and Mach are not compared with V on a warm or cold day"
+        }
         s::AY if has_all(&LATERAL) => {
             "the CY derivatives follow from the motion of beta alone, with larger bounds"
         }

@@ -1,34 +1,25 @@
 //! Assessment of a stretch after all of its channels are read: counts, kinematic relations, gusts
 //! and instrument errors.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Range;
+use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
 use super::channel::{
-    ChannelStatistics, ConditionedChannel, Signature, empty_channel, missing_signal, stuck_channel,
-    values_beyond,
+    ChannelStatistics, ConditionedChannel, Signature, empty_channel, missing_signal,
+    sparse_channel, stuck_channel, values_beyond,
 };
-use super::checks::{
-    BlockAverager, BlockMeans, Check, FaultReport, FaultyChannel, Gusts, ImpossibleSignal,
-    LiftPoint, check_relations, confirmed_signals, find_faulty_channels, impossible_centre,
-    impossible_gyration, impossible_mass, impossible_signals, impossible_velocity, lift_curve,
-    report, wrong_time,
-};
-use super::clock::{Clock, Stretch};
-use super::compatibility::{self, ErrorEvidence, Findings, OnFault};
+use super::checks::{BlockAverager, FaultReport, Gusts, LiftPoint, lift_curve};
+use super::clock::Stretch;
+use super::compatibility::{ErrorEvidence, Findings, OnFault};
 use super::context::Context;
+use super::examination::{Examination, Outcome, RecordReader, RelationResult};
 use super::refusal::Refusal;
 use super::settings::OnFailedCheck;
 use super::table_ends::held_throughout;
 use crate::error::Problem;
-use crate::flight::{Channel, Correction, Mark, Record, StandIn, signal};
+use crate::flight::{Channel, Correction, Mark, StandIn, signal};
 use crate::tables::{ChannelRow, ChannelVerdict, CheckRow, FlightRow, InstrumentRow};
-
-/// Samples of a long record that are reconstructed at once: under an hour of a usual recorder, so
-/// that memory does not grow with the record.
-const PART_SAMPLES: usize = 1 << 17;
 
 /// Results of ingest for one stretch, besides its record.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -51,9 +42,6 @@ pub struct Assessment {
     pub signature: Signature,
 }
 
-/// Reads signals of a record over a range of its samples; `None` if they cannot be read.
-type RecordReader<'a> = dyn Fn(&BTreeSet<String>, Range<usize>) -> Option<Record> + 'a;
-
 /// Assesses a stretch from its conditioned channels. `read` reads signals of its record over a
 /// range of samples.
 ///
@@ -72,46 +60,42 @@ pub fn assess(
     let examination = Examination {
         clock: &stretch.clock,
         context,
-        recorded: recording.block_means.keys().cloned().collect(),
-        stand_ins: &recording.stand_ins,
+        recorded: std::mem::take(&mut recording.recorded),
+        stand_ins: std::mem::take(&mut recording.stand_ins),
         read,
     };
     let blocks = examination.blocks(std::mem::take(&mut recording.block_means));
     let channels = recording.channels.iter();
     let at_ends = channels.filter_map(|(name, channel, _)| held_throughout(name, channel, &blocks));
     problems.extend(at_ends.map(|refusal| refusal.into_problem(flight_id)));
-    let (mut relations, findings) = examination.reconcile(&blocks);
-    if relations.impossible.is_empty() {
-        relations.impossible = examination.impossible(&blocks, &relations.faulty);
-    }
-    problems.extend(impossible_values(&relations, context, flight_id)?);
-    let mut stand_ins = recording.stand_ins;
+    let outcome = examination.examine(blocks);
+    let Outcome {
+        relations,
+        findings,
+        left_out,
+        ..
+    } = &outcome;
+    let left_out = left_out.iter().map(|one| one.refusal.clone());
+    problems.extend(left_out.map(|refusal| refusal.into_problem(flight_id)));
+    problems.extend(impossible_values(relations, context, flight_id)?);
     if let Some(report) = &relations.report {
-        let left_out = left_out(report, &relations.faulty);
-        let problem = relation_problem(report, &left_out, &findings, flight_id);
-        if context.settings.on_failed_check == OnFailedCheck::Refuse && report.required {
+        let problem = relation_problem(report, findings, flight_id);
+        if context.settings.on_failed_check == OnFailedCheck::Refuse {
             return Err(problem);
         }
         problems.push(problem);
-        stand_ins.extend(left_out);
     }
-    problems.extend(instrument_faults(&findings, context, flight_id)?);
+    problems.extend(instrument_faults(findings, context, flight_id)?);
     Ok(Assessment {
         flight: Some(flight_row(stretch, &relations.gusts)),
-        channels: channel_rows(
-            stretch,
-            context.channels,
-            &recording.channels,
-            &relations,
-            &findings,
-        ),
+        channels: channel_rows(stretch, context.channels, &recording.channels, &outcome),
         checks: relations.check_rows(flight_id),
         instruments: findings.rows(flight_id),
         error_evidence: findings.evidence(),
         corrections: findings.corrections(),
-        stand_ins,
         problems,
-        lift: lift_curve(&blocks, context.aircraft, &context.settings.checks),
+        lift: lift_curve(&outcome.blocks, context.aircraft, &context.settings.checks),
+        stand_ins: outcome.stand_ins,
         signature: recording.signature,
     })
 }
@@ -161,6 +145,8 @@ struct Recording<'a> {
     channels: Vec<ReadChannel<'a>>,
     /// Block means by signal, of channels that a relation uses.
     block_means: BTreeMap<String, BlockAverager>,
+    /// Signals with values.
+    recorded: Vec<String>,
     problems: Vec<Problem>,
     stand_ins: Vec<(String, StandIn)>,
     signature: Signature,
@@ -176,11 +162,22 @@ impl<'a> Recording<'a> {
         let (mut channels, mut problems, mut empty) = (Vec::new(), Vec::new(), Vec::new());
         let mut block_means = BTreeMap::new();
         let mut signature_samples = Vec::new();
+        let signals: Vec<&str> = conditioned
+            .iter()
+            .map(|one| one.channel.signal.as_str())
+            .collect();
+        let is_replaceable = |signal: &str| {
+            let is_other = |name: &str| name != signal && signals.contains(&name);
+            signal::REQUIRED.contains(&signal) && context.can_do_without(signal, is_other)
+        };
         for one in conditioned {
             let (name, channel, statistics) = (one.name, one.channel, one.statistics);
+            let signal = channel.signal.as_str();
             if statistics.count(Mark::Missing) == clock.samples {
-                let refusal = empty_channel(name, channel, clock.rows);
-                empty.push((channel.signal.as_str(), refusal));
+                empty.push((signal, empty_channel(name, channel, clock.rows)));
+            } else if is_replaceable(signal) && 2 * with_value(&statistics) < clock.samples {
+                let share = with_value(&statistics) as f64 / clock.samples as f64;
+                empty.push((signal, sparse_channel(name, channel, share)));
             } else {
                 let stuck = stuck_channel(name, &statistics, clock);
                 let beyond = values_beyond(name, channel, &statistics, clock);
@@ -194,12 +191,12 @@ impl<'a> Recording<'a> {
             }
             channels.push((name, channel, statistics));
         }
-        let is_recorded = |signal: &str| {
-            let mut recorded = channels
-                .iter()
-                .map(|(_, channel, _)| channel.signal.as_str());
-            recorded.any(|s| s == signal) && !empty.iter().any(|(s, _)| *s == signal)
-        };
+        let recorded = channels
+            .iter()
+            .map(|(_, channel, _)| channel.signal.clone());
+        let recorded = recorded.filter(|signal| !empty.iter().any(|(s, _)| s == signal));
+        let recorded: Vec<String> = recorded.collect();
+        let is_recorded = |signal: &str| recorded.iter().any(|s| s == signal);
         let stand_ins = match context.stand_ins(is_recorded) {
             Ok(stand_ins) => stand_ins,
             Err(signal) => return Err(refused_signal(signal, empty).into_problem(flight_id)),
@@ -211,11 +208,18 @@ impl<'a> Recording<'a> {
         Ok(Recording {
             channels,
             block_means,
+            recorded,
             problems,
             stand_ins,
             signature: Signature::of(signature_samples.into_iter()),
         })
     }
+}
+
+/// Number of samples of a channel that have a value.
+fn with_value(statistics: &ChannelStatistics) -> usize {
+    let kept = [Mark::Measured, Mark::Bridged, Mark::Despiked, Mark::Between];
+    kept.map(|mark| statistics.count(mark)).iter().sum()
 }
 
 /// Refusal of a required signal that can have no stand-in, at its empty channel if it has one.
@@ -224,243 +228,20 @@ fn refused_signal(signal: &str, empty: Vec<(&str, Refusal)>) -> Refusal {
     own.map_or_else(|| missing_signal(signal), |(_, refusal)| refusal)
 }
 
-/// Inputs of the relation checks and of flight-path reconstruction.
-struct Examination<'a> {
-    clock: &'a Clock,
-    context: &'a Context<'a>,
-    /// Signals that come from channels.
-    recorded: Vec<String>,
-    stand_ins: &'a [(String, StandIn)],
-    read: &'a RecordReader<'a>,
-}
-
-impl Examination<'_> {
-    /// Block means of the recorded signals and of the constants.
-    fn blocks(&self, mut means: BTreeMap<String, BlockAverager>) -> BlockMeans {
-        let (clock, checks) = (self.clock, &self.context.settings.checks);
-        for (signal, value) in self.context.constants {
-            let constant =
-                BlockAverager::constant(signal, *value, clock.samples, clock.step_s, checks);
-            if let Some(constant) = constant {
-                means.entry(signal.clone()).or_insert(constant);
-            }
-        }
-        BlockMeans::of(means, clock.samples, clock.step_s, checks)
-    }
-
-    /// Reconciles the relations between channels with the errors of the instruments.
-    ///
-    /// If a channel has a wrong sign or unit, the errors of the other instruments are estimated
-    /// with the channel corrected; the record is left as it is. If no sign and no unit explains a
-    /// failed relation, a delay may: if the relation holds once the delays are removed, the delay
-    /// is the fault.
-    fn reconcile(&self, blocks: &BlockMeans) -> (RelationResult, Findings) {
-        let relations = self.check(blocks);
-        if !relations.impossible.is_empty() {
-            return (relations, Findings::default());
-        }
-        let faulty = &relations.faulty;
-        if !faulty.is_empty() && faulty.iter().all(FaultyChannel::is_correctable) {
-            let findings = self.reconstruct(|record| correct_by_factors(record, faulty));
-            return (relations, findings.without_corrections());
-        }
-        // With a dead channel or with one fault among several there is nothing to go by.
-        if !faulty.is_empty() && !faulty.iter().any(|f| signal::is_indispensable(&f.signal)) {
-            let findings = self.reconstruct(|record| leave_out(record, faulty));
-            return (relations, findings);
-        }
-        if faulty.iter().any(|f| f.cause.is_some()) {
-            return (relations, Findings::default());
-        }
-        let findings = self.reconstruct(|_| ());
-        if relations.report.is_none() {
-            return (relations, findings);
-        }
-        if findings.has_fault() {
-            let corrected = blocks.corrected(&findings.with_faults_corrected().corrections());
-            let again = self.check(&corrected);
-            if again.report.is_none() {
-                return (again, findings);
-            }
-        }
-        (relations, Findings::default())
-    }
-
-    /// Finds signals with values that no aircraft has. The mass is checked only if no relation
-    /// finds a fault in the other signals of the lift.
-    fn impossible(&self, blocks: &BlockMeans, faulty: &[FaultyChannel]) -> Vec<ImpossibleSignal> {
-        const LIFT: [&str; 4] = [
-            signal::AN,
-            signal::ALPHA_VANE,
-            signal::QBAR,
-            signal::VELOCITY,
-        ];
-        let Context {
-            channels,
-            aircraft,
-            settings,
-            ..
-        } = *self.context;
-        let mut found = impossible_signals(blocks);
-        found.extend(impossible_centre(blocks, aircraft));
-        found.extend(impossible_velocity(blocks, &settings.checks));
-        if !found.is_empty() || faulty.iter().any(|f| LIFT.contains(&f.signal.as_str())) {
-            return found;
-        }
-        let mass = channels.values().find(|c| c.signal == signal::MASS);
-        let unit = mass.map(|channel| channel.unit.as_str());
-        impossible_mass(blocks, aircraft, unit, &settings.checks)
-            .or_else(|| impossible_gyration(blocks, aircraft))
-            .into_iter()
-            .collect()
-    }
-
-    /// Checks the kinematic relations and isolates the faulty channels. A wrong time fails the
-    /// relations of every channel; no channel is then named.
-    fn check(&self, blocks: &BlockMeans) -> RelationResult {
-        let Context {
-            channels,
-            aircraft,
-            settings,
-            ..
-        } = *self.context;
-        let (checks, gusts) = check_relations(blocks, aircraft, &settings.checks);
-        if let Some(time) = wrong_time(&checks) {
-            return RelationResult {
-                confirmed: Vec::new(),
-                report: None,
-                checks,
-                gusts,
-                faulty: Vec::new(),
-                impossible: vec![time],
-            };
-        }
-        let faulty = find_faulty_channels(
-            blocks,
-            &checks,
-            channels,
-            &self.recorded,
-            aircraft,
-            &settings.checks,
-        );
-        RelationResult {
-            confirmed: confirmed_signals(&checks),
-            report: report(&faulty, &checks),
-            checks,
-            gusts,
-            faulty,
-            impossible: Vec::new(),
-        }
-    }
-
-    /// Estimates the instruments' errors by flight-path reconstruction, part by part of the
-    /// record, each part after `correct`.
-    fn reconstruct(&self, correct: impl Fn(&mut Record)) -> Findings {
-        let samples = self.clock.samples;
-        let count = samples.div_ceil(PART_SAMPLES);
-        let signals = compatibility::signals();
-        let parts = (0..count).filter_map(|i| {
-            let range = i * PART_SAMPLES..((i + 1) * PART_SAMPLES).min(samples);
-            let mut record = (self.read)(&signals, range)?;
-            for (signal, stand_in) in self.stand_ins {
-                stand_in.fill(signal, &mut record);
-            }
-            correct(&mut record);
-            Some(record)
-        });
-        compatibility::examine(
-            parts,
-            count,
-            self.context.channels,
-            &self.recorded,
-            self.context.aircraft,
-            &self.context.settings.compatibility,
-        )
-    }
-}
-
-/// Multiplies the signals of faulty channels by the factors that correct them.
-fn correct_by_factors(record: &mut Record, faulty: &[FaultyChannel]) {
-    for fault in faulty {
-        let series = record.signals.get_mut(&fault.signal);
-        if let (Some(factor), Some(series)) = (fault.factor, series) {
-            series.values.iter_mut().for_each(|v| *v *= factor);
-        }
-    }
-}
-
-/// Removes the signals of faulty channels.
-fn leave_out(record: &mut Record, faulty: &[FaultyChannel]) {
-    record
-        .signals
-        .retain(|name, _| !faulty.iter().any(|f| f.signal == *name));
-}
-
-/// Outcome of the kinematic relations of one stretch.
-struct RelationResult {
-    checks: Vec<Check>,
-    gusts: Gusts,
-    faulty: Vec<FaultyChannel>,
-    /// Signals that a relation confirms.
-    confirmed: Vec<&'static str>,
-    report: Option<FaultReport>,
-    /// Signals with values that no aircraft has, unless they refuse the flight.
-    impossible: Vec<ImpossibleSignal>,
-}
-
-impl RelationResult {
-    fn check_rows(&self, flight_id: &str) -> Vec<CheckRow> {
-        self.checks.iter().map(|c| c.row(flight_id)).collect()
-    }
-
-    fn verdict(&self, signal: &str) -> ChannelVerdict {
-        if let Some(one) = self.impossible.iter().find(|one| one.signal == signal) {
-            return ChannelVerdict::Fault(one.reason.clone());
-        }
-        match self.faulty.iter().find(|f| f.signal == signal) {
-            Some(fault) => ChannelVerdict::Fault(fault.verdict()),
-            None if self.confirmed.contains(&signal) => ChannelVerdict::Ok,
-            None => ChannelVerdict::NotChecked,
-        }
-    }
-}
-
 /// Problem of the failed relations, with the instrument faults found besides.
-fn relation_problem(
-    report: &FaultReport,
-    left_out: &[(String, StandIn)],
-    findings: &Findings,
-    flight_id: &str,
-) -> Problem {
-    let left_out = left_out
-        .iter()
-        .fold(String::new(), |words, (signal, stand_in)| {
-            let one = format!(". It is left out: `{signal}` {}", stand_in.in_words());
-            words + &one
-        });
+fn relation_problem(report: &FaultReport, findings: &Findings, flight_id: &str) -> Problem {
     let besides = findings
         .fault_summary()
         .map(|faults| format!(". Besides, {faults}"))
         .unwrap_or_default();
     let refusal = Refusal {
         place: report.place.clone(),
-        reason: format!("{}{left_out}{besides}", report.reason),
+        reason: format!(
+            "{}. Correct the channel map, or leave the flight out{besides}",
+            report.reason
+        ),
     };
     refusal.into_problem(flight_id)
-}
-
-/// Faulty channels that a flight can do without, each with its stand-in; empty if the report
-/// refuses the stretch.
-fn left_out(report: &FaultReport, faulty: &[FaultyChannel]) -> Vec<(String, StandIn)> {
-    if report.required {
-        return Vec::new();
-    }
-    let is_faulty = |signal: &str| faulty.iter().any(|f| f.signal == signal);
-    let stand_in = |fault: &FaultyChannel| {
-        let stand_in = StandIn::of(&fault.signal, |signal| !is_faulty(signal))?;
-        Some((fault.signal.clone(), stand_in))
-    };
-    faulty.iter().filter_map(stand_in).collect()
 }
 
 /// One problem that joins the places and reasons of several.
@@ -495,13 +276,10 @@ fn channel_rows(
     stretch: &Stretch,
     channel_map: &BTreeMap<String, Channel>,
     channels: &[ReadChannel],
-    relations: &RelationResult,
-    findings: &Findings,
+    outcome: &Outcome,
 ) -> Vec<ChannelRow> {
     let of_channel = |(name, channel, statistics): &ReadChannel| {
-        let fault = findings.verdict(&channel.signal);
-        let verdict =
-            fault.map_or_else(|| relations.verdict(&channel.signal), ChannelVerdict::Fault);
+        let verdict = outcome.verdict(&channel.signal);
         channel_row(stretch, name, channel, statistics, verdict)
     };
     let time = channel_map

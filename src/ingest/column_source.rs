@@ -20,6 +20,11 @@ pub trait ColumnSource: Sync {
     /// Unit that a file states for a column, where it states one.
     fn unit(&self, file: usize, column: &str) -> Option<&str>;
 
+    /// Reason for which a column of a file holds no numbers, in words; such a column counts as absent.
+    fn unreadable(&self, _file: usize, _column: &str) -> Option<&str> {
+        None
+    }
+
     /// Passes the values of some rows to `sink` in order and in pieces; a null is a NaN.
     ///
     /// # Errors

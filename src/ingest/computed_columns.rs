@@ -82,6 +82,10 @@ impl<S: ColumnSource + ?Sized> ColumnSource for ComputedColumns<'_, S> {
         }
     }
 
+    fn unreadable(&self, file: usize, column: &str) -> Option<&str> {
+        self.source.unreadable(file, column)
+    }
+
     fn read(
         &self,
         file: usize,

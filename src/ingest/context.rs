@@ -6,7 +6,7 @@ use super::refusal::Refusal;
 use super::settings::Settings;
 use crate::aircraft::Aircraft;
 use crate::flight::stand_in::stand_ins;
-use crate::flight::{Channel, StandIn};
+use crate::flight::{Channel, StandIn, signal};
 
 /// Channel map, constants, aircraft and settings of ingest.
 #[derive(Clone, Copy, Debug)]
@@ -30,6 +30,14 @@ impl Context<'_> {
                 reason,
             },
         }
+    }
+
+    /// `true` for a signal that a flight can do without at little cost. `recorded` is `true` for the
+    /// signals that its channels give.
+    pub(super) fn can_do_without(&self, signal: &str, recorded: impl Fn(&str) -> bool) -> bool {
+        let has = |name: &str| recorded(name) || self.constants.contains_key(name);
+        let is_read = signal::REQUIRED.contains(&signal);
+        !signal::is_indispensable(signal) && (!is_read || StandIn::of(signal, has).is_some())
     }
 
     /// Stand-ins of the required signals that neither `recorded` nor a constant gives.

@@ -13,6 +13,7 @@ mod checks;
 mod clock;
 pub mod compatibility;
 mod context;
+mod examination;
 mod in_memory;
 mod refusal;
 mod settings;

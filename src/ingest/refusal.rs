@@ -25,11 +25,14 @@ impl Refusal {
     /// This refusal with the stand-in of the signal that is left out, and the cost of its absence.
     #[must_use]
     pub fn with_stand_in(self, signal: &str, stand_ins: &[(String, StandIn)]) -> Refusal {
-        let stand_in_of = |signal: &str| stand_ins.iter().find(|(name, _)| name == signal);
+        let stand_in_of = |signal: &str| {
+            let mut present = stand_ins.iter().filter(|(_, s)| *s != StandIn::Absent);
+            present.find(|(name, _)| name == signal)
+        };
         let cost = cost(signal, |other| stand_in_of(other).is_none());
         let consequence = match stand_in_of(signal) {
             Some((name, stand_in)) => format!("; `{name}` {}: {cost}", stand_in.in_words()),
-            None if signal == signal::PSI => format!("; {cost}"),
+            None if signal::OPTIONAL.contains(&signal) => format!("; {cost}"),
             None => String::new(),
         };
         Refusal {

@@ -294,6 +294,38 @@ fn a_channel_that_nothing_requires_is_left_out_by_name() {
     assert!(!ingested.record.signals.contains_key(signal::PSI));
 }
 
+#[test]
+fn a_stated_unit_that_contradicts_the_map_costs_no_flight_where_nothing_requires_the_signal() {
+    let mut flight = Flight::steady();
+    for name in ["altitude", "de"] {
+        flight.raw.columns.get_mut(name).unwrap().unit = Some("furlong".to_owned());
+    }
+    let ingested = flight.ingest().unwrap();
+    let places: Vec<&str> = ingested.problems.iter().map(|p| p.place.as_str()).collect();
+    assert_eq!(places, ["channel `altitude`", "channel `de`"]);
+    assert!(!ingested.record.is_recorded(signal::ALTITUDE));
+    let altitude = ingested.record.values(signal::ALTITUDE).unwrap()[5];
+    assert_relative_eq!(altitude, 20_000.0, max_relative = 1e-3);
+    // Without the dynamic pressure the altitude is required.
+    flight.raw.columns.remove("qbar");
+    assert_eq!(flight.refused().place, "channel `altitude`");
+}
+
+#[test]
+fn a_replaceable_channel_without_values_in_most_samples_is_left_out() {
+    let mut flight = Flight::noisy();
+    flight.values("mach")[..ROWS * 3 / 4].fill(f64::NAN);
+    flight.values("theta")[..ROWS * 3 / 4].fill(f64::NAN);
+    let ingested = flight.ingest().unwrap();
+    let [problem] = &ingested.problems[..] else {
+        panic!("{:?}", ingested.problems)
+    };
+    assert_eq!(problem.place, "channel `mach`");
+    assert!(problem.reason.contains("25.0 %"), "{problem:?}");
+    assert!(ingested.record.values(signal::MACH).unwrap()[5].is_finite());
+    assert!(ingested.record.values(signal::THETA).unwrap()[5].is_nan());
+}
+
 /// A flight whose inertia about x is a table over fuel that burns from 300 kg to 100 kg.
 fn with_inertia_over(at: [f64; 2]) -> Flight {
     let mut flight = Flight::steady();

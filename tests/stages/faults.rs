@@ -4,12 +4,14 @@ use std::path::Path;
 
 use harvest::config::{Config, Overrides};
 use harvest::error::Problem;
-use harvest::flight::RawFlight;
+use harvest::flight::{Channel, RawFlight};
 use harvest::ingest::compatibility::{Compatibility, OnFault};
 use harvest::ingest::{self, Ingested, Settings};
 use harvest::schema::Words;
 use harvest::store::archive;
 use harvest::tables::CheckVerdict;
+
+use crate::support::Random;
 
 const DEG: f64 = 57.295_779_5;
 
@@ -214,6 +216,103 @@ fn a_refused_flight_names_channel_relation_and_cause() {
         "{}",
         problem.reason
     );
+}
+
+/// Values that have nothing of the signal: noise of a size about a middle.
+fn noise(count: usize, middle: f64, size: f64) -> Vec<f64> {
+    let mut random = Random::new(7);
+    let mut value = || middle + size * (2.0 * random.unit() - 1.0);
+    (0..count).map(|_| value()).collect()
+}
+
+/// Ten minutes with a thermometer of the standard atmosphere.
+fn with_thermometer(config: &mut Config) -> RawFlight {
+    let mut raw = ten_minutes(config);
+    let mut air = raw.columns["altitude"].clone();
+    air.unit = Some("K".to_owned());
+    air.values
+        .iter_mut()
+        .for_each(|h| *h = 288.15 - 0.0065 * 0.3048 * *h);
+    raw.columns.insert("OAT".to_owned(), air);
+    let channel = Channel::plain("air_kelvin", "K");
+    config.channels.insert("OAT".to_owned(), channel);
+    raw
+}
+
+#[test]
+fn a_useless_channel_that_nothing_requires_costs_no_flight() {
+    let mut config = config();
+    let raw = with_thermometer(&mut config);
+    let rows = raw.columns["time"].values.len();
+    let settings = few_windows(OnFault::Apply);
+    for (channel, values, consequence) in [
+        ("psi", noise(rows, 180.0, 180.0), "larger bounds"),
+        ("psi", noise(rows, 180.0, 10.0), "larger bounds"),
+        ("psi", vec![90.0; rows], "larger bounds"),
+        (
+            "altitude",
+            vec![20_000.0; rows],
+            "`altitude_ft` is computed",
+        ),
+        (
+            "altitude",
+            noise(rows, 20_000.0, 9_000.0),
+            "`altitude_ft` is computed",
+        ),
+        ("mach", noise(rows, 0.0, 5.0), "`mach` is computed"),
+        ("mach", vec![0.6; rows], "`mach` is computed"),
+        ("OAT", noise(rows, 250.0, 60.0), "standard atmosphere"),
+        ("OAT", vec![288.15; rows], "standard atmosphere"),
+        ("OAT", vec![-20.0; rows], "degC"),
+    ] {
+        let mut wrong = raw.clone();
+        wrong.columns.get_mut(channel).unwrap().values = values;
+        let ingested = ingest(&config, &wrong, &settings).unwrap();
+        let [problem] = &ingested.problems[..] else {
+            panic!("{channel}: {:?}", ingested.problems)
+        };
+        assert_eq!(problem.place, format!("channel `{channel}`"));
+        assert!(problem.reason.contains("left out"), "{problem:?}");
+        assert!(problem.reason.contains(consequence), "{problem:?}");
+        let rows = ingested.channels.iter();
+        let accused: Vec<&str> = rows
+            .filter(|row| !row.verdict.passed())
+            .map(|row| row.channel.as_str())
+            .collect();
+        assert_eq!(accused, [channel]);
+        let signal = &config.channels[channel].signal;
+        assert!(!ingested.record.is_recorded(signal), "{channel}");
+        assert!(
+            ingested
+                .instruments
+                .iter()
+                .all(|row| row.channel != channel)
+        );
+    }
+}
+
+#[test]
+fn a_fault_beside_a_useless_channel_is_found_all_the_same() {
+    let config = config();
+    let mut raw = ten_minutes(&config);
+    raw.columns.get_mut("altitude").unwrap().values.fill(2e4);
+    let theta = &mut raw.columns.get_mut("theta").unwrap().values;
+    for value in theta {
+        *value = -*value;
+    }
+    let problem = ingest(&config, &raw, &few_windows(OnFault::Apply)).unwrap_err();
+    assert_eq!(problem.place, "channel `theta`", "{problem:?}");
+}
+
+#[test]
+fn noise_in_a_required_channel_refuses_the_flight() {
+    let config = config();
+    let raw = ten_minutes(&config);
+    let rows = raw.columns["time"].values.len();
+    let mut wrong = raw.clone();
+    wrong.columns.get_mut("phi").unwrap().values = noise(rows, 0.0, 60.0);
+    let problem = ingest(&config, &wrong, &few_windows(OnFault::Apply)).unwrap_err();
+    assert!(problem.place.contains("`phi`"), "{problem:?}");
 }
 
 /// Fewer windows than by default, for speed.

@@ -132,23 +132,38 @@ fn a_record_without_time_is_refused() {
     );
 }
 
+/// A record whose channel is a column of text.
+fn with_text(record: &RecordBatch, channel: &str) -> RecordBatch {
+    let words: Vec<String> = values(record, channel)
+        .iter()
+        .map(|v| format!("{v:.2}"))
+        .collect();
+    replaced(record, channel, |field, _| {
+        (
+            field.clone().with_data_type(DataType::Utf8),
+            Arc::new(StringArray::from(words)),
+        )
+    })
+}
+
+#[test]
+fn a_channel_of_text_that_nothing_requires_costs_no_flight() {
+    let campaign = Campaign::new();
+    campaign.add("flight_001", &with_text(&pitch_steps(), "psi"));
+    campaign.ends("estimate", 2);
+    let problems = campaign.table("problems");
+    assert_eq!(problems.len(), 1, "{problems:?}");
+    assert_eq!(problems[0]["place"], "channel `psi`");
+    for words in ["is of type Utf8", "larger bounds"] {
+        assert!(problems[0]["reason"].contains(words), "{problems:?}");
+    }
+    assert_eq!(campaign.table("fits")[0]["outcome"], "converged");
+}
+
 #[test]
 fn a_channel_of_text_is_refused() {
-    let text = |channel: &str| {
-        let record = yaw_and_roll_steps();
-        let words: Vec<String> = values(&record, channel)
-            .iter()
-            .map(|v| format!("{v:.2}"))
-            .collect();
-        replaced(&record, channel, |field, _| {
-            (
-                field.clone().with_data_type(DataType::Utf8),
-                Arc::new(StringArray::from(words)),
-            )
-        })
-    };
     record_is_refused(
-        &text("p"),
+        &with_text(&yaw_and_roll_steps(), "p"),
         "spoiled.parquet",
         &[
             "column `p`",

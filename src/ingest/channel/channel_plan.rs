@@ -47,7 +47,9 @@ fn plan<'a>(
 ) -> Result<(Vec<ChannelPlan<'a>>, Vec<Problem>), Refusal> {
     let mut plans: BTreeMap<&str, ChannelPlan> = BTreeMap::new();
     let mut absent: Vec<(&str, Refusal)> = Vec::new();
-    let is_useless = |signal: &str| signal::is_own(signal) && !signal::is_indispensable(signal);
+    let is_mapped = |signal: &str| context.channels.values().any(|c| c.signal == signal);
+    let is_useless =
+        |signal: &str| context.can_do_without(signal, |other| other != signal && is_mapped(other));
     let time = context
         .channels
         .iter()
@@ -144,6 +146,10 @@ fn is_in_files(source: &(impl ColumnSource + ?Sized), name: &str) -> bool {
 /// Refusal of a channel that is in no file. For a formula it names the columns that no file has.
 fn not_in_files(source: &(impl ColumnSource + ?Sized), name: &str, channel: &Channel) -> Refusal {
     let signal = &channel.signal;
+    let mut unreadable = (0..source.files()).filter_map(|file| source.unreadable(file, name));
+    if let Some(reason) = unreadable.next() {
+        return Refusal::of_channel(name, reason.to_owned());
+    }
     let reason = match &channel.formula {
         None => format!("channel `{name}` (signal `{signal}`) is not in the file"),
         Some(formula) => {
@@ -191,6 +197,16 @@ pub fn empty_channel(name: &str, channel: &Channel, rows: usize) -> Refusal {
     let reason = format!(
         "channel `{name}` (signal `{}`) holds no number in {rows} rows",
         channel.signal
+    );
+    Refusal::of_channel(name, reason)
+}
+
+/// Refusal of a channel that has no value in most of the samples.
+pub fn sparse_channel(name: &str, channel: &Channel, share: f64) -> Refusal {
+    let reason = format!(
+        "channel `{name}` (signal `{}`) has a value in {:.1} % of the samples only, and is left out",
+        channel.signal,
+        100.0 * share
     );
     Refusal::of_channel(name, reason)
 }

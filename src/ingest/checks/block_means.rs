@@ -195,6 +195,13 @@ impl BlockMeans {
         changed
     }
 
+    /// These means without some signals, as if they were not recorded.
+    pub fn without(&self, left_out: impl Fn(&str) -> bool) -> BlockMeans {
+        let mut changed = self.clone();
+        changed.means.retain(|signal, _| !left_out(signal));
+        changed
+    }
+
     /// These means with instrument errors removed.
     pub fn corrected(&self, corrections: &[Correction]) -> BlockMeans {
         let mut changed = self.clone();

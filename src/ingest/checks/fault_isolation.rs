@@ -69,8 +69,6 @@ impl FaultyChannel {
 pub struct FaultReport {
     pub place: String,
     pub reason: String,
-    /// `true` if a faulty channel is one that the equations of motion need.
-    pub required: bool,
 }
 
 /// Finds the channels that make relations fail; `recorded` are the signals that come from channels.
@@ -383,13 +381,9 @@ pub fn report(faulty: &[FaultyChannel], checks: &[Check]) -> Option<FaultReport>
         format!("{names} {do_not} agree with the other channels ({failures})")
     };
     let cause = likely_cause(faulty);
-    let is_required = |f: &FaultyChannel| signal::is_indispensable(&f.signal);
     Some(FaultReport {
         place: format!("{} {names}", if is_one { "channel" } else { "channels" }),
-        reason: format!(
-            "{several}{disagreement}; {cause}. Correct the channel map, or leave the flight out"
-        ),
-        required: faulty.is_empty() || faulty.iter().any(is_required),
+        reason: format!("{several}{disagreement}; {cause}"),
     })
 }
 

@@ -96,27 +96,10 @@ pub fn impossible_signals(blocks: &BlockMeans) -> Vec<ImpossibleSignal> {
         .filter_map(|name| not_positive(blocks, name))
         .collect();
     if found.is_empty() {
-        let others = impossible_inertia(blocks).into_iter();
-        others.chain(impossible_temperature(blocks)).collect()
+        impossible_inertia(blocks).into_iter().collect()
     } else {
         found
     }
-}
-
-/// Temperatures of the air up to 100,000 ft, K, with a margin of 10 K beyond the extremes on record
-/// (MIL-STD-210C: 184 to 331 K).
-const AIR_KELVIN: std::ops::Range<f64> = 174.0..341.0;
-
-/// Finds a temperature that no air has.
-fn impossible_temperature(blocks: &BlockMeans) -> Option<ImpossibleSignal> {
-    let median = median(blocks, signal::AIR_TEMPERATURE).filter(|k| !AIR_KELVIN.contains(k))?;
-    Some(ImpossibleSignal {
-        signal: signal::AIR_TEMPERATURE,
-        reason: format!(
-            "its median is {median:.1} K, and air has {} to {} K: is it in degC or degF?",
-            AIR_KELVIN.start, AIR_KELVIN.end
-        ),
-    })
 }
 
 /// Dynamic pressure of an aircraft that flies, lbf/ft²: that of 90 ft/s at sea level.
@@ -279,7 +262,7 @@ fn probable_unit(stated: &str, lift: f64) -> Option<&'static str> {
 }
 
 /// Median of a signal's finite block means.
-fn median(blocks: &BlockMeans, name: &str) -> Option<f64> {
+pub fn median(blocks: &BlockMeans, name: &str) -> Option<f64> {
     let means = (0..blocks.count).map(|block| blocks.mean(name, block));
     upper_median(means.filter(|mean| mean.is_finite()))
 }

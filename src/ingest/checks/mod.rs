@@ -7,6 +7,7 @@ mod fault_isolation;
 mod gusts;
 mod mass_properties;
 mod relations;
+mod thermometer;
 mod time_scale;
 mod windows;
 
@@ -21,4 +22,5 @@ pub(in crate::ingest) use mass_properties::{
     ImpossibleSignal, impossible_centre, impossible_gyration, impossible_mass, impossible_signals,
     impossible_velocity, lift_curve,
 };
+pub(in crate::ingest) use thermometer::{impossible_temperature, useless_temperature};
 pub(in crate::ingest) use time_scale::wrong_time;

@@ -19,8 +19,8 @@ use super::guard::guarded;
 use super::numbers::{clock_factor, hand_over, refuse_other_types};
 use super::remote;
 use crate::error::{Error, Problem, ProblemStage};
-use crate::flight::Channel;
 use crate::flight::channel::columns;
+use crate::flight::{Channel, signal};
 use crate::ingest::ColumnSource;
 use crate::store::atomic::Draft;
 use crate::store::import::tall::Tall;
@@ -48,6 +48,8 @@ struct OpenFile {
     wide: Option<Draft>,
     metadata: ArrowReaderMetadata,
     columns: BTreeMap<String, OpenColumn>,
+    /// Mapped columns that hold no numbers and that a flight can do without, with the reason.
+    unreadable: BTreeMap<String, String>,
     rows: usize,
 }
 
@@ -157,12 +159,18 @@ fn open_columns(
     channels: &BTreeMap<String, Channel>,
     metadata: ArrowReaderMetadata,
 ) -> Result<OpenFile, String> {
-    let mut columns = BTreeMap::new();
+    let (mut columns, mut unreadable) = (BTreeMap::new(), BTreeMap::new());
     for (at, field) in metadata.schema().fields().iter().enumerate() {
         let Some(channel) = channels.get(field.name()) else {
             continue;
         };
-        refuse_other_types(field, channel)?;
+        match refuse_other_types(field, channel) {
+            Err(reason) if is_dispensable(&channel.signal) => {
+                unreadable.insert(field.name().clone(), reason);
+                continue;
+            }
+            checked => checked?,
+        }
         let unit = field.metadata().get(UNIT).cloned();
         let column = OpenColumn {
             at,
@@ -180,8 +188,14 @@ fn open_columns(
         wide: None,
         metadata,
         columns,
+        unreadable,
         rows,
     })
+}
+
+/// `true` for a signal without which a flight may be read. Columns of formulas have none.
+fn is_dispensable(signal: &str) -> bool {
+    !signal.is_empty() && signal != signal::TIME && !signal::is_indispensable(signal)
 }
 
 /// Number of rows of a file.
@@ -233,6 +247,14 @@ impl ColumnSource for Opened {
 
     fn unit(&self, file: usize, column: &str) -> Option<&str> {
         self.files.get(file)?.columns.get(column)?.unit.as_deref()
+    }
+
+    fn unreadable(&self, file: usize, column: &str) -> Option<&str> {
+        self.files
+            .get(file)?
+            .unreadable
+            .get(column)
+            .map(String::as_str)
     }
 
     fn read(

@@ -1,0 +1,399 @@
+//! Examination of a stretch: kinematic relations and flight-path reconstruction reconciled. A channel that
+//! is wrong, and that the flight can do without, is left out first.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+use super::checks::{
+    BlockAverager, BlockMeans, Check, FaultReport, FaultyChannel, Gusts, ImpossibleSignal,
+    check_relations, confirmed_signals, find_faulty_channels, impossible_centre,
+    impossible_gyration, impossible_mass, impossible_signals, impossible_temperature,
+    impossible_velocity, report, useless_temperature, wrong_time,
+};
+use super::clock::Clock;
+use super::compatibility::{self, Findings};
+use super::context::Context;
+use super::refusal::Refusal;
+use crate::flight::{Record, StandIn, signal};
+use crate::tables::{ChannelVerdict, CheckRow};
+
+/// Samples of a long record that are reconstructed at once: under an hour of a usual recorder, so
+/// that memory does not grow with the record.
+const PART_SAMPLES: usize = 1 << 17;
+
+/// Reads signals of a record over a range of its samples; `None` if they cannot be read.
+pub type RecordReader<'a> = dyn Fn(&BTreeSet<String>, Range<usize>) -> Option<Record> + 'a;
+
+/// Inputs of the relation checks and of flight-path reconstruction.
+#[derive(Clone)]
+pub struct Examination<'a> {
+    pub clock: &'a Clock,
+    pub context: &'a Context<'a>,
+    /// Signals that come from channels.
+    pub recorded: Vec<String>,
+    pub stand_ins: Vec<(String, StandIn)>,
+    pub read: &'a RecordReader<'a>,
+}
+
+/// Outcome of the examination of one stretch.
+pub struct Outcome {
+    pub relations: RelationResult,
+    pub findings: Findings,
+    /// Channels that the stretch does without.
+    pub left_out: Vec<LeftOut>,
+    /// Stand-ins of the signals that the stretch lacks, with those of the channels that are left out.
+    pub stand_ins: Vec<(String, StandIn)>,
+    /// Block means of the channels that are not left out.
+    pub blocks: BlockMeans,
+}
+
+impl Outcome {
+    /// Verdict on the channel of a signal.
+    pub fn verdict(&self, signal: &str) -> ChannelVerdict {
+        let mut left_out = self.left_out.iter();
+        if let Some(one) = left_out.find(|one| one.signal == signal) {
+            return ChannelVerdict::Fault(one.verdict.clone());
+        }
+        let fault = self.findings.verdict(signal);
+        fault.map_or_else(|| self.relations.verdict(signal), ChannelVerdict::Fault)
+    }
+}
+
+/// A channel that is wrong, and that the stretch does without.
+#[derive(Clone)]
+pub struct LeftOut {
+    signal: String,
+    /// Verdict for the table `channels`.
+    verdict: String,
+    /// Place and reason for the table `problems`.
+    pub refusal: Refusal,
+}
+
+/// Outcome of the kinematic relations of one stretch.
+pub struct RelationResult {
+    checks: Vec<Check>,
+    pub gusts: Gusts,
+    faulty: Vec<FaultyChannel>,
+    /// Signals that a relation confirms.
+    confirmed: Vec<&'static str>,
+    pub report: Option<FaultReport>,
+    /// Signals with values that no aircraft has, unless they refuse the flight.
+    pub impossible: Vec<ImpossibleSignal>,
+}
+
+impl RelationResult {
+    pub fn check_rows(&self, flight_id: &str) -> Vec<CheckRow> {
+        self.checks.iter().map(|c| c.row(flight_id)).collect()
+    }
+
+    fn verdict(&self, signal: &str) -> ChannelVerdict {
+        if let Some(one) = self.impossible.iter().find(|one| one.signal == signal) {
+            return ChannelVerdict::Fault(one.reason.clone());
+        }
+        match self.faulty.iter().find(|f| f.signal == signal) {
+            Some(fault) => ChannelVerdict::Fault(fault.verdict()),
+            None if self.confirmed.contains(&signal) => ChannelVerdict::Ok,
+            None => ChannelVerdict::NotChecked,
+        }
+    }
+
+    /// Adds the checks that only an examination with more signals has.
+    fn with_checks_before(&mut self, before: Vec<Check>) {
+        let mut own = std::mem::take(&mut self.checks).into_iter().peekable();
+        for check in before {
+            let is_own = |own: &Check| own.relation.name == check.relation.name;
+            self.checks.push(own.next_if(is_own).unwrap_or(check));
+        }
+        self.checks.extend(own);
+    }
+}
+
+impl Examination<'_> {
+    /// Block means of the recorded signals and of the constants.
+    pub fn blocks(&self, mut means: BTreeMap<String, BlockAverager>) -> BlockMeans {
+        let (clock, checks) = (self.clock, &self.context.settings.checks);
+        for (signal, value) in self.context.constants {
+            let constant =
+                BlockAverager::constant(signal, *value, clock.samples, clock.step_s, checks);
+            if let Some(constant) = constant {
+                means.entry(signal.clone()).or_insert(constant);
+            }
+        }
+        BlockMeans::of(means, clock.samples, clock.step_s, checks)
+    }
+
+    /// Examines the stretch. Wrong channels that it can do without are left out one after another,
+    /// and the others are examined as if these were not recorded.
+    pub fn examine(&self, blocks: BlockMeans) -> Outcome {
+        if let Some(thermometer) = self.thermometer(&blocks) {
+            return self.examine_without(vec![thermometer], &blocks, Vec::new());
+        }
+        let relations = self.check(&blocks);
+        // A late altimeter is corrected by its delay, which the reconstruction finds.
+        let may_be_late = relations
+            .faulty
+            .iter()
+            .any(|f| f.signal == signal::ALTITUDE);
+        if !may_be_late && self.has_useless_alone(&relations) {
+            let left_out = self.useless(&relations);
+            return self.examine_without(left_out, &blocks, relations.checks);
+        }
+        let (mut relations, findings) = self.reconcile(&blocks, relations);
+        if self.has_useless_alone(&relations) || self.holds_without_useless(&relations, &blocks) {
+            let left_out = self.useless(&relations);
+            return self.examine_without(left_out, &blocks, relations.checks);
+        }
+        if relations.impossible.is_empty() {
+            relations.impossible = self.impossible(&blocks, &relations.faulty);
+        }
+        Outcome {
+            relations,
+            findings,
+            left_out: Vec::new(),
+            stand_ins: self.stand_ins.clone(),
+            blocks,
+        }
+    }
+
+    /// Examines the stretch without some channels. `checks` are those with these channels.
+    fn examine_without(
+        &self,
+        left_out: Vec<LeftOut>,
+        blocks: &BlockMeans,
+        checks: Vec<Check>,
+    ) -> Outcome {
+        let is_left_out = |name: &str| left_out.iter().any(|one| one.signal == name);
+        let others = self.without(&is_left_out);
+        let mut outcome = others.examine(blocks.without(is_left_out));
+        outcome.relations.with_checks_before(checks);
+        outcome.left_out.splice(0..0, left_out);
+        outcome
+    }
+
+    /// This examination as if some signals were not recorded.
+    fn without(&self, left_out: &dyn Fn(&str) -> bool) -> Self {
+        let stays = |signal: &&String| !left_out(signal);
+        let recorded: Vec<String> = self.recorded.iter().filter(stays).cloned().collect();
+        let removed = self.recorded.iter().filter(|signal| left_out(signal));
+        let removed = removed.map(|signal| (signal.clone(), StandIn::Absent));
+        let is_recorded = |signal: &str| recorded.iter().any(|name| name == signal);
+        // The signals that are left out have a stand-in, or none reads them.
+        let stand_ins = self.context.stand_ins(is_recorded).unwrap_or_default();
+        let before = self.stand_ins.iter().cloned();
+        let mut absent: Vec<(String, StandIn)> =
+            before.filter(|(_, s)| *s == StandIn::Absent).collect();
+        absent.extend(removed);
+        Examination {
+            stand_ins: absent.into_iter().chain(stand_ins).collect(),
+            recorded,
+            ..self.clone()
+        }
+    }
+
+    /// The thermometer of the air, if its values are of no use.
+    fn thermometer(&self, blocks: &BlockMeans) -> Option<LeftOut> {
+        if !self.is_recorded(signal::AIR_TEMPERATURE) {
+            return None;
+        }
+        let reason = useless_temperature(blocks)?;
+        let verdict = reason.clone();
+        let refusal = self.context.refusal(signal::AIR_TEMPERATURE, reason);
+        Some(self.leave_out(signal::AIR_TEMPERATURE, verdict, refusal))
+    }
+
+    /// `true` for a faulty channel that the stretch can do without.
+    fn is_useless(&self, fault: &FaultyChannel) -> bool {
+        let is_other = |name: &str| name != fault.signal && self.is_recorded(name);
+        self.context.can_do_without(&fault.signal, is_other)
+    }
+
+    /// `true` if channels are faulty, and the stretch can do without all of them.
+    fn has_useless_alone(&self, relations: &RelationResult) -> bool {
+        let faulty = &relations.faulty;
+        !faulty.is_empty() && faulty.iter().all(|fault| self.is_useless(fault))
+    }
+
+    /// `true` if no sign or unit of a suspect explains the failed relations, and all others hold without
+    /// the suspects that the stretch can do without.
+    fn holds_without_useless(&self, relations: &RelationResult, blocks: &BlockMeans) -> bool {
+        let faulty = &relations.faulty;
+        let useless: Vec<&FaultyChannel> = faulty.iter().filter(|f| self.is_useless(f)).collect();
+        if useless.is_empty() || faulty.iter().any(|f| f.cause.is_some()) {
+            return false;
+        }
+        let is_left_out = |name: &str| useless.iter().any(|fault| fault.signal == name);
+        let others = self.without(&is_left_out);
+        let checked = others.check(&blocks.without(is_left_out));
+        checked.report.is_none() && checked.impossible.is_empty()
+    }
+
+    /// Faulty channels that the stretch can do without, to be left out.
+    fn useless(&self, relations: &RelationResult) -> Vec<LeftOut> {
+        let report = relations.report.as_ref();
+        let reason = report.map_or_else(String::new, |report| report.reason.clone());
+        let leave_out = |fault: &FaultyChannel| {
+            let refusal = Refusal::of_channel(&fault.channel, reason.clone());
+            self.leave_out(&fault.signal, fault.verdict(), refusal)
+        };
+        let useless = relations.faulty.iter().filter(|f| self.is_useless(f));
+        useless.map(leave_out).collect()
+    }
+
+    /// A channel that is left out, with its stand-in and the cost.
+    fn leave_out(&self, name: &str, verdict: String, refusal: Refusal) -> LeftOut {
+        let stand_ins = self.without(&|other| other == name).stand_ins;
+        let refusal = Refusal {
+            reason: format!("{}. The channel is left out", refusal.reason),
+            ..refusal
+        };
+        LeftOut {
+            signal: name.to_owned(),
+            verdict,
+            refusal: refusal.with_stand_in(name, &stand_ins),
+        }
+    }
+
+    fn is_recorded(&self, signal: &str) -> bool {
+        self.recorded.iter().any(|name| name == signal)
+    }
+
+    /// Reconciles the relations between channels with the errors of the instruments.
+    ///
+    /// If a channel has a wrong sign or unit, the errors of the other instruments are estimated
+    /// with the channel corrected; the record is left as it is. If no sign and no unit explains a
+    /// failed relation, a delay may: if the relation holds once the delays are removed, the delay
+    /// is the fault.
+    fn reconcile(
+        &self,
+        blocks: &BlockMeans,
+        relations: RelationResult,
+    ) -> (RelationResult, Findings) {
+        if !relations.impossible.is_empty() {
+            return (relations, Findings::default());
+        }
+        let faulty = &relations.faulty;
+        if !faulty.is_empty() && faulty.iter().all(FaultyChannel::is_correctable) {
+            let findings = self.reconstruct(|record| correct_by_factors(record, faulty));
+            return (relations, findings.without_corrections());
+        }
+        // With a dead channel or with one fault among several there is nothing to go by.
+        if faulty.iter().any(|f| f.cause.is_some()) {
+            return (relations, Findings::default());
+        }
+        let findings = self.reconstruct(|_| ());
+        if relations.report.is_none() {
+            return (relations, findings);
+        }
+        if findings.has_fault() {
+            let corrected = blocks.corrected(&findings.with_faults_corrected().corrections());
+            let again = self.check(&corrected);
+            if again.report.is_none() {
+                return (again, findings);
+            }
+        }
+        (relations, Findings::default())
+    }
+
+    /// Finds signals with values that no aircraft has. The mass is checked only if no relation
+    /// finds a fault in the other signals of the lift.
+    fn impossible(&self, blocks: &BlockMeans, faulty: &[FaultyChannel]) -> Vec<ImpossibleSignal> {
+        const LIFT: [&str; 4] = [
+            signal::AN,
+            signal::ALPHA_VANE,
+            signal::QBAR,
+            signal::VELOCITY,
+        ];
+        let Context {
+            channels,
+            aircraft,
+            settings,
+            ..
+        } = *self.context;
+        let mut found = impossible_signals(blocks);
+        found.extend(impossible_centre(blocks, aircraft));
+        found.extend(impossible_velocity(blocks, &settings.checks));
+        found.extend(impossible_temperature(blocks));
+        if !found.is_empty() || faulty.iter().any(|f| LIFT.contains(&f.signal.as_str())) {
+            return found;
+        }
+        let mass = channels.values().find(|c| c.signal == signal::MASS);
+        let unit = mass.map(|channel| channel.unit.as_str());
+        impossible_mass(blocks, aircraft, unit, &settings.checks)
+            .or_else(|| impossible_gyration(blocks, aircraft))
+            .into_iter()
+            .collect()
+    }
+
+    /// Checks the kinematic relations and isolates the faulty channels. A wrong time fails the
+    /// relations of every channel; no channel is then named.
+    fn check(&self, blocks: &BlockMeans) -> RelationResult {
+        let Context {
+            channels,
+            aircraft,
+            settings,
+            ..
+        } = *self.context;
+        let (checks, gusts) = check_relations(blocks, aircraft, &settings.checks);
+        if let Some(time) = wrong_time(&checks) {
+            return RelationResult {
+                confirmed: Vec::new(),
+                report: None,
+                checks,
+                gusts,
+                faulty: Vec::new(),
+                impossible: vec![time],
+            };
+        }
+        let faulty = find_faulty_channels(
+            blocks,
+            &checks,
+            channels,
+            &self.recorded,
+            aircraft,
+            &settings.checks,
+        );
+        RelationResult {
+            confirmed: confirmed_signals(&checks),
+            report: report(&faulty, &checks),
+            checks,
+            gusts,
+            faulty,
+            impossible: Vec::new(),
+        }
+    }
+
+    /// Estimates the instruments' errors by flight-path reconstruction, part by part of the
+    /// record, each part after `correct`.
+    fn reconstruct(&self, correct: impl Fn(&mut Record)) -> Findings {
+        let samples = self.clock.samples;
+        let count = samples.div_ceil(PART_SAMPLES);
+        let signals = compatibility::signals();
+        let parts = (0..count).filter_map(|i| {
+            let range = i * PART_SAMPLES..((i + 1) * PART_SAMPLES).min(samples);
+            let mut record = (self.read)(&signals, range)?;
+            for (signal, stand_in) in &self.stand_ins {
+                stand_in.fill(signal, &mut record);
+            }
+            correct(&mut record);
+            Some(record)
+        });
+        compatibility::examine(
+            parts,
+            count,
+            self.context.channels,
+            &self.recorded,
+            self.context.aircraft,
+            &self.context.settings.compatibility,
+        )
+    }
+}
+
+/// Multiplies the signals of faulty channels by the factors that correct them.
+fn correct_by_factors(record: &mut Record, faulty: &[FaultyChannel]) {
+    for fault in faulty {
+        let series = record.signals.get_mut(&fault.signal);
+        if let (Some(factor), Some(series)) = (fault.factor, series) {
+            series.values.iter_mut().for_each(|v| *v *= factor);
+        }
+    }
+}
