@@ -63,10 +63,9 @@ impl Config {
             }
         }
         let mut lines: Vec<String> = costs.iter().map(|(cost, s)| absence(s, cost)).collect();
-        if !has(signal::PSI) {
-            let cost = cost(signal::PSI, has);
-            lines.push(format!("no `{}`: {cost}", signal::PSI));
-        }
+        let optional = signal::OPTIONAL.into_iter();
+        let absent = optional.filter(|signal| !has(signal));
+        lines.extend(absent.map(|signal| format!("no `{signal}`: {}", cost(signal, has))));
         lines
     }
 

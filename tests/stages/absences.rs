@@ -204,6 +204,7 @@ fn a_pipeline_does_without_tunnel_and_sticks_and_check_reports_the_cost() {
         "derivatives that the classes hold count as zero",
         "without    no `left_rpm`: it is taken as 0; the gyroscopic moment",
         "without    no `psi_deg`: the errors of the other instruments",
+        "without    no `air_kelvin`: the air has the temperature of the standard atmosphere",
         "without    no `segment: excitation_flag`",
     ] {
         assert!(check.contains(words), "`{words}` is not in\n{check}");
