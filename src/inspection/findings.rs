@@ -7,6 +7,7 @@ use super::certainty::verdict;
 use super::clock::{ClockColumn, find_clock};
 use super::grid::Grid;
 use super::inputs::{InputColumn, inputs, kind_of, rate};
+use super::mirror_images::MirrorImages;
 use super::plausible::{ColumnFacts, candidates, facts};
 use super::quantity::Quantity;
 use super::recording::Recording;
@@ -51,6 +52,8 @@ pub struct Channel {
     pub moves: bool,
     /// Size of a step of an input, in the signal's unit; `None` if it only follows feedback.
     pub step: Option<f64>,
+    /// Columns whose half difference it is proposed to be.
+    pub mirror_images: Option<MirrorImages>,
 }
 
 /// A column that gives no signal.
@@ -78,6 +81,27 @@ pub struct Inspection {
 /// # Errors
 /// A message where no column counts time.
 pub fn inspect(recordings: &[Recording]) -> Result<Inspection, String> {
+    let pairs = MirrorImages::of(recordings);
+    if pairs.is_empty() {
+        return inspect_columns(recordings);
+    }
+    let mut replaced = recordings.to_vec();
+    for pair in &pairs {
+        replaced = pair.replaced(&replaced);
+    }
+    let mut inspection = inspect_columns(&replaced)?;
+    for channel in &mut inspection.channels {
+        if let Some(pair) = pairs.iter().find(|pair| pair.name == channel.column) {
+            channel.is_sure = false;
+            channel.evidence = format!("{}; {}", pair.evidence(), channel.evidence);
+            channel.mirror_images = Some(pair.clone());
+        }
+    }
+    Ok(inspection)
+}
+
+/// Inspects recordings column by column.
+fn inspect_columns(recordings: &[Recording]) -> Result<Inspection, String> {
     let clock = find_clock(recordings).ok_or(
         "no column counts time: one column must rise evenly from row to row, in s, ms, us or ns",
     )?;
@@ -127,6 +151,7 @@ fn time_channel(clock: &ClockColumn, facts: &[ColumnFacts]) -> Channel {
         range: own.and_then(|c| c.range).unwrap_or_default(),
         moves: true,
         step: None,
+        mirror_images: None,
     }
 }
 
@@ -159,6 +184,7 @@ impl Findings<'_> {
             range: facts.range.unwrap_or_default(),
             moves: true,
             step: None,
+            mirror_images: None,
         }
     }
 

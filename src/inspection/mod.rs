@@ -6,7 +6,7 @@
 //! Mach number from speed and altitude. Angular accelerations determine the signs of surfaces and
 //! controls. A finding that no equation confirms is marked as unsure.
 //!
-//! In the order of use: `recording` (the input), `words` and `vocabulary` (names), `quantity`,
+//! In the order of use: `recording` (the input), `words` and `vocabulary` (names), `mirror_images`, `quantity`,
 //! `clock`, `grid` (one step for all columns), `plausible` (candidates), `equations`, `assignment`
 //! (the search, over `signs`), `certainty`, `effects` and `inputs` (surfaces and controls), `steps`
 //! (which of them step), `findings`, and `draft` (YAML).
@@ -20,6 +20,7 @@ mod equations;
 mod findings;
 mod grid;
 mod inputs;
+mod mirror_images;
 mod plausible;
 mod quantity;
 mod recording;

@@ -428,6 +428,41 @@ fn surfaces_whose_names_mean_nothing_are_found_by_their_effects_and_not_sure() {
 }
 
 #[test]
+fn ailerons_that_are_mirror_images_are_proposed_as_their_half_difference() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/navion/flights");
+    let flights = archive::find(&root.display().to_string()).unwrap();
+    let recordings = flights.iter().take(2);
+    let recordings: Vec<Recording> = recordings
+        .flat_map(|flight| recording::first_rows(flight, ROWS).unwrap())
+        .collect();
+    let inspection = inspect(&recordings).unwrap();
+    let channels = inspection.channels.iter();
+    let own: Vec<_> = channels
+        .filter(|channel| channel.column.to_lowercase().starts_with("aileron"))
+        .collect();
+    let [aileron] = &own[..] else {
+        panic!("{own:?}")
+    };
+    assert_eq!(aileron.signal, "aileron_deg");
+    assert!(!aileron.is_sure && aileron.evidence.contains("a proposal"));
+    let draft = Draft {
+        name: "mine",
+        archive: "flights",
+        inspection: &inspection,
+    };
+    let files = draft::files(&draft);
+    let aircraft = files.iter().find(|file| file.path == "aircraft.yaml");
+    let text = &aircraft.unwrap().text;
+    for line in [
+        "\n  AILERON_L: { unit: rad } #",
+        "\n  AILERON_R: { unit: rad } #",
+        "\n  aileron: { signal: aileron_deg, formula: \"0.5 * (AILERON_L - AILERON_R)\" } # unsure: a proposal: ",
+    ] {
+        assert!(text.contains(line), "`{line}` is not in\n{text}");
+    }
+}
+
+#[test]
 fn an_incomplete_recording_is_not_filled_up_with_other_columns() {
     let gone = ["psi", "beta_vane", "mach", "altitude", "tvcs", "obes", "q"];
     let copy = Copy::new().without(&gone);

@@ -70,6 +70,7 @@ channels:
         );
     }
     for channel in unsure {
+        text += &columns_of_formula(channel);
         let _ = writeln!(
             text,
             "  {} # {UNSURE} {}",
@@ -80,8 +81,27 @@ channels:
     text
 }
 
+/// Lines of the columns from which a channel is computed; empty for one that is a column.
+fn columns_of_formula(channel: &Channel) -> String {
+    let pair = channel.mirror_images.as_ref();
+    let columns = pair.map_or(vec![], |pair| vec![&pair.left, &pair.right]);
+    let line = |column: &String| {
+        let (column, unit) = (scalar(column), scalar(&channel.unit));
+        format!("  {column}: {{ unit: {unit} }} # a column of the formula below\n")
+    };
+    columns.into_iter().map(line).collect()
+}
+
 /// Line of the channel map.
 fn line(channel: &Channel) -> String {
+    if let Some(pair) = &channel.mirror_images {
+        let formula = scalar(&pair.formula(channel.sign));
+        let column = scalar(&channel.column);
+        return format!(
+            "{column}: {{ signal: {}, formula: {formula} }}",
+            channel.signal
+        );
+    }
     let sign = if channel.sign < 0.0 { ", sign: -1" } else { "" };
     let wraps = channel.wraps_at;
     let wraps = wraps.map_or_else(String::new, |period| format!(", wraps_at: {period}"));
