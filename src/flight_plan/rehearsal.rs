@@ -79,7 +79,7 @@ pub fn instruments(of_cards: &Instruments, channels: &[ChannelRow]) -> Instrumen
     let mut measured: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
     for row in channels {
         let of_signal = measured.entry(&row.signal).or_default();
-        of_signal.extend(row.noise.filter(|noise| *noise > 0.0));
+        of_signal.extend(deviation(row).filter(|deviation| *deviation > 0.0));
     }
     for (signal, values) in measured {
         if let Some(median) = median(values) {
@@ -96,6 +96,14 @@ pub fn instruments(of_cards: &Instruments, channels: &[ChannelRow]) -> Instrumen
             .map(|(signal, noise)| (signal, instrument(noise)))
             .collect(),
     )
+}
+
+/// Standard deviation of a channel's samples: that of its noise, and at least that of its rounding, which
+/// a noise below the recorder's step hides.
+fn deviation(row: &ChannelRow) -> Option<f64> {
+    // Rounding errors are uniform over a step.
+    let rounding = row.quantisation.map(|step| step / 12.0_f64.sqrt());
+    row.noise.map(|noise| noise.max(rounding.unwrap_or(0.0)))
 }
 
 /// Derivatives of the aircraft that flies the rehearsals: the posterior's, else the tunnel's, else the
@@ -137,4 +145,44 @@ fn medians(name: &str, estimates: &[EstimateRow]) -> Vec<TunnelPoint> {
         found.push(TunnelPoint::new(0.0, 0.0));
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tables::ChannelVerdict;
+    use approx::assert_relative_eq;
+
+    fn channel(noise: Option<f64>, quantisation: Option<f64>) -> ChannelRow {
+        ChannelRow {
+            flight_id: "f".to_owned(),
+            channel: "q".to_owned(),
+            signal: "q_deg_s".to_owned(),
+            samples: 1000,
+            rate_hz: Some(40.0),
+            between: 0,
+            bridged: 0,
+            despiked: 0,
+            missing: 0,
+            stuck: 0,
+            wraps: 0,
+            quantisation,
+            noise,
+            verdict: ChannelVerdict::Ok,
+        }
+    }
+
+    #[test]
+    fn the_noise_of_a_coarse_channel_is_at_least_that_of_its_rounding() {
+        let noise =
+            |row: ChannelRow| instruments(&Instruments::default(), &[row]).0["q_deg_s"].noise;
+        // A step of 0.6 has the deviation 0.6/√12.
+        assert_relative_eq!(
+            noise(channel(Some(0.0), Some(0.6))),
+            0.173_205,
+            max_relative = 1e-5
+        );
+        assert_relative_eq!(noise(channel(Some(0.5), Some(0.6))), 0.5);
+        assert_relative_eq!(noise(channel(Some(0.02), None)), 0.02);
+    }
 }

@@ -56,8 +56,9 @@ table! {
         pub wraps: usize ["1"],
         /// Step of the recorder's numbers; empty where they have none.
         pub quantisation: Option<f64> ["the signal's unit"],
-        /// Standard deviation of the noise from sample to sample; of the clock: jitter of the time
-        /// stamps in s.
+        /// Standard deviation of the noise from sample to sample, without that of the rounding to
+        /// `quantisation`: 0 where the step is coarser than the noise. Of the clock: jitter of the
+        /// time stamps in s.
         pub noise: Option<f64> ["the signal's unit"],
         /// Worst verdict of the relations and instrument checks that name this channel.
         pub verdict: ChannelVerdict,
