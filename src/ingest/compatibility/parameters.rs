@@ -67,38 +67,34 @@ pub const SIGNALS: [&str; INSTRUMENTS] = [
     s::MACH,
 ];
 
+/// Outputs that depend on the velocity in the plane of symmetry: β on its size, and on its parts by roll
+/// and yaw.
+const OF_VELOCITY: &[&str] = &[
+    s::ALPHA_VANE,
+    s::BETA_VANE,
+    s::ALTITUDE,
+    s::VELOCITY,
+    s::QBAR,
+    s::MACH,
+];
+
 /// Outputs that depend on the motion along each input. Without the input their equations lack a
 /// term, and they are not compared. Forward and downward velocity turn into each other with the pitch
 /// rate, so each needs both accelerations and the pitch attitude.
-const DECIDED_BY: [(&str, &[&str]); INPUTS] = [
-    (s::P, &[s::PHI]),
-    (
-        s::Q,
-        &[
-            s::THETA,
-            s::ALPHA_VANE,
-            s::ALTITUDE,
-            s::VELOCITY,
-            s::QBAR,
-            s::MACH,
-        ],
-    ),
-    (s::R, &[s::PSI, s::BETA_VANE]),
-    (
-        s::AX,
-        &[s::ALPHA_VANE, s::ALTITUDE, s::VELOCITY, s::QBAR, s::MACH],
-    ),
-    (s::AY, &[s::BETA_VANE]),
-    (
-        s::AN,
-        &[s::ALPHA_VANE, s::ALTITUDE, s::VELOCITY, s::QBAR, s::MACH],
-    ),
+const DECIDED_BY: [(&str, &[&[&str]]); INPUTS] = [
+    (s::P, &[&[s::PHI]]),
+    (s::Q, &[&[s::THETA], OF_VELOCITY]),
+    (s::R, &[&[s::PSI, s::BETA_VANE]]),
+    (s::AX, &[OF_VELOCITY]),
+    (s::AY, &[&[s::BETA_VANE]]),
+    (s::AN, &[OF_VELOCITY]),
 ];
 
 /// `true` for an output that depends on an input that is not recorded.
 pub fn lacks_input(output: usize, is_recorded: impl Fn(&str) -> bool) -> bool {
     let mut lacking = DECIDED_BY.iter().filter(|(input, _)| !is_recorded(input));
-    lacking.any(|(_, decided)| decided.contains(&SIGNALS[INPUTS + output]))
+    let signal = &SIGNALS[INPUTS + output];
+    lacking.any(|(_, decided)| decided.iter().any(|signals| signals.contains(signal)))
 }
 
 /// Index of a parameter among all.

@@ -1025,7 +1025,7 @@ fn without_an_acceleration_no_other_instrument_is_blamed() {
             .outputs
             .iter()
             .map(|v| v.iter().any(|v| v.is_finite()));
-        let expected = [false, true, false, true, true, true, false, false, false];
+        let expected = [false, false, false, true, true, true, false, false, false];
         assert_eq!(compared.collect::<Vec<_>>(), expected);
     }
 }
