@@ -56,7 +56,7 @@ const DERIVED: &[&str] = &[
 ];
 
 /// Pairs of engines, left before right.
-const SIDES: [(&str, &str); 8] = [
+pub const SIDES: [(&str, &str); 8] = [
     ("l", "r"),
     ("left", "right"),
     ("lh", "rh"),
