@@ -48,7 +48,9 @@ impl StandIn {
     pub fn of(signal: &str, has: impl Fn(&str) -> bool) -> Option<StandIn> {
         let has_all = |signals: &[&str]| signals.iter().all(|signal| has(signal));
         match signal {
-            s::RPM_LEFT | s::RPM_RIGHT | s::THRUST | s::IXZ => Some(StandIn::Value(0.0)),
+            s::RPM_LEFT | s::RPM_RIGHT | s::THRUST | s::IXZ | s::AX | s::AY => {
+                Some(StandIn::Value(0.0))
+            }
             s::MACH if has(s::VELOCITY) || has(s::QBAR) => Some(StandIn::MachOfVelocity),
             s::VELOCITY if has_all(&[s::MACH, s::ALTITUDE]) => Some(StandIn::VelocityOfMach),
             s::VELOCITY if has_all(&[s::QBAR, s::ALTITUDE]) => Some(StandIn::VelocityOfPressure),
@@ -59,7 +61,6 @@ impl StandIn {
             s::THETA if has_all(&LATERAL) => Some(StandIn::ThetaOfAlpha),
             s::Q if has_all(&LATERAL) => Some(StandIn::Value(0.0)),
             s::AN => Some(StandIn::Value(1.0)),
-            s::AX | s::AY => Some(StandIn::Value(0.0)),
             lateral if LATERAL.contains(&lateral) => {
                 has_all(&LONGITUDINAL).then_some(StandIn::Value(0.0))
             }
