@@ -213,8 +213,8 @@ impl Examination<'_> {
         !faulty.is_empty() && faulty.iter().all(|fault| self.is_useless(fault))
     }
 
-    /// `true` if no sign or unit of a suspect explains the failed relations, and all others hold without
-    /// the suspects that the stretch can do without.
+    /// `true` if no sign or unit of a suspect explains the failed relations, and without the suspects that
+    /// the stretch can do without all others hold and confirm the remaining suspects.
     fn holds_without_useless(&self, relations: &RelationResult, blocks: &BlockMeans) -> bool {
         let faulty = &relations.faulty;
         let useless: Vec<&FaultyChannel> = faulty.iter().filter(|f| self.is_useless(f)).collect();
@@ -224,7 +224,10 @@ impl Examination<'_> {
         let is_left_out = |name: &str| useless.iter().any(|fault| fault.signal == name);
         let others = self.without(&is_left_out);
         let checked = others.check(&blocks.without(is_left_out));
-        checked.report.is_none() && checked.impossible.is_empty()
+        let is_cleared = |fault: &FaultyChannel| {
+            is_left_out(&fault.signal) || checked.confirmed.contains(&fault.signal.as_str())
+        };
+        checked.report.is_none() && checked.impossible.is_empty() && faulty.iter().all(is_cleared)
     }
 
     /// Faulty channels that the stretch can do without, to be left out.
