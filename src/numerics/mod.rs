@@ -7,6 +7,8 @@ pub mod chi_squared;
 pub mod differences;
 pub(crate) mod digits;
 pub mod dual;
+#[cfg(test)]
+pub mod forecasts;
 pub(crate) mod harmonics;
 pub(crate) mod lanes;
 pub(crate) mod matrix;

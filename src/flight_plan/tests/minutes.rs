@@ -7,7 +7,8 @@ use crate::numerics::order_statistics::median;
 use crate::tables::PosteriorRow;
 
 const UP_TO_40: &[f64] = &[10.0, 20.0, 30.0, 40.0];
-const UP_TO_60: &[f64] = &[10.0, 20.0, 30.0, 40.0, 50.0, 60.0];
+/// Angles of attack of the list.
+pub const UP_TO_60: &[f64] = &[10.0, 20.0, 30.0, 40.0, 50.0, 60.0];
 
 /// Classes and angles of attack of the list, by flight.
 const LIST: [&[(&str, &[f64])]; 4] = [
@@ -60,8 +61,8 @@ impl World {
         of_cards + (high - low) * self.budget(0.0).minutes_per_deg
     }
 
-    /// Uncertainty after the flights of the list.
-    fn by_list(&self) -> Knowledge {
+    /// Flies the list; returns the maneuvers and their minutes.
+    pub fn fly_list(&self) -> (Vec<FlownCard>, f64) {
         let all = self.candidates();
         let (mut flown, mut minutes) = (vec![], 0.0);
         for (i, flight) in LIST.iter().enumerate() {
@@ -75,6 +76,12 @@ impl World {
             minutes += self.minutes(&cards);
             flown.extend(self.fly(&format!("list {i}"), &cards));
         }
+        (flown, minutes)
+    }
+
+    /// Uncertainty after the flights of the list.
+    fn by_list(&self) -> Knowledge {
+        let (flown, minutes) = self.fly_list();
         self.knowledge(&flown, minutes)
     }
 

@@ -7,3 +7,4 @@ mod limits;
 mod world;
 mod promise;
 mod minutes;
+mod flown_qualities;

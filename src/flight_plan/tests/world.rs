@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::aero::WindTunnel;
 use crate::config::Config;
-use crate::estimate::Estimated;
+use crate::estimate::{Estimated, means};
 use crate::flight_plan::candidate::{Candidate, candidates};
 use crate::flight_plan::choice::Budget;
 use crate::flight_plan::experience::CampaignHistory;
@@ -27,7 +27,7 @@ use crate::tables::{NextGoalRow, PosteriorRow};
 pub struct World {
     pub shipped: SimulatedCampaign,
     /// With the tunnel's tables in place of the truth.
-    config: Config,
+    pub config: Config,
     instruments: Instruments,
     seed: u64,
 }
@@ -84,7 +84,8 @@ impl World {
                 flight_id: flight.to_owned(),
                 ..flown.maneuver
             };
-            let estimated = estimate_maneuver(&self.config, &record, &maneuver, &[]);
+            let mut estimated = estimate_maneuver(&self.config, &record, &maneuver, &[]);
+            estimated.means = means(&record, &maneuver, &self.config.buildup);
             (maneuver, estimated)
         };
         cards.par_iter().enumerate().map(fly).collect()

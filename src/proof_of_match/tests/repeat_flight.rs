@@ -12,6 +12,7 @@ use crate::aero::{Derivative, Regressor, WindTunnel};
 use crate::flight::Record;
 use crate::lab::simulator::FlownManeuver;
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
+use crate::numerics::forecasts::reliability;
 use crate::numerics::random::RandomStream;
 use crate::proof_of_match::outputs::MATCHED;
 use crate::proof_of_match::start;
@@ -173,24 +174,6 @@ fn forecast(flown: &FlownManeuver, error_pct: f64, seed: u32) -> (f64, bool) {
         .remove(0);
     let is_inside = verdict.verdict == MatchVerdict::Inside;
     (0.01 * verdict.repeat_pct.unwrap(), is_inside)
-}
-
-/// Reliability part of the Brier score: mean square of forecast less frequency over ten bins.
-fn reliability(forecasts: &[(f64, bool)]) -> f64 {
-    let mut bins: BTreeMap<i64, Vec<(f64, bool)>> = BTreeMap::new();
-    for (forecast, passed) in forecasts {
-        #[expect(clippy::cast_possible_truncation, reason = "a tenth of a probability")]
-        let bin = ((10.0 * forecast).floor() as i64).min(9);
-        bins.entry(bin).or_default().push((*forecast, *passed));
-    }
-    let mut sum = 0.0;
-    for own in bins.values() {
-        let count = own.len() as f64;
-        let forecast = own.iter().map(|(f, _)| f).sum::<f64>() / count;
-        let frequency = own.iter().filter(|(_, passed)| *passed).count() as f64 / count;
-        sum += count * (forecast - frequency) * (forecast - frequency);
-    }
-    sum / forecasts.len() as f64
 }
 
 /// `make match-study`.

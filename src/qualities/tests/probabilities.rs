@@ -9,6 +9,7 @@ use super::fixture::{linear, posterior, specification};
 use crate::aero::Axis;
 use crate::model::LocalPosterior;
 use crate::numerics::dual::Dual;
+use crate::numerics::forecasts::reliability;
 use crate::numerics::random::RandomStream;
 use crate::numerics::root::{EXACT, root};
 use crate::qualities::analysis::{AxisAnalysis, Drawn};
@@ -200,26 +201,6 @@ fn control_anticipation_beside_a_load_factor_of_zero_has_the_interval_of_its_dis
     assert_eq!(own.basis, DeviationBasis::Draws);
     assert_relative_eq!(own.lower, quantile(0.025), max_relative = 0.05);
     assert_relative_eq!(own.upper, quantile(0.975), max_relative = 0.05);
-}
-
-/// Reliability part of the Brier score: mean square of forecast less frequency over ten bins.
-fn reliability(forecasts: &[(f64, bool)]) -> f64 {
-    let mut bins = [(0.0, 0.0, 0.0); 10];
-    for (probability, came_true) in forecasts {
-        let first_above = bins
-            .iter()
-            .zip(1..)
-            .position(|(_, i)| *probability < 0.1 * f64::from(i));
-        let bin = &mut bins[first_above.unwrap_or(9)];
-        *bin = (
-            bin.0 + 1.0,
-            bin.1 + probability,
-            bin.2 + f64::from(u8::from(*came_true)),
-        );
-    }
-    let parts = bins.iter().filter(|bin| bin.0 > 0.0);
-    let sum: f64 = parts.map(|bin| (bin.1 - bin.2).powi(2) / bin.0).sum();
-    sum / forecasts.len() as f64
 }
 
 #[test]
