@@ -127,7 +127,7 @@ doc: ## the documentation of the code, private items included, into target/doc
 	cargo doc --locked --no-deps --document-private-items
 
 docs: ## write docs/tables.md and docs/settings.md from the declarations of tables and settings
-	HARVEST_WRITE_DOCS=1 cargo test --locked --lib --quiet -- the_page_of_
+	HARVEST_WRITE_DOCS=1 cargo test --release --locked --lib --quiet -- the_page_of_
 
 # Of make torture and make fuzz: others each time; the output names it.
 SEED ?= $(shell date +%s)
@@ -149,7 +149,7 @@ fuzz: ## FILES spoiled flights, and as many spoiled YAML and CSV files
 match-study: ## are the probabilities of the proof of match calibrated, over 540 simulated maneuvers
 	cargo test --release --locked --lib -- --ignored proof_of_match::
 
-next-study: ## are the bounds that plans of the next flight predict kept, and how many minutes do they save, over ten simulated campaigns
+next-study: ## are the bounds that plans predict kept, how many minutes do they save, and do intervals of flying qualities hold, in simulated campaigns
 	cargo test --release --locked --lib -- --ignored --nocapture flight_plan::
 
 bench: ## run the benchmarks

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# All tests, then the ten slowest. Needs Rust alone: stable test programs print times once RUSTC_BOOTSTRAP is set, and it is
+# All tests, then the ten slowest, of the code that users run: a release build shares its dependencies with the
+# program. Needs Rust alone: stable test programs print times once RUSTC_BOOTSTRAP is set, and it is
 # set while they run only, so that nothing is built with it.
 #
 #   tests/run.sh             all tests
@@ -11,7 +12,7 @@ cd "$(dirname "$0")/.."
 
 built=$(mktemp) log=$(mktemp)
 trap 'rm -f "$built" "$log"' EXIT
-cargo test --locked --features "${FEATURES:-}" --no-run 2>&1 | tee "$built" || exit 1
+cargo test --release --locked --features "${FEATURES:-}" --no-run 2>&1 | tee "$built" || exit 1
 programs=$(sed -n 's/^ *Executable .*(\(.*\))$/\1/p' "$built")
 [ -n "$programs" ] || { echo "cargo named no test program"; exit 1; }
 

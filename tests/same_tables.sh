@@ -38,16 +38,16 @@ for campaign in $campaigns; do
     [ ! -e "$earlier/$campaign/done" ] || continue
     if [ ! -e "$tree" ]; then
         git worktree add --quiet --detach --force "$tree" "$revision"
-        (cd "$tree" && cargo build --locked --quiet)
-        cp "$target/debug/harvest" "$target/same_tables/program"
+        (cd "$tree" && cargo build --release --locked --quiet)
+        cp "$target/release/harvest" "$target/same_tables/program"
     fi
     (cd "$tree" && run "$target/same_tables/program" "$campaign" "$earlier")
 done
 
-cargo build --locked --quiet
+cargo build --release --locked --quiet
 different=0
 for campaign in $campaigns; do
-    run "$target/debug/harvest" "$campaign" "$now"
+    run "$target/release/harvest" "$campaign" "$now"
     for name in $( (cd "$earlier/$campaign/reports" && ls ./*.csv; cd "$now/$campaign/reports" && ls ./*.csv) | sort -u); do
         pair=("$earlier/$campaign/reports/$name" "$now/$campaign/reports/$name")
         cmp -s "${pair[@]}" && continue
