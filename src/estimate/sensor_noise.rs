@@ -7,7 +7,7 @@
 
 use super::whiteness::{are_white, white_cost};
 use crate::dynamics::OUTPUTS;
-use crate::filter_error::filter;
+use crate::filter_error::response::FilterResponse;
 use crate::output_error::bounds::coloured;
 use crate::output_error::{Fit, Measurements, Outcome};
 
@@ -20,7 +20,7 @@ const VERY_STRONG: f64 = 5.0;
 pub(super) fn explains(
     measurements: &Measurements,
     output_error: &Fit,
-    filter: &filter::FilterResponse,
+    filter: &FilterResponse,
 ) -> bool {
     if output_error.outcome != Outcome::Converged || are_white(measurements, &filter.predicted) {
         return false;

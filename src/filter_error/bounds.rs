@@ -10,8 +10,9 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::filter::{Filter, FilterResponse};
+use super::filter::Filter;
 use super::joint_filter::JointFilter;
+use super::response::FilterResponse;
 use super::scoring::Scored;
 use super::slopes::{SlopeEffect, SlopeInformation};
 use crate::dynamics::{InGusts, OUTPUTS};

@@ -20,6 +20,25 @@ pub(super) struct Pattern {
     pub samples: usize,
 }
 
+/// Distinct patterns of valid outputs, and the index of each sample's pattern.
+pub(super) fn patterns(used: &[[bool; OUTPUTS]]) -> (Vec<Pattern>, Vec<u8>) {
+    let (mut patterns, mut of_sample) = (Vec::<Pattern>::new(), Vec::with_capacity(used.len()));
+    for used in used {
+        let known = patterns.iter().position(|p| p.used == *used);
+        let pattern = known.unwrap_or_else(|| {
+            patterns.push(Pattern {
+                used: *used,
+                samples: 0,
+            });
+            patterns.len() - 1
+        });
+        patterns[pattern].samples += 1;
+        // At most 2⁵ patterns.
+        of_sample.push(u8::try_from(pattern).unwrap_or(u8::MAX));
+    }
+    (patterns, of_sample)
+}
+
 /// Filter of the samples of one pattern.
 #[derive(Clone, Debug)]
 pub(super) struct PatternGain<const NX: usize> {

@@ -9,8 +9,9 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::filter::{Filter, FilterResponse};
+use super::filter::Filter;
 use super::noise::{Noise, NoiseParameter};
+use super::response::FilterResponse;
 use crate::dynamics::{InGusts, OUTPUTS};
 use crate::output_error::Diverged;
 use crate::output_error::sharing::{SharedParameters, add_matrix, add_vector, values_at};

@@ -24,8 +24,10 @@
 //! | [`input_noise`] | noise of surfaces and dynamic pressure as noise of the states |
 //! | `riccati` | covariance of the prediction, and its slopes |
 //! | `gains` | gain and covariance of the innovations for each pattern of missing outputs |
+//! | `gains_at` | gains for given parameters, with their slopes along all of them |
 //! | `pass` | one pass: innovations and their sensitivities, in the kernel of output error |
-//! | [`filter`] | a maneuver prepared: cost, gradient and information |
+//! | [`response`] | result of a pass: cost, gradient and information |
+//! | [`filter`] | a maneuver prepared |
 //! | [`joint_filter`] | several maneuvers that share derivatives, or one |
 //! | [`scoring`] | the iteration |
 //! | [`bounds`] | covariance of the estimates, and the effects of held values and calibration |
@@ -34,11 +36,13 @@
 pub mod bounds;
 pub mod filter;
 mod gains;
+mod gains_at;
 mod input_noise;
 pub mod joint_filter;
 mod linearised;
 pub mod noise;
 mod pass;
+pub mod response;
 mod riccati;
 pub mod scoring;
 pub mod slopes;

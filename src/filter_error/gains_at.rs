@@ -1,0 +1,126 @@
+//! Gains of a maneuver's filter for given parameters, with their slopes along all of them.
+#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
+
+use std::marker::PhantomData;
+
+use nalgebra::SMatrix;
+use pulp::{Simd, WithSimd};
+
+use super::gains::{
+    ParameterSlope, Pattern, PatternGain, gains, steady_variance_slopes, steady_variances,
+};
+use super::input_noise::InputNoise;
+use super::linearised::{Discrete, Linearised};
+use super::noise::{Noise, NoiseParameter};
+use super::riccati::{NoisySystem, States, SteadyFilter};
+use crate::dynamics::{InGusts, OUTPUTS};
+use crate::numerics::small::product;
+
+/// Computation of the gains, compiled for the processor at hand.
+pub(super) struct GainsAt<'a, const NX: usize, E: InGusts<NX>> {
+    pub linearised: &'a Linearised<NX>,
+    pub input_noise: &'a InputNoise<NX>,
+    pub patterns: &'a [Pattern],
+    /// Time between two samples.
+    pub step_s: f64,
+    /// Values of all parameters.
+    pub parameters: &'a [f64],
+    /// Values of the free derivatives.
+    pub derivatives: &'a [f64],
+    pub noise: Noise,
+    /// Parameters of the noise with their numbers.
+    pub noise_parameters: Vec<(usize, NoiseParameter)>,
+    pub equations: PhantomData<E>,
+}
+
+impl<const NX: usize, E: InGusts<NX>> WithSimd for GainsAt<'_, NX, E> {
+    type Output = Option<Vec<PatternGain<NX>>>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        let decay = decay_matrix::<NX, E>(self.noise.decay(self.step_s));
+        let (discrete, by_derivative) = self.linearised.discrete(self.parameters);
+        let (of_inputs, of_inputs_slopes) = self.input_noise.covariance(self.derivatives);
+        let system = NoisySystem {
+            a: product(&discrete.step, &decay),
+            c: discrete.outputs,
+            q: self.noise.covariance::<NX, E>(self.step_s) + of_inputs,
+            r: steady_variances(&self.noise, self.patterns),
+        };
+        let mut slopes = Vec::with_capacity(self.parameters.len());
+        for (parameter, (slope, q)) in by_derivative.iter().zip(of_inputs_slopes).enumerate() {
+            slopes.push(ParameterSlope {
+                parameter,
+                system: derivative_slope(slope, q, &decay),
+            });
+        }
+        for (parameter, kind) in &self.noise_parameters {
+            slopes.push(ParameterSlope {
+                parameter: *parameter,
+                system: self.noise_slope(*kind, &discrete),
+            });
+        }
+        let is_still = self.noise.is_still() && self.input_noise.is_zero();
+        let filter = if is_still {
+            SteadyFilter::still(system)
+        } else {
+            SteadyFilter::solve_system(system)?
+        };
+        gains(
+            &filter,
+            &self.noise,
+            &slopes,
+            &self.noise_parameters,
+            self.patterns,
+        )
+    }
+}
+
+impl<const NX: usize, E: InGusts<NX>> GainsAt<'_, NX, E> {
+    /// Slope of the system along a parameter of the noise.
+    #[inline(always)]
+    fn noise_slope(&self, kind: NoiseParameter, discrete: &Discrete<NX>) -> NoisySystem<NX> {
+        let slope = self.noise.decay_slope(kind, self.step_s);
+        NoisySystem {
+            a: product(&discrete.step, &decay_matrix_slope::<NX, E>(slope)),
+            c: SMatrix::zeros(),
+            q: self.noise.covariance_slope::<NX, E>(kind, self.step_s),
+            r: steady_variance_slopes(&self.noise, self.patterns, kind),
+        }
+    }
+}
+
+/// Matrix T by which the rotary gusts of the state decay in a step.
+fn decay_matrix<const NX: usize, E: InGusts<NX>>(decay: f64) -> States<NX> {
+    let mut t = States::identity();
+    for &(rate, felt) in E::FELT_RATES {
+        t[(felt, felt)] = decay;
+        t[(felt, rate)] = 1.0 - decay;
+    }
+    t
+}
+
+/// Slope of T along a parameter, from the slope of the decay.
+fn decay_matrix_slope<const NX: usize, E: InGusts<NX>>(slope: f64) -> States<NX> {
+    let mut t = States::zeros();
+    for &(rate, felt) in E::FELT_RATES {
+        t[(felt, felt)] = slope;
+        t[(felt, rate)] = -slope;
+    }
+    t
+}
+
+/// Slope of the system along a derivative; `q` is the slope of the noise of the states.
+#[inline(always)]
+fn derivative_slope<const NX: usize>(
+    slope: &Discrete<NX>,
+    q: States<NX>,
+    decay: &States<NX>,
+) -> NoisySystem<NX> {
+    NoisySystem {
+        a: product(&slope.step, decay),
+        c: slope.outputs,
+        q,
+        r: [0.0; OUTPUTS],
+    }
+}
