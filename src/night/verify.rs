@@ -73,6 +73,7 @@ pub fn verify(
     let comparison = FileComparison {
         lineage,
         damaged: nights.damaged(&night),
+        replaced: nights.replaced(&night),
         other_rows,
         nights: &nights,
         night: &night,
@@ -143,6 +144,8 @@ struct FileComparison<'a> {
     lineage: Lineage,
     /// Files whose bytes changed since they were published.
     damaged: Vec<String>,
+    /// Files in whose place another file stands in the folder of reports.
+    replaced: Vec<String>,
     /// Tables whose rows differ from those that the artefacts make.
     other_rows: BTreeSet<String>,
     nights: &'a Nights,
@@ -151,8 +154,11 @@ struct FileComparison<'a> {
 
 impl FileComparison<'_> {
     fn finding(&self, file: &str) -> FileFinding {
-        let reasons = if self.damaged.iter().any(|damaged| damaged == file) {
+        let is_among = |files: &[String]| files.iter().any(|name| name == file);
+        let reasons = if is_among(&self.damaged) {
             vec!["its bytes are not those that were published".to_owned()]
+        } else if is_among(&self.replaced) {
+            vec!["another file, or none, stands in its place in the folder of reports".to_owned()]
         } else if self.other_rows.contains(file) {
             vec!["the artefacts of the store make other rows of it".to_owned()]
         } else {

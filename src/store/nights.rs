@@ -208,6 +208,20 @@ impl Nights {
             .collect()
     }
 
+    /// Files of the current night in whose place another file stands in the folder of reports; none for
+    /// another night.
+    #[must_use]
+    pub fn replaced(&self, night: &Night) -> Vec<String> {
+        if self.current_name().as_ref() != Some(&night.name) {
+            return Vec::new();
+        }
+        let names = night.files.keys();
+        names
+            .filter(|name| !link::is_placed(&self.reports, &self.folder(&night.name), name))
+            .cloned()
+            .collect()
+    }
+
     fn tonight_folder(&self) -> PathBuf {
         self.folder(&format!("{}tonight", atomic::TEMPORARY))
     }
@@ -402,15 +416,23 @@ mod link {
         fs::rename(&beside, path).map_err(Error::io(path, "cannot put the link in its place"))
     }
 
+    /// `true` if the file of a night in the folder of reports is the link to it.
+    pub fn is_placed(reports: &Path, _: &Path, name: &str) -> bool {
+        target(&reports.join(name)) == Some(link_to(name))
+    }
+
+    fn link_to(name: &str) -> String {
+        format!("{CURRENT}/{name}")
+    }
+
     /// Links each file of a night in the folder of reports, and removes the links of other files.
     pub fn place_all<'a>(
         reports: &Path,
         _: &Path,
         names: impl Iterator<Item = &'a String>,
     ) -> Result<()> {
-        let wanted: std::collections::BTreeMap<String, String> = names
-            .map(|name| (name.clone(), format!("{CURRENT}/{name}")))
-            .collect();
+        let wanted: std::collections::BTreeMap<String, String> =
+            names.map(|name| (name.clone(), link_to(name))).collect();
         for (name, to) in &wanted {
             let path = reports.join(name);
             if target(&path).as_ref() != Some(to) {
@@ -445,6 +467,12 @@ mod link {
 
     pub fn place(path: &Path, target: &str) -> Result<()> {
         atomic::place(path, target.as_bytes())
+    }
+
+    /// `true` if the file of a night in the folder of reports has the bytes of the night's.
+    pub fn is_placed(reports: &Path, night: &Path, name: &str) -> bool {
+        let read = |folder: &Path| fs::read(folder.join(name)).ok();
+        read(reports) == read(night)
     }
 
     pub fn place_all<'a>(

@@ -505,6 +505,14 @@ fn published_tables_carry_their_lineage_and_verify_checks_it() {
     );
     campaign.finishes("run");
     campaign.ends("verify", 0);
+    // A file of another's hand where the reader looks for a published one.
+    let shortcut = campaign.path("reports/trends.csv");
+    fs::remove_file(&shortcut).unwrap();
+    fs::write(&shortcut, "derivative,value\n").unwrap();
+    let said = campaign.ends("verify", 2).stdout;
+    assert!(said.contains("stands in its place"), "{said}");
+    campaign.finishes("run");
+    campaign.ends("verify", 0);
     flip(&files(&campaign.path("store/estimate"))[0]);
     assert!(
         campaign
