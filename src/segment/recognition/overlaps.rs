@@ -13,7 +13,7 @@ struct Candidate<'a> {
 
 /// Removes overlaps, and sorts by time.
 ///
-/// Of two candidates whose inputs overlap the accepted one counts, then the longer one. `rejection`
+/// The accepted one of two candidates whose inputs overlap counts, then the longer one. `rejection`
 /// returns the reason for which a candidate would be rejected. The other one is `unknown` if it was
 /// rejected or belongs to the other axis: the maneuver then does not explain its inputs. Excitation of
 /// no class is removed if it overlaps a maneuver, or longer excitation of no class, of which it is a
