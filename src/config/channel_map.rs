@@ -75,13 +75,8 @@ impl ChannelMap<'_> {
         let Some(signal) = &line.signal else {
             return Err(self.error(name, "a formula needs a `signal`"));
         };
-        let further = [
-            ("unit", line.unit.is_some()),
-            ("sign", line.sign.is_some()),
-            ("scale", line.scale.is_some()),
-            ("wraps_at", line.wraps_at.is_some()),
-        ];
-        if let Some((key, _)) = further.iter().find(|(_, is_given)| *is_given) {
+        let key = line.unit.as_ref().map(|_| "unit");
+        if let Some(key) = key.or_else(|| key_of_column(line)) {
             let what = format!(
                 "a formula has no `{key}`: its units follow from its columns, factors stand in it"
             );
@@ -106,13 +101,8 @@ impl ChannelMap<'_> {
             let what = "a table needs a `signal`, and a `unit`, which is that of `value`";
             return Err(self.error(name, what));
         };
-        let further = [
-            ("formula", line.formula.is_some()),
-            ("sign", line.sign.is_some()),
-            ("scale", line.scale.is_some()),
-            ("wraps_at", line.wraps_at.is_some()),
-        ];
-        if let Some((key, _)) = further.iter().find(|(_, is_given)| *is_given) {
+        let key = line.formula.as_ref().map(|_| "formula");
+        if let Some(key) = key.or_else(|| key_of_column(line)) {
             let what = format!("a channel with a table has no `{key}`");
             return Err(self.error(name, &what));
         }
@@ -171,7 +161,20 @@ impl ChannelMap<'_> {
     }
 }
 
-/// Columns without a signal that no formula of the channels uses.
+/// Key of a line that only a column can have.
+fn key_of_column(line: &ChannelLine) -> Option<&'static str> {
+    let given = [
+        ("sign", line.sign.is_some()),
+        ("scale", line.scale.is_some()),
+        ("wraps_at", line.wraps_at.is_some()),
+    ];
+    given
+        .iter()
+        .find(|(_, is_given)| *is_given)
+        .map(|(key, _)| *key)
+}
+
+/// Columns without a signal that no formula or table of the channels uses.
 pub fn unused(
     lines: &BTreeMap<String, ChannelLine>,
     channels: &BTreeMap<String, Channel>,

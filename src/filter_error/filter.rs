@@ -153,12 +153,6 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         &self.noise_parameters
     }
 
-    /// Returns true if a sample of an output counts.
-    #[must_use]
-    pub fn measures(&self, output: usize) -> bool {
-        self.patterns.iter().any(|pattern| pattern.used[output])
-    }
-
     /// Noise of these parameters.
     #[must_use]
     pub fn noise(&self, parameters: &[f64]) -> Noise {
@@ -402,7 +396,6 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
             patterns: &self.patterns,
             step_s: self.case.step_s,
             derivatives: &parameters[..self.case.derivatives()],
-            parameters,
             noise: self.noise(parameters),
             noise_parameters: numbered.collect(),
             equations: PhantomData,

@@ -23,8 +23,6 @@ pub(super) struct GainsAt<'a, const NX: usize, E: InGusts<NX>> {
     pub patterns: &'a [Pattern],
     /// Time between two samples.
     pub step_s: f64,
-    /// Values of all parameters.
-    pub parameters: &'a [f64],
     /// Values of the free derivatives.
     pub derivatives: &'a [f64],
     pub noise: Noise,
@@ -39,7 +37,7 @@ impl<const NX: usize, E: InGusts<NX>> WithSimd for GainsAt<'_, NX, E> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
         let decay = decay_matrix::<NX, E>(self.noise.decay(self.step_s));
-        let (discrete, by_derivative) = self.linearised.discrete(self.parameters);
+        let (discrete, by_derivative) = self.linearised.discrete(self.derivatives);
         let (of_inputs, of_inputs_slopes) = self.input_noise.covariance(self.derivatives);
         let system = NoisySystem {
             a: product(&discrete.step, &decay),
@@ -47,7 +45,7 @@ impl<const NX: usize, E: InGusts<NX>> WithSimd for GainsAt<'_, NX, E> {
             q: self.noise.covariance::<NX, E>(self.step_s) + of_inputs,
             r: steady_variances(&self.noise, self.patterns),
         };
-        let mut slopes = Vec::with_capacity(self.parameters.len());
+        let mut slopes = Vec::with_capacity(self.derivatives.len() + self.noise_parameters.len());
         for (parameter, (slope, q)) in by_derivative.iter().zip(of_inputs_slopes).enumerate() {
             slopes.push(ParameterSlope {
                 parameter,

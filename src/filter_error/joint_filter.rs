@@ -219,7 +219,7 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
 fn fix_unmeasured<const NX: usize, E: InGusts<NX>>(filter: &Filter<NX, E>, free: &mut [bool]) {
     for (kind, free) in filter.noise_parameters().iter().zip(free) {
         if let NoiseParameter::Output(output) = kind {
-            *free &= filter.measures(*output);
+            *free &= filter.case.measurements.have(*output);
         }
     }
 }

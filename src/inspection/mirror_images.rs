@@ -3,6 +3,7 @@
 use super::recording::{Column, Recording, column_names};
 use super::vocabulary::{Input, SIDES, input};
 use super::words::{Spelling, words};
+use crate::output_error::identifiability;
 
 /// Largest correlation of mirror images. Ailerons that move twice as far up as down have −0.95; elevons
 /// whose pitch command is a quarter of the roll command have −0.88.
@@ -35,7 +36,7 @@ impl MirrorImages {
                 };
                 let is_taken =
                     names.contains(&name.as_str()) || found.iter().any(|m| m.name == name);
-                let correlation = correlation(recordings, left, right);
+                let correlation = correlation_in(recordings, left, right);
                 if let Some(correlation) = correlation.filter(|c| *c <= MIRRORED && !is_taken) {
                     found.push(MirrorImages {
                         name,
@@ -134,7 +135,7 @@ fn common_name(left: &str, right: &str) -> Option<String> {
 }
 
 /// Correlation of two columns where both have values; `None` where one of them rests.
-fn correlation(recordings: &[Recording], a: &str, b: &str) -> Option<f64> {
+fn correlation_in(recordings: &[Recording], a: &str, b: &str) -> Option<f64> {
     let pairs = recordings
         .iter()
         .filter_map(|r| r.column(a).zip(r.column(b)));
@@ -146,16 +147,8 @@ fn correlation(recordings: &[Recording], a: &str, b: &str) -> Option<f64> {
     if pairs.len() < FEWEST_ROWS {
         return None;
     }
-    let count = pairs.len() as f64;
-    let mean = |of: fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / count;
-    let (mean_a, mean_b) = (mean(|pair| pair.0), mean(|pair| pair.1));
-    let product = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
-        let products = pairs.iter().map(|(a, b)| of(a - mean_a, b - mean_b));
-        products.sum()
-    };
-    let (aa, bb) = (product(&|a, _| a * a), product(&|_, b| b * b));
-    let correlation = product(&|a, b| a * b) / (aa * bb).sqrt();
-    correlation.is_finite().then_some(correlation)
+    let (a, b): (Vec<f64>, Vec<f64>) = pairs.into_iter().unzip();
+    identifiability::correlation(&a, &b)
 }
 
 #[cfg(test)]

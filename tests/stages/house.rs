@@ -5,7 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::sources::{Source, Tree, circles, root, source, sources, words};
 use crate::support::files;
@@ -320,6 +320,14 @@ fn only_the_command_line_prints() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
+/// Rust files in folders of the repository.
+fn rust_files(folders: &[&str]) -> impl Iterator<Item = PathBuf> {
+    let all = folders
+        .iter()
+        .flat_map(|folder| files(&root().join(folder)));
+    all.filter(|file| file.extension().is_some_and(|e| e == "rs"))
+}
+
 /// Files of program, tests and benchmarks that name a word, by word.
 fn files_by_word(texts: &[String]) -> BTreeMap<&str, usize> {
     let mut files_of = BTreeMap::new();
@@ -353,10 +361,7 @@ fn is_reached_by_module(bare: &str, name: &str) -> bool {
 #[test]
 fn a_function_or_constant_of_one_file_is_private() {
     assert_eq!(visible("    pub const fn f(&self) {}"), Some("f"));
-    let texts: Vec<String> = ["src", "tests", "benches"]
-        .iter()
-        .flat_map(|folder| files(&root().join(folder)))
-        .filter(|file| file.extension().is_some_and(|e| e == "rs"))
+    let texts: Vec<String> = rust_files(&["src", "tests", "benches"])
         .map(|file| fs::read_to_string(file).unwrap())
         .collect();
     let files_of = files_by_word(&texts);
@@ -374,38 +379,28 @@ fn a_function_or_constant_of_one_file_is_private() {
 
 #[test]
 fn every_file_has_a_header() {
-    for file in files(&root().join("src"))
-        .into_iter()
-        .chain(files(&root().join("tests")))
-    {
-        if file.extension().is_some_and(|e| e == "rs") {
-            let text = fs::read_to_string(&file).unwrap();
-            assert!(text.starts_with("//! "), "{}", file.display());
-        }
+    for file in rust_files(&["src", "tests"]) {
+        let text = fs::read_to_string(&file).unwrap();
+        assert!(text.starts_with("//! "), "{}", file.display());
     }
 }
 
 /// First lines of the doc comments of all sources, with their places.
 fn openings() -> Vec<(String, String)> {
     let mut openings = Vec::new();
-    for folder in ["src", "tests", "benches"] {
-        for file in files(&root().join(folder)) {
-            if file.extension().is_none_or(|e| e != "rs") {
-                continue;
+    for file in rust_files(&["src", "tests", "benches"]) {
+        let text = fs::read_to_string(&file).unwrap();
+        let mut before = "";
+        for (number, line) in lines(&text) {
+            let line = line.trim_start();
+            let comment = ["/// ", "//! "]
+                .iter()
+                .find_map(|mark| line.strip_prefix(mark));
+            if let Some(comment) = comment.filter(|_| !before.starts_with(&line[..3])) {
+                let name = file.strip_prefix(root()).unwrap().display();
+                openings.push((format!("{name}:{number}"), comment.to_owned()));
             }
-            let text = fs::read_to_string(&file).unwrap();
-            let mut before = "";
-            for (number, line) in lines(&text) {
-                let line = line.trim_start();
-                let comment = ["/// ", "//! "]
-                    .iter()
-                    .find_map(|mark| line.strip_prefix(mark));
-                if let Some(comment) = comment.filter(|_| !before.starts_with(&line[..3])) {
-                    let name = file.strip_prefix(root()).unwrap().display();
-                    openings.push((format!("{name}:{number}"), comment.to_owned()));
-                }
-                before = line;
-            }
+            before = line;
         }
     }
     openings
