@@ -5,10 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use super::checks::{
-    BlockAverager, BlockMeans, Check, FaultReport, FaultyChannel, Gusts, ImpossibleSignal,
-    check_relations, confirmed_signals, find_faulty_channels, impossible_centre,
+    BlockAverager, BlockMeans, Check, ENGINE_SIGNALS, FaultReport, FaultyChannel, Gusts,
+    ImpossibleSignal, check_relations, confirmed_signals, find_faulty_channels, impossible_centre,
     impossible_gyration, impossible_mass, impossible_signals, impossible_temperature,
-    impossible_velocity, report, useless_temperature, wrong_time,
+    impossible_velocity, report, useless_engine_signal, useless_temperature, wrong_time,
 };
 use super::clock::Clock;
 use super::compatibility::{self, Findings};
@@ -125,8 +125,9 @@ impl Examination<'_> {
     /// Examines the stretch. Wrong channels that it can do without are left out one after another,
     /// and the others are examined as if these were not recorded.
     pub fn examine(&self, blocks: BlockMeans) -> Outcome {
-        if let Some(thermometer) = self.thermometer(&blocks) {
-            return self.examine_without(vec![thermometer], &blocks, Vec::new());
+        let outside_relations = self.useless_outside_relations(&blocks);
+        if !outside_relations.is_empty() {
+            return self.examine_without(outside_relations, &blocks, Vec::new());
         }
         let relations = self.check(&blocks);
         // A late altimeter is corrected by its delay, which the reconstruction finds.
@@ -142,6 +143,10 @@ impl Examination<'_> {
         if self.has_useless_alone(&relations) || self.holds_without_useless(&relations, &blocks) {
             let left_out = self.useless(&relations);
             return self.examine_without(left_out, &blocks, relations.checks);
+        }
+        let inexplicable = self.inexplicable(&findings);
+        if !inexplicable.is_empty() {
+            return self.examine_without(inexplicable, &blocks, relations.checks);
         }
         if relations.impossible.is_empty() {
             relations.impossible = self.impossible(&blocks, &relations.faulty);
@@ -190,15 +195,19 @@ impl Examination<'_> {
         }
     }
 
-    /// The thermometer of the air, if its values are of no use.
-    fn thermometer(&self, blocks: &BlockMeans) -> Option<LeftOut> {
-        if !self.is_recorded(signal::AIR_TEMPERATURE) {
-            return None;
-        }
-        let reason = useless_temperature(blocks)?;
-        let verdict = reason.clone();
-        let refusal = self.context.refusal(signal::AIR_TEMPERATURE, reason);
-        Some(self.leave_out(signal::AIR_TEMPERATURE, verdict, refusal))
+    /// Channels that no relation contains and whose values are of no use.
+    fn useless_outside_relations(&self, blocks: &BlockMeans) -> Vec<LeftOut> {
+        let temperature = useless_temperature(blocks).map(|why| (signal::AIR_TEMPERATURE, why));
+        let engines = ENGINE_SIGNALS.iter();
+        let engines =
+            engines.filter_map(|name| Some((*name, useless_engine_signal(blocks, name)?)));
+        let found = temperature.into_iter().chain(engines);
+        let leave_out = |(name, reason): (&str, String)| {
+            let verdict = reason.clone();
+            self.leave_out(name, verdict, self.context.refusal(name, reason))
+        };
+        let recorded = found.filter(|(name, _)| self.is_recorded(name));
+        recorded.map(leave_out).collect()
     }
 
     /// `true` for a faulty channel that the stretch can do without.
@@ -240,6 +249,19 @@ impl Examination<'_> {
         };
         let useless = relations.faulty.iter().filter(|f| self.is_useless(f));
         useless.map(leave_out).collect()
+    }
+
+    /// Channels whose values no error of an instrument explains and that the stretch can do without.
+    fn inexplicable(&self, findings: &Findings) -> Vec<LeftOut> {
+        let leave_out = |(name, fault): (&str, String)| {
+            let is_other = |other: &str| other != name && self.is_recorded(other);
+            let is_useless = self.context.can_do_without(name, is_other);
+            is_useless.then(|| {
+                let refusal = self.context.refusal(name, fault.clone());
+                self.leave_out(name, fault, refusal)
+            })
+        };
+        findings.inexplicable().filter_map(leave_out).collect()
     }
 
     /// A channel that is left out, with its stand-in and the cost.

@@ -8,7 +8,7 @@ use crate::flight::{Correction, signal};
 use crate::ingest::settings::Checks;
 use crate::numerics::sample_count::whole_steps;
 
-/// Signals that the relations and the checks of mass and inertias use.
+/// Signals that the relations and the checks of mass, inertias and engines use.
 const USED: &[&str] = &[
     signal::ALPHA_VANE,
     signal::BETA_VANE,
@@ -34,6 +34,9 @@ const USED: &[&str] = &[
     signal::IY,
     signal::IZ,
     signal::IXZ,
+    signal::THRUST,
+    signal::RPM_LEFT,
+    signal::RPM_RIGHT,
 ];
 
 /// Relative difference below which two means are equal: rounding of sums of one value.

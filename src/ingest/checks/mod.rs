@@ -3,6 +3,7 @@
 mod agreement;
 mod block_means;
 mod block_motion;
+mod engine;
 mod fault_isolation;
 mod gusts;
 mod mass_properties;
@@ -13,6 +14,7 @@ mod windows;
 
 pub(in crate::ingest) use agreement::{Check, check_relations, confirmed_signals};
 pub(in crate::ingest) use block_means::{BlockAverager, BlockMeans};
+pub(in crate::ingest) use engine::{ENGINE_SIGNALS, useless_engine_signal};
 pub(in crate::ingest) use fault_isolation::{
     FaultReport, FaultyChannel, find_faulty_channels, report,
 };

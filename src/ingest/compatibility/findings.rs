@@ -115,6 +115,9 @@ impl Findings {
             let mut estimates =
                 ALL_KINDS.map(|kind| errors.and_then(|errors| estimate(errors, i, kind, settings)));
             correct_together(&mut estimates, settings);
+            if has_estimate_at_limit(&estimates) {
+                withdraw_corrections(&mut estimates);
+            }
             let evidence = ALL_KINDS
                 .into_iter()
                 .filter_map(|kind| evidence(errors?, i, kind, settings));
@@ -186,12 +189,11 @@ impl Findings {
     #[must_use]
     pub fn with_faults_corrected(&self) -> Findings {
         let mut corrected = self.clone();
-        for estimate in corrected
-            .0
-            .iter_mut()
-            .flat_map(|f| f.estimates.iter_mut().flatten())
-        {
-            estimate.applied |= estimate.fault && !estimate.at_limit;
+        for finding in &mut corrected.0 {
+            let is_usable = !has_estimate_at_limit(&finding.estimates);
+            for estimate in finding.estimates.iter_mut().flatten() {
+                estimate.applied |= estimate.fault && is_usable;
+            }
         }
         corrected
     }
@@ -214,14 +216,21 @@ impl Findings {
     /// These findings with nothing corrected.
     #[must_use]
     pub fn without_corrections(mut self) -> Findings {
-        for estimate in self
-            .0
-            .iter_mut()
-            .flat_map(|f| f.estimates.iter_mut().flatten())
-        {
-            estimate.applied = false;
+        for finding in &mut self.0 {
+            withdraw_corrections(&mut finding.estimates);
         }
         self
+    }
+
+    /// Signals whose scale error is at the limit of its search, each with the fault in words: no error
+    /// of an instrument explains their values.
+    pub fn inexplicable(&self) -> impl Iterator<Item = (&'static str, String)> {
+        let scale = |f: &InstrumentFinding| f.estimates[Kind::Scale as usize];
+        let inexplicable = self
+            .0
+            .iter()
+            .filter(move |f| scale(f).is_some_and(|e| e.at_limit));
+        inexplicable.map(|f| (f.signal, f.fault_sentence()))
     }
 
     /// Corrections of the record.
@@ -385,6 +394,18 @@ fn correct_together(estimates: &mut [Option<ErrorEstimate>; KINDS], settings: &C
     }
 }
 
+/// `true` if an error is at the limit of its search. The estimates of an instrument's other errors
+/// then depend on that limit.
+fn has_estimate_at_limit(estimates: &[Option<ErrorEstimate>; KINDS]) -> bool {
+    estimates.iter().flatten().any(|estimate| estimate.at_limit)
+}
+
+fn withdraw_corrections(estimates: &mut [Option<ErrorEstimate>; KINDS]) {
+    for estimate in estimates.iter_mut().flatten() {
+        estimate.applied = false;
+    }
+}
+
 impl InstrumentFinding {
     /// Each fault in words.
     fn faults(&self) -> Vec<String> {
@@ -544,6 +565,30 @@ mod tests {
             evidence(&errors(j, value, 0.001), 6, Kind::Delay, &settings)
         };
         assert!(of(limit_s).is_none() && of(0.9 * limit_s).is_some());
+    }
+
+    #[test]
+    fn no_error_of_an_instrument_is_corrected_beside_one_at_the_limit_of_its_search() {
+        let mach = SIGNALS.iter().position(|s| *s == signal::MACH).unwrap();
+        let settings = Compatibility::default();
+        let of_scale = |scale: f64| {
+            let mut errors = errors(place(mach, Kind::Bias), 0.35, 0.002);
+            errors.values[place(mach, Kind::Scale)] = scale;
+            let channel = Channel::plain(signal::MACH, "1");
+            let channels = BTreeMap::from([("mach".to_owned(), channel)]);
+            let recorded = [signal::MACH.to_owned()];
+            Findings::of(Some(&errors), &channels, &recorded, &settings)
+        };
+        let at_limit = of_scale(-0.8);
+        assert_eq!(at_limit.corrections(), []);
+        assert_eq!(at_limit.with_faults_corrected().corrections(), []);
+        let problem = &at_limit.problems("f")[0].reason;
+        assert!(problem.contains("left as recorded"), "{problem}");
+        let inexplicable: Vec<_> = at_limit.inexplicable().map(|(name, _)| name).collect();
+        assert_eq!(inexplicable, [signal::MACH]);
+        let inside = of_scale(-0.4);
+        assert_eq!(inside.corrections().len(), 1);
+        assert_eq!(inside.inexplicable().count(), 0);
     }
 
     #[test]
