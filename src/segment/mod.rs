@@ -12,6 +12,7 @@
 
 mod condition;
 mod events;
+mod noisy_controls;
 mod problems;
 mod quality;
 mod recognition;
@@ -24,8 +25,10 @@ mod tests;
 use std::collections::BTreeSet;
 
 use crate::aircraft::Aircraft;
+use crate::error::Problem;
 use crate::flight::Record;
 use crate::maneuver::{Acceptance, Class};
+use noisy_controls::without_noisy_controls;
 use recognition::detections::Detections;
 use recognition::found::FoundManeuver;
 use recognition::overlaps::without_overlaps;
@@ -71,6 +74,8 @@ pub fn maneuvers(
     aircraft: &Aircraft,
     settings: &Settings,
 ) -> Segmented {
+    let (record, of_noise) = without_noisy_controls(record, settings);
+    let record = record.as_ref();
     let detections = Detections::of(record, settings);
     let recognised_as = with_surfaces_for_controls(record, classes, settings);
     let recognition = recognise(&detections, &recognised_as);
@@ -94,7 +99,10 @@ pub fn maneuvers(
     recognition.unknown.extend(nothing);
     let windows = windows(&detections, &recognition.found);
     let mut problems = problems::of_unknown(record, &recognition.unknown);
-    problems.extend(problems::of_missing_signals(record, classes, settings));
+    let missing = problems::of_missing_signals(record, classes, settings);
+    let is_noisy = |p: &Problem| of_noise.iter().any(|noisy| noisy.place == p.place);
+    problems.extend(missing.into_iter().filter(|p| !is_noisy(p)));
+    problems.extend(of_noise.iter().cloned());
     problems.extend(problems::of_stuck_flags(record, &recognition.found));
     let mut maneuvers = Vec::new();
     for (found, window) in recognition.found.iter().zip(windows) {

@@ -13,7 +13,7 @@ use crate::maneuver::{Class, Unknown};
 const FEWEST_CONTRADICTIONS: usize = 2;
 
 /// A problem of a record at a place: a signal or a time.
-fn at_place(record: &Record, place: String, reason: String) -> Problem {
+pub(super) fn at_place(record: &Record, place: String, reason: String) -> Problem {
     Problem {
         stage: ProblemStage::Segment,
         flight_id: record.flight_id.clone(),

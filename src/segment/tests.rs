@@ -12,6 +12,7 @@ use crate::flight::record::Series;
 use crate::flight::{Mark, signal};
 use crate::maneuver::Quality;
 use crate::maneuver::{Acceptance, Event, Maneuver, Pulses, Recognition, StepCount, Sweep};
+use crate::numerics::random::RandomStream;
 use crate::tables::EventVerdict;
 
 const STEP_S: f64 = 0.025;
@@ -922,6 +923,38 @@ fn without_pilot_controls_steps_of_surfaces_stand_for_them_with_less_confidence(
     assert_abs_diff_eq!(without, 0.9 * with_controls, epsilon = 1e-12);
     let evidence = &found(&r).maneuvers[0].recognised.evidence;
     assert!(evidence.contains("stand for the pilot's"), "{evidence}");
+}
+
+#[test]
+fn a_control_of_noise_is_left_out_by_name_and_costs_no_maneuver() {
+    let mut quiet = flight(60);
+    three_two_one_one(&mut quiet, 21.0);
+    for (deviation, is_left_out) in [(0.15, false), (1.0, true)] {
+        let mut r = quiet.clone();
+        let mut random = RandomStream::new(3, "stick");
+        let noise: Vec<f64> = (0..r.samples)
+            .map(|_| deviation * random.normal())
+            .collect();
+        let stick = &mut r.signals.get_mut("stick_lat_in").unwrap().values;
+        stick.iter_mut().zip(noise).for_each(|(v, e)| *v += e);
+        let segmented = found(&r);
+        assert_eq!(classes_of(&segmented), ["3211"], "{deviation}");
+        let places: Vec<&str> = segmented
+            .problems
+            .iter()
+            .map(|p| p.place.as_str())
+            .collect();
+        let expected = if is_left_out {
+            &["stick_lat_in"][..]
+        } else {
+            &[]
+        };
+        assert_eq!(places, expected, "{:?}", segmented.problems);
+        if is_left_out {
+            let reason = &segmented.problems[0].reason;
+            assert!(reason.contains("left out"), "{reason}");
+        }
+    }
 }
 
 #[test]

@@ -5,6 +5,8 @@
 //! through feedback. The other steps of surfaces are uncommanded by the pilot: they distinguish
 //! excitation from ordinary flying without any flag.
 
+use std::collections::BTreeMap;
+
 use crate::flight::Record;
 use crate::segment::settings::Settings;
 use crate::segment::steps::detection;
@@ -28,6 +30,8 @@ pub(in crate::segment) struct Detections<'a> {
     /// True if one of the pilot's controls is recorded. Otherwise the pilot's inputs cannot be
     /// separated from the system's.
     pub pilot_is_recorded: bool,
+    /// Standard deviation of each pilot control's changes that its noise causes.
+    control_noise: BTreeMap<&'a str, f64>,
     /// True if the excitation flag is recorded and not stuck.
     flag_varies: bool,
     /// Times during which a varying flag is down between two times that it is up, of at least the
@@ -51,6 +55,7 @@ impl<'a> Detections<'a> {
             deflections,
             uncommanded: Steps::default(),
             pilot_is_recorded: settings.pilot_controls.iter().any(is_recorded),
+            control_noise: control_noise(record, settings),
             flag_varies: varies(flag),
             flag_gaps: gaps(flag, record, settings.shortest_pause_s),
         };
@@ -107,8 +112,10 @@ impl<'a> Detections<'a> {
     fn moves_at(&self, control: &str, time_s: f64) -> bool {
         let settings = self.settings;
         let geared_s = (time_s - settings.gearing_s, time_s + settings.transit_s);
+        let noise = self.control_noise.get(control).copied().unwrap_or(0.0);
+        let smallest = settings.geared_share * self.steps.smallest(control);
         detection::largest_change(self.record, control, settings, geared_s)
-            >= settings.geared_share * self.steps.smallest(control)
+            >= smallest.max(settings.steps_over_noise * noise)
     }
 
     /// True if a varying flag is up at a time.
@@ -141,6 +148,14 @@ impl<'a> Detections<'a> {
             .map(|c| self.steps.between(c, from_s, to_s).len())
             .sum()
     }
+}
+
+fn control_noise<'a>(record: &Record, settings: &'a Settings) -> BTreeMap<&'a str, f64> {
+    let controls = settings.pilot_controls.iter();
+    let noise = |control| detection::level_noise(record, control, settings);
+    controls
+        .filter_map(|control| Some((control.as_str(), noise(control)?)))
+        .collect()
 }
 
 /// True for a flag that is up in some samples and down in others.

@@ -96,6 +96,28 @@ pub(in crate::segment) fn largest_change(
         .fold(0.0, f64::max)
 }
 
+/// Second differences of white noise have √6 times its standard deviation.
+const SECOND_DIFFERENCES: f64 = 6.0;
+
+/// Standard deviation of the changes between levels that white noise of a signal causes, from the
+/// second differences of its samples: motion hardly enters them. `None` without samples.
+pub(in crate::segment) fn level_noise(
+    record: &Record,
+    signal: &str,
+    settings: &Settings,
+) -> Option<f64> {
+    let values = record.values(signal)?;
+    let second_difference = |v: &[f64]| (v[2] - 2.0 * v[1] + v[0]).abs();
+    let mut sizes: Vec<f64> = values
+        .windows(3)
+        .map(second_difference)
+        .filter(|size| size.is_finite())
+        .collect();
+    let of_samples = SIGMA_PER_MAD * upper_median_in_place(&mut sizes)?;
+    let length = Window::of(record, settings).level as f64;
+    Some(of_samples * (2.0 / (SECOND_DIFFERENCES * length)).sqrt())
+}
+
 /// Standard deviation of uncommanded changes. Steps are few, so it follows from the median size of
 /// all changes. In a recording that is a single maneuver they are not few; there it follows from
 /// the rests between the inputs.
@@ -416,6 +438,21 @@ mod tests {
         // Differences of white levels: √2 of their deviation.
         assert_abs_diff_eq!(median, 2.0_f64.sqrt(), epsilon = 0.05);
         assert_abs_diff_eq!(quiet, median, epsilon = 0.08);
+    }
+
+    #[test]
+    fn the_noise_of_levels_is_that_of_white_samples_whatever_the_motion() {
+        let mut random = crate::numerics::random::RandomStream::new(9, "samples");
+        let values: Vec<f64> = (0..20_000)
+            .map(|k| 0.3 * random.normal() + 5.0 * (f64::from(k) / 60.0).sin())
+            .collect();
+        let (record, settings) = record_of(values);
+        let noise = level_noise(&record, "de_deg", &settings).unwrap();
+        // Means of five samples, and their difference.
+        assert_abs_diff_eq!(noise, 0.3 * (2.0_f64 / 5.0).sqrt(), epsilon = 0.005);
+        let (still, settings) = record_of(vec![1.0; 100]);
+        assert_eq!(level_noise(&still, "de_deg", &settings), Some(0.0));
+        assert_eq!(level_noise(&still, "dr_deg", &settings), None);
     }
 
     #[test]
