@@ -17,7 +17,7 @@ What is needed is brought up to date first, as far as `model`. Each card (class,
 flown by a simulator with the derivatives of tonight's posterior and estimated as a flown maneuver is; the cards that lower \
 the standard deviations of the goals most in the minutes are chosen (docs/next.md).
 
-  next_cards.csv, .parquet   every card: what it teaches, its minutes, its place in the flight, why it is refused
+  next_cards.csv, .parquet   every card: the goals it informs, its minutes, its place in the flight, why it is refused
   next_goals.csv, .parquet   standard deviation of each goal before and after the flight, and its chance to be decided
   kneeboard.html, .pdf       one page for the pilot
 
@@ -117,12 +117,12 @@ fn line(row: &NextCardRow) -> String {
         class,
         alpha_deg,
         scale,
-        teaches,
+        informs,
         ..
     } = row;
     let minutes = row.minutes * *times as f64;
     let place = row.place.unwrap_or_default();
-    let first = teaches.split("; ").next().unwrap_or_default();
+    let first = informs.split("; ").next().unwrap_or_default();
     format!(
         "{place:>4}  {class:<18} {alpha_deg:>5}°  x{times}  scale {scale:<4} {minutes:>5.1} min  {first}"
     )

@@ -62,7 +62,7 @@ struct CardLine {
     inputs: String,
     minutes: String,
     reaches: String,
-    teaches: Vec<InformedGoal>,
+    informs: Vec<InformedGoal>,
 }
 
 /// Line of a program of inputs.
@@ -163,7 +163,7 @@ fn card_line(config: &Config, row: &NextCardRow, program: Option<&Program>, at: 
     let title = config.class(&row.class).map(|class| class.title.clone());
     let reach =
         |value: Option<f64>, decimals| value.map_or_else(String::new, |v| fixed(v, decimals));
-    let teaches = row.teaches.split("; ").filter_map(|part| {
+    let informs = row.informs.split("; ").filter_map(|part| {
         let (goal, rest) = part.split_once(" at ")?;
         Some(InformedGoal {
             symbol: goal_symbol(goal),
@@ -190,7 +190,7 @@ fn card_line(config: &Config, row: &NextCardRow, program: Option<&Program>, at: 
             reach(row.highest_an_g, 1),
             reach(row.highest_qbar_psf, 0),
         ),
-        teaches: teaches.take(1).collect(),
+        informs: informs.take(1).collect(),
     }
 }
 

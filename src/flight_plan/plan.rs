@@ -284,7 +284,7 @@ impl PlanRows<'_> {
             highest_qbar_psf: Some(extremes.qbar_psf.1),
             mach: Some(extremes.mach),
             calibrated_airspeed_kt: Some(extremes.calibrated_kt),
-            teaches: self.most_informed_goals(card, nothing),
+            informs: self.most_informed_goals(card, nothing),
             ..self.of_candidate(candidate)
         }
     }
@@ -311,7 +311,7 @@ impl PlanRows<'_> {
             highest_qbar_psf: None,
             mach: None,
             calibrated_airspeed_kt: None,
-            teaches: String::new(),
+            informs: String::new(),
             refused: String::new(),
         }
     }

@@ -60,7 +60,7 @@ table! {
         /// Calibrated airspeed of the card in trim.
         pub calibrated_airspeed_kt: Option<f64> ["kt"],
         /// Goals to which the card alone adds most, with the change of their standard deviations.
-        pub teaches: String,
+        pub informs: String,
         /// Reason why the card is refused; empty for one that may be flown.
         pub refused: String,
     }

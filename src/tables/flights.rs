@@ -301,7 +301,7 @@ words! {
         /// No error beyond its limit.
         Ok = "ok",
         /// No error beyond its limit; the flight moves it too little to determine its delay.
-        NoDelay = "ok; its delay is not told",
+        NoDelay = "ok; delay not excited",
         /// The flight moves it too little; its errors are those of the other flights.
         FromOthers = "ok; taken from the other flights",
         /// The flight moves it too little to determine any error.
