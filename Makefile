@@ -117,8 +117,8 @@ install: build ## install program, man pages and shell completions under PREFIX
 	install -D -m 755 "$(or $(CARGO_TARGET_DIR),target)/release/harvest" "$(DESTDIR)$(PREFIX)/bin/harvest"
 	"$(DESTDIR)$(PREFIX)/bin/harvest" manual --to "$(DESTDIR)$(PREFIX)"
 
-test: ## run the tests and name the ten slowest
-	FEATURES='$(FEATURES)' bash tests/run.sh
+test: ## run the tests and name the ten slowest [PROFILE=release: of the code that users run]
+	FEATURES='$(FEATURES)' PROFILE='$(PROFILE)' bash tests/run.sh
 
 same: ## are the published tables those of the revision SINCE, byte for byte
 	bash tests/same_tables.sh '$(SINCE)'
@@ -127,14 +127,14 @@ doc: ## the documentation of the code, private items included, into target/doc
 	cargo doc --locked --no-deps --document-private-items
 
 docs: ## write docs/tables.md and docs/settings.md from the declarations of tables and settings
-	HARVEST_WRITE_DOCS=1 cargo test --release --locked --lib --quiet -- the_page_of_
+	HARVEST_WRITE_DOCS=1 cargo test --locked --lib --quiet -- the_page_of_
 
 # Of make torture and make fuzz: others each time; the output names it.
 SEED ?= $(shell date +%s)
 KILLS ?= 200
 FLIPS ?= 200
 torture: ## kill runs at KILLS random moments, flip bits, fill the disk, race; the bytes must be those of an undisturbed run
-	HARVEST_SEED='$(SEED)' HARVEST_KILLS='$(KILLS)' HARVEST_FLIPS='$(FLIPS)' cargo test --release --locked --test stages -- nights:: --nocapture
+	HARVEST_SEED='$(SEED)' HARVEST_KILLS='$(KILLS)' HARVEST_FLIPS='$(FLIPS)' cargo test --locked --test stages -- nights:: --nocapture
 
 cluster: build ## a campaign on a Slurm of this machine's own: plain, with a failing task, with a killed node
 	bash tests/cluster/slurm.sh target/release/harvest
@@ -144,7 +144,7 @@ object-store: ## archive and store in an object store: the tests on an S3-compat
 
 FILES ?= 5000
 fuzz: ## FILES spoiled flights, and as many spoiled YAML and CSV files
-	HARVEST_SEED='$(SEED)' HARVEST_FUZZ='$(FILES)' cargo test --release --locked --test stages -- fuzz:: --nocapture
+	HARVEST_SEED='$(SEED)' HARVEST_FUZZ='$(FILES)' cargo test --locked --test stages -- fuzz:: --nocapture
 
 match-study: ## are the probabilities of the proof of match calibrated, over 540 simulated maneuvers
 	cargo test --release --locked --lib -- --ignored proof_of_match::
