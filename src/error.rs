@@ -103,10 +103,11 @@ impl Error {
 table! {
     /// Everything that was rejected or could not be made, while the rest of the campaign went on.
     ///
-    /// With a row of another stage than `trend` `harvest` exits with 2: a derivative with too few
-    /// maneuvers for a trend is no rejection.
+    /// With a row of another stage than `recording` and `trend` `harvest` exits with 2: neither a signal
+    /// that a recording lacks nor a derivative with too few maneuvers for a trend is a rejection. A flight
+    /// or maneuver that is rejected for want of a signal has a row of its own.
     pub struct Problem in "problems" per "thing that was rejected or could not be made" {
-        /// Stage that found the problem.
+        /// Stage that found the problem; `recording` for an absence in the recording.
         pub stage: ProblemStage,
         /// Flight, or stretch of a flight; empty where it is none.
         pub flight_id: String,
@@ -120,6 +121,8 @@ table! {
 words! {
     /// Stage that found a problem.
     pub enum ProblemStage {
+        /// Signals that a recording lacks, with their stand-ins and the cost; nothing is rejected.
+        Recording = "recording",
         /// Flights to records.
         Ingest = "ingest",
         /// Records to maneuvers.
@@ -136,6 +139,14 @@ words! {
         Report = "report",
         /// The simulator; not in the table `problems`.
         Simulate = "simulate",
+    }
+}
+
+impl ProblemStage {
+    /// `true` for a stage whose problems are rejections, or results that could not be made.
+    #[must_use]
+    pub fn is_rejection(self) -> bool {
+        !matches!(self, ProblemStage::Recording | ProblemStage::Trend)
     }
 }
 
@@ -181,6 +192,13 @@ mod tests {
             e.to_string(),
             "pipelines/harv/model.yaml:12: unknown regressor `dx`"
         );
+    }
+
+    #[test]
+    fn absences_and_trends_of_few_maneuvers_are_no_rejections() {
+        let others = ProblemStage::ALL.into_iter().filter(|s| !s.is_rejection());
+        let others: Vec<ProblemStage> = others.collect();
+        assert_eq!(others, [ProblemStage::Recording, ProblemStage::Trend]);
     }
 
     #[test]

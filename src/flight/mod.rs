@@ -1,5 +1,6 @@
 //! A flight as recorded (channels) and as conditioned (signals on one clock).
 
+pub mod absence;
 pub mod channel;
 pub mod correction;
 pub mod formula;

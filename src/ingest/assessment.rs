@@ -6,15 +6,15 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::channel::{
-    ChannelStatistics, ConditionedChannel, Signature, empty_channel, missing_signal,
-    sparse_channel, stuck_channel, values_beyond,
+    ChannelStatistics, ConditionedChannel, Signature, empty_channel, sparse_channel, stuck_channel,
+    values_beyond,
 };
 use super::checks::{BlockAverager, FaultReport, Gusts, LiftPoint, lift_curve};
 use super::clock::Stretch;
 use super::compatibility::{ErrorEvidence, Findings, OnFault};
 use super::context::Context;
 use super::examination::{Examination, Outcome, RecordReader, RelationResult};
-use super::refusal::Refusal;
+use super::refusal::{LeftOut, Refusal};
 use super::settings::OnFailedCheck;
 use super::table_ends::held_throughout;
 use crate::error::Problem;
@@ -159,7 +159,7 @@ impl<'a> Recording<'a> {
         context: &Context,
     ) -> Result<Recording<'a>, Problem> {
         let (flight_id, clock) = (stretch.flight_id.as_str(), &stretch.clock);
-        let (mut channels, mut problems, mut empty) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut channels, mut problems, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
         let mut block_means = BTreeMap::new();
         let mut signature_samples = Vec::new();
         let signals: Vec<&str> = conditioned
@@ -174,10 +174,18 @@ impl<'a> Recording<'a> {
             let (name, channel, statistics) = (one.name, one.channel, one.statistics);
             let signal = channel.signal.as_str();
             if statistics.count(Mark::Missing) == clock.samples {
-                empty.push((signal, empty_channel(name, channel, clock.rows)));
+                left_out.push(LeftOut {
+                    signal,
+                    refusal: empty_channel(name, channel, clock.rows),
+                    is_absent: true,
+                });
             } else if is_replaceable(signal) && 2 * with_value(&statistics) < clock.samples {
                 let share = with_value(&statistics) as f64 / clock.samples as f64;
-                empty.push((signal, sparse_channel(name, channel, share)));
+                left_out.push(LeftOut {
+                    signal,
+                    refusal: sparse_channel(name, channel, share),
+                    is_absent: false,
+                });
             } else {
                 let stuck = stuck_channel(name, &statistics, clock);
                 let beyond = values_beyond(name, channel, &statistics, clock);
@@ -194,17 +202,18 @@ impl<'a> Recording<'a> {
         let recorded = channels
             .iter()
             .map(|(_, channel, _)| channel.signal.clone());
-        let recorded = recorded.filter(|signal| !empty.iter().any(|(s, _)| s == signal));
+        let recorded = recorded.filter(|signal| !left_out.iter().any(|one| one.signal == signal));
         let recorded: Vec<String> = recorded.collect();
         let is_recorded = |signal: &str| recorded.iter().any(|s| s == signal);
         let stand_ins = match context.stand_ins(is_recorded) {
             Ok(stand_ins) => stand_ins,
-            Err(signal) => return Err(refused_signal(signal, empty).into_problem(flight_id)),
+            Err(signals) => {
+                let refusal = Refusal::of_signals(&signals, left_out);
+                return Err(refusal.into_problem(flight_id));
+            }
         };
-        problems.extend(empty.into_iter().map(|(signal, refusal)| {
-            let refusal = refusal.with_stand_in(signal, &stand_ins);
-            refusal.into_problem(flight_id)
-        }));
+        let left_out = left_out.into_iter();
+        problems.extend(left_out.map(|one| one.into_problem(&stand_ins, flight_id)));
         Ok(Recording {
             channels,
             block_means,
@@ -220,12 +229,6 @@ impl<'a> Recording<'a> {
 fn with_value(statistics: &ChannelStatistics) -> usize {
     let kept = [Mark::Measured, Mark::Bridged, Mark::Despiked, Mark::Between];
     kept.map(|mark| statistics.count(mark)).iter().sum()
-}
-
-/// Refusal of a required signal that can have no stand-in, at its empty channel if it has one.
-fn refused_signal(signal: &str, empty: Vec<(&str, Refusal)>) -> Refusal {
-    let own = empty.into_iter().find(|(name, _)| *name == signal);
-    own.map_or_else(|| missing_signal(signal), |(_, refusal)| refusal)
 }
 
 /// Problem of the failed relations, with the instrument faults found besides.

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::refusal::Refusal;
 use super::settings::Settings;
 use crate::aircraft::Aircraft;
+use crate::flight::absence::irreplaceable;
 use crate::flight::stand_in::stand_ins;
 use crate::flight::{Channel, StandIn, signal};
 
@@ -43,11 +44,12 @@ impl Context<'_> {
     /// Stand-ins of the required signals that neither `recorded` nor a constant gives.
     ///
     /// # Errors
-    /// The first signal that can have no stand-in.
+    /// All signals that can have no stand-in.
     pub(super) fn stand_ins(
         &self,
         recorded: impl Fn(&str) -> bool,
-    ) -> Result<Vec<(String, StandIn)>, &'static str> {
-        stand_ins(|signal| recorded(signal) || self.constants.contains_key(signal))
+    ) -> Result<Vec<(String, StandIn)>, Vec<&'static str>> {
+        let has = |signal: &str| recorded(signal) || self.constants.contains_key(signal);
+        stand_ins(has).map_err(|_| irreplaceable(has))
     }
 }

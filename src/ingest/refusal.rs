@@ -1,6 +1,7 @@
 //! Reasons for which ingest refuses a flight, a stretch or a channel.
 
 use crate::error::{Problem, ProblemStage};
+use crate::flight::absence::remedies;
 use crate::flight::stand_in::cost;
 use crate::flight::{StandIn, signal};
 
@@ -41,14 +42,78 @@ impl Refusal {
         }
     }
 
+    /// Refusal of a flight for required signals without a source: at the channel of each where the
+    /// channel map has one, with the remedies.
+    pub(super) fn of_signals(signals: &[&str], left_out: Vec<LeftOut>) -> Refusal {
+        let mut own = left_out;
+        own.retain(|one| signals.contains(&one.signal));
+        let line = match own.len() {
+            0 => "",
+            1 => "take its line out of the channel map and ",
+            _ => "take their lines out of the channel map and ",
+        };
+        let advice = format!(
+            "Where the recorder lacks {}, {line}{}",
+            if signals.len() == 1 { "it" } else { "them" },
+            remedies(signals)
+        );
+        let at_channel = |signal: &str| own.iter().find(|one| one.signal == signal);
+        let refusals: Vec<Refusal> = signals
+            .iter()
+            .map(|signal| match at_channel(signal) {
+                Some(one) => one.refusal.clone(),
+                None => without_channel(signal),
+            })
+            .collect();
+        let places: Vec<&str> = refusals.iter().map(|r| r.place.as_str()).collect();
+        let reasons: Vec<&str> = refusals.iter().map(|r| r.reason.as_str()).collect();
+        Refusal {
+            place: places.join(", "),
+            reason: format!("{}. {advice}", reasons.join("; ")),
+        }
+    }
+
     /// The problem of a flight or stretch.
     #[must_use]
     pub fn into_problem(self, flight_id: &str) -> Problem {
+        self.of_stage(ProblemStage::Ingest, flight_id)
+    }
+
+    fn of_stage(self, stage: ProblemStage, flight_id: &str) -> Problem {
         Problem {
-            stage: ProblemStage::Ingest,
+            stage,
             flight_id: flight_id.to_owned(),
             place: self.place,
             reason: self.reason,
         }
+    }
+}
+
+/// A channel that is left out of a flight.
+pub(super) struct LeftOut<'a> {
+    pub signal: &'a str,
+    pub refusal: Refusal,
+    /// `false` for a channel whose recorded values cannot be used.
+    pub is_absent: bool,
+}
+
+impl LeftOut<'_> {
+    /// The row of a flight that is read without the channel: the stand-in and the cost.
+    pub(super) fn into_problem(self, stand_ins: &[(String, StandIn)], flight_id: &str) -> Problem {
+        let stage = if self.is_absent {
+            ProblemStage::Recording
+        } else {
+            ProblemStage::Ingest
+        };
+        let refusal = self.refusal.with_stand_in(self.signal, stand_ins);
+        refusal.of_stage(stage, flight_id)
+    }
+}
+
+/// Refusal of a required signal that has no channel, no constant and no stand-in.
+fn without_channel(signal: &str) -> Refusal {
+    Refusal {
+        place: format!("signal `{signal}`"),
+        reason: format!("signal `{signal}` is neither a channel nor a constant"),
     }
 }

@@ -391,10 +391,9 @@ fn a_missing_or_empty_required_channel_refuses_the_flight_unless_a_constant_stan
 
     let mut flight = Flight::steady();
     flight.values("alpha").fill(f64::NAN);
-    assert_eq!(
-        flight.refused().reason,
-        "channel `alpha` (signal `alpha_vane_deg`) holds no number in 2000 rows"
-    );
+    let reason = flight.refused().reason;
+    let cause = "channel `alpha` (signal `alpha_vane_deg`) holds no number in 2000 rows. Where the";
+    assert!(reason.starts_with(cause), "{reason}");
 
     let mut flight = Flight::steady();
     flight.constants.remove(signal::MASS);
@@ -407,6 +406,41 @@ fn a_missing_or_empty_required_channel_refuses_the_flight_unless_a_constant_stan
             .reason
             .starts_with("signal `mass_slug` is neither a channel nor a constant")
     );
+}
+
+#[test]
+fn all_absent_channels_that_refuse_a_flight_are_named_at_once_with_the_advice() {
+    let mut flight = Flight::steady();
+    for channel in ["mass", "Iy", "psi"] {
+        flight.raw.columns.remove(channel);
+    }
+    let refused = flight.refused();
+    assert_eq!(refused.stage, ProblemStage::Ingest);
+    assert_eq!(refused.place, "channel `mass`, channel `Iy`");
+    for words in [
+        "channel `mass` (signal `mass_slug`) is not in the file; channel `Iy`",
+        "take their lines out of the channel map and give each a line under `channels`",
+        "under `constants` (`mass_slug: 1000`, `iy_slug_ft2: 20000`)",
+    ] {
+        assert!(refused.reason.contains(words), "{}", refused.reason);
+    }
+    assert!(!refused.reason.contains("psi"), "{}", refused.reason);
+}
+
+#[test]
+fn an_absence_is_no_rejection_and_a_channel_in_another_unit_is() {
+    let mut flight = Flight::steady();
+    flight.raw.columns.remove("psi");
+    flight.values("left_rpm").fill(f64::NAN);
+    let absent = flight.ingest().unwrap();
+    let stages: Vec<ProblemStage> = absent.problems.iter().map(|p| p.stage).collect();
+    assert_eq!(stages, [ProblemStage::Recording; 2]);
+    assert!(absent.problems.iter().all(|p| !p.stage.is_rejection()));
+    let mut flight = Flight::steady();
+    let column = flight.raw.columns.get_mut("de").unwrap();
+    column.unit = Some("rad".to_owned());
+    let other_unit = flight.ingest().unwrap();
+    assert_eq!(other_unit.problems[0].stage, ProblemStage::Ingest);
 }
 
 #[test]

@@ -45,11 +45,11 @@ impl RunOutcome {
     }
 }
 
-/// `true` if something that was recorded was rejected. A derivative with too few maneuvers for a
-/// trend is a problem, but no rejection.
+/// `true` if something that was recorded was rejected. A signal that a recording lacks, or a derivative
+/// with too few maneuvers for a trend, is a problem, but no rejection.
 #[must_use]
 pub fn has_rejections(problems: &[Problem]) -> bool {
-    problems.iter().any(|p| p.stage != ProblemStage::Trend)
+    problems.iter().any(|p| p.stage.is_rejection())
 }
 
 /// Brings the campaign up to date as far as `until` and publishes it as a night. Waits up to `wait`

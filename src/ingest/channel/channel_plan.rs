@@ -9,7 +9,7 @@ use crate::flight::{Channel, signal};
 use crate::ingest::clock::Clock;
 use crate::ingest::column_source::ColumnSource;
 use crate::ingest::context::Context;
-use crate::ingest::refusal::Refusal;
+use crate::ingest::refusal::{LeftOut, Refusal};
 use crate::units::{Conversion, Unit};
 
 /// Relative difference below which two factors are the same unit: rounding of the factors.
@@ -46,7 +46,7 @@ fn plan<'a>(
     flight_id: &str,
 ) -> Result<(Vec<ChannelPlan<'a>>, Vec<Problem>), Refusal> {
     let mut plans: BTreeMap<&str, ChannelPlan> = BTreeMap::new();
-    let mut absent: Vec<(&str, Refusal)> = Vec::new();
+    let mut left_out: Vec<LeftOut> = Vec::new();
     let is_mapped = |signal: &str| context.channels.values().any(|c| c.signal == signal);
     let is_useless =
         |signal: &str| context.can_do_without(signal, |other| other != signal && is_mapped(other));
@@ -67,7 +67,12 @@ fn plan<'a>(
                 return Err(refusal);
             }
             Err(refusal) => {
-                absent.push((&channel.signal, refusal));
+                let is_absent = is_lacking(source, name, channel);
+                left_out.push(LeftOut {
+                    signal: &channel.signal,
+                    refusal,
+                    is_absent,
+                });
                 continue;
             }
         };
@@ -82,15 +87,10 @@ fn plan<'a>(
     }
     let stand_ins = match context.stand_ins(|signal| plans.contains_key(signal)) {
         Ok(stand_ins) => stand_ins,
-        Err(signal) => {
-            let channel = absent.into_iter().find(|(absent, _)| *absent == signal);
-            return Err(channel.map_or_else(|| missing_signal(signal), |(_, refusal)| refusal));
-        }
+        Err(signals) => return Err(Refusal::of_signals(&signals, left_out)),
     };
-    let problems = absent.into_iter().map(|(signal, refusal)| {
-        let refusal = refusal.with_stand_in(signal, &stand_ins);
-        refusal.into_problem(flight_id)
-    });
+    let problems = left_out.into_iter();
+    let problems = problems.map(|one| one.into_problem(&stand_ins, flight_id));
     let problems = problems.collect();
     Ok((plans.into_values().collect(), problems))
 }
@@ -141,6 +141,18 @@ fn same_unit(stated: &str, mapped: &str) -> bool {
 
 fn is_in_files(source: &(impl ColumnSource + ?Sized), name: &str) -> bool {
     (0..source.files()).any(|file| source.has(file, name))
+}
+
+/// `true` for a channel whose column, or a column of whose formula, no file has.
+fn is_lacking(source: &(impl ColumnSource + ?Sized), name: &str, channel: &Channel) -> bool {
+    let has = |column: &str| {
+        let mut files = 0..source.files();
+        files.any(|file| source.has(file, column) || source.unreadable(file, column).is_some())
+    };
+    match &channel.formula {
+        None => !has(name),
+        Some(formula) => formula.operands().iter().any(|o| !has(&o.column)),
+    }
 }
 
 /// Refusal of a channel that is in no file. For a formula it names the columns that no file has.
@@ -261,17 +273,6 @@ fn duplicate_signal(name: &str, channel: &Channel) -> Refusal {
         channel.signal
     );
     Refusal::of_channel(name, reason)
-}
-
-/// Refusal of a required signal that has no channel, no constant and no stand-in.
-pub fn missing_signal(signal: &str) -> Refusal {
-    Refusal {
-        place: format!("signal `{signal}`"),
-        reason: format!(
-            "signal `{signal}` is neither a channel nor a constant; map a channel to it or give \
-             its value"
-        ),
-    }
 }
 
 #[cfg(test)]
