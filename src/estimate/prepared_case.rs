@@ -87,6 +87,9 @@ fn check_marked_share(task: &Task, surfaces: &[&str]) -> Result<(), String> {
         ));
     }
     for surface in surfaces {
+        if !task.record.signals.contains_key(*surface) {
+            return Err(format!("`{surface}` is not recorded"));
+        }
         let share = task.record.marked_share([*surface], start_s, end_s);
         if share > most {
             return Err(format!(

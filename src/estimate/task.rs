@@ -109,7 +109,9 @@ impl<'a> Task<'a> {
 
     /// Returns true if the regressor of a derivative follows from recorded signals.
     fn has_regressor(&self, derivative: &Derivative) -> bool {
+        let mut signals = derivative.regressor.signals();
         self.absent_of_regressor(derivative).is_none()
+            && signals.all(|signal| self.record.signals.contains_key(signal))
     }
 
     /// Returns true for an output that is not recorded: the record has a stand-in for it.

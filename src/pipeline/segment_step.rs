@@ -145,7 +145,8 @@ fn bring_flights(
 fn add_maneuvers(campaign: &mut Campaign, found: FoundManeuvers) {
     let state = campaign.state(Stage::Segment);
     state.fresh += 1;
-    state.failed.extend(found.problems.iter().map(|p| Failure {
+    let rejections = found.problems.iter().filter(|p| p.stage.is_rejection());
+    state.failed.extend(rejections.map(|p| Failure {
         item: p.flight_id.clone(),
         reason: format!("{}: {}", p.place, p.reason),
     }));

@@ -10,6 +10,7 @@
 //! Excitation that fits no class is `unknown`, with the reason. A maneuver whose [`quality`] is
 //! beyond a limit is rejected.
 
+mod absent_signals;
 mod condition;
 mod events;
 mod noisy_controls;
@@ -37,6 +38,7 @@ use recognition::stand_ins::with_surfaces_for_controls;
 use recognition::unclassified::nothing_found;
 use recognition::windows::windows;
 
+pub use absent_signals::absent_signals;
 pub use events::with_events;
 pub use segmented::Segmented;
 pub use settings::{Actuator, QualityLimits, Settings};

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use super::absent_signals::{AbsentSignal, absent_signals};
 use super::recognition::found::FoundManeuver;
 use super::settings::Settings;
 use crate::error::{Problem, ProblemStage};
@@ -40,37 +41,27 @@ pub(super) fn of_unknown(record: &Record, unknown: &[Unknown]) -> Vec<Problem> {
     unknown.iter().map(problem).collect()
 }
 
-/// One problem for each signal that recognition needs and the record lacks.
+/// One row for each signal that recognition needs and the record lacks. The row itself is no rejection:
+/// excitation without a class, and maneuvers that are not estimated, have rows of their own.
 pub(super) fn of_missing_signals(
     record: &Record,
     classes: &[Class],
     settings: &Settings,
 ) -> Vec<Problem> {
-    let flags: BTreeSet<&String> = classes
-        .iter()
-        .flat_map(|c| c.recognition.flags.keys())
-        .chain([&settings.excitation_flag])
-        .filter(|flag| !flag.is_empty())
-        .collect();
-    let counted = classes.iter().flat_map(|c| c.recognition.counted());
-    let needed: BTreeSet<&String> = counted
-        .chain(&settings.pilot_controls)
-        .chain(flags.iter().copied())
-        .collect();
-    let is_missing = |signal: &&String| {
-        record
-            .values(signal)
-            .is_none_or(|v| v.iter().all(|v| !v.is_finite()))
+    let is_recorded = |signal: &str| {
+        let values = record.values(signal).unwrap_or_default();
+        values.iter().any(|v| v.is_finite())
     };
-    let problem = |signal: &String| {
-        let reason = if flags.contains(signal) {
-            "the record has no such flag; maneuvers are recognised by their inputs alone"
-        } else {
-            "the record has no such signal; maneuvers of the classes that count its steps cannot be recognised"
-        };
-        at_place(record, signal.clone(), reason.to_owned())
+    let absence = |absent: AbsentSignal| {
+        let kind = if absent.is_flag { "flag" } else { "signal" };
+        let reason = format!("the record has no such {kind}; {}", absent.cost);
+        Problem {
+            stage: ProblemStage::Recording,
+            ..at_place(record, absent.signal, reason)
+        }
     };
-    needed.into_iter().filter(is_missing).map(problem).collect()
+    let absent = absent_signals(classes, settings, is_recorded);
+    absent.into_iter().map(absence).collect()
 }
 
 /// One problem for each flag that never changes although maneuvers contradict it.

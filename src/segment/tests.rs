@@ -904,6 +904,25 @@ fn a_missing_signal_is_a_problem_and_the_rest_is_segmented() {
             .collect::<Vec<_>>(),
         ["dsa_deg"]
     );
+    assert!(!problems[0].stage.is_rejection());
+}
+
+#[test]
+fn the_row_of_a_missing_control_names_the_surfaces_that_stand_for_it() {
+    let mut r = flight(60);
+    three_two_one_one(&mut r, 21.0);
+    r.signals.remove("stick_pitch_in");
+    let segmented = found(&r);
+    let [row] = &segmented.problems[..] else {
+        panic!("{:?}", segmented.problems)
+    };
+    assert!(
+        row.reason.starts_with(
+            "the record has no such signal; steps of the surfaces stand for its steps"
+        ),
+        "{row:?}"
+    );
+    assert!(!row.reason.contains("cannot be recognised"), "{row:?}");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Joint estimates and predictions on simulated maneuvers of known derivatives.
 
 mod absent_outputs;
+mod absent_surfaces;
 mod calibration;
 mod doubt;
 mod evidence;
