@@ -44,6 +44,17 @@ impl Copy {
         text.split(from).next().unwrap().matches('\n').count() + 1
     }
 
+    /// Removes the lines of channels.
+    fn unmap(&self, channels: &[&str]) {
+        let text = fs::read_to_string(self.path("aircraft.yaml")).unwrap();
+        let is_removed = |line: &str| {
+            let mut channels = channels.iter();
+            channels.any(|channel| line.starts_with(&format!("  {channel}: {{ signal")))
+        };
+        let kept: Vec<&str> = text.lines().filter(|line| !is_removed(line)).collect();
+        self.write("aircraft.yaml", &kept.join("\n"));
+    }
+
     fn write(&self, file: &str, text: &str) -> PathBuf {
         fs::write(self.path(file), text).unwrap();
         self.path(file)
@@ -669,6 +680,123 @@ fn the_value_in_place_of_a_signal_without_a_source_may_have_an_uncertainty() {
         absences.iter().any(|line| line.contains("no `thrust_lbf`")),
         "{absences:?}"
     );
+}
+
+/// The line of `check` that begins so, of a pipeline whose channel map lacks these lines.
+fn absence_without(channels: &[&str], begin: &str) -> String {
+    let copy = Copy::new();
+    copy.unmap(channels);
+    let config = copy.load(Overrides::default()).unwrap();
+    let absences = config.absences();
+    let line = absences.iter().find(|line| line.starts_with(begin));
+    line.unwrap_or_else(|| panic!("{absences:?}")).clone()
+}
+
+#[test]
+fn a_flag_or_control_that_no_channel_gives_is_an_absence_with_its_cost() {
+    let flag = absence_without(&["obes"], "no `obes`: ");
+    assert!(flag.contains("by their inputs alone"), "{flag}");
+    let pedal = absence_without(&["pedal"], "no `pedal_in`: ");
+    assert!(
+        pedal.contains("stand for its steps in maneuvers of"),
+        "{pedal}"
+    );
+    assert!(!pedal.contains("cannot be recognised"), "{pedal}");
+    let all = ["obes", "tvcs", "stick_pitch", "stick_lat", "pedal"];
+    absence_without(&all, "no `stick_pitch_in`: ");
+}
+
+#[test]
+fn an_instrument_of_a_signal_that_no_channel_gives_is_an_absence() {
+    let heading = absence_without(&["psi"], "no `psi_deg`: ");
+    assert!(heading.contains("larger bounds"), "{heading}");
+    let copy = Copy::new();
+    copy.spoil(
+        "aircraft.yaml",
+        "  dyv_deg: { uncertainty: { bias: 0.05, scale_pct: 0.2 } }\n",
+        "  dyv_deg: { uncertainty: { bias: 0.05, scale_pct: 0.2 } }\n  fuel_flow: { uncertainty: { bias: 1 } }\n",
+    );
+    let absences = copy.load(Overrides::default()).unwrap().absences();
+    assert!(
+        absences.contains(&"no `fuel_flow`: no result depends on it".to_owned()),
+        "{absences:?}"
+    );
+}
+
+#[test]
+fn a_surface_that_no_channel_gives_costs_the_classes_that_need_it() {
+    let vanes = absence_without(&["dyv"], "no `dyv_deg`: ");
+    for words in [
+        "maneuvers of OLAT, SSIMD_LAT cannot be recognised",
+        "maneuvers of PYRSTV are found and not estimated",
+        "its effect is left out of maneuvers of PYRS",
+    ] {
+        assert!(vanes.contains(words), "`{words}` is not in {vanes}");
+    }
+}
+
+#[test]
+fn a_pipeline_of_which_no_class_is_left_is_refused() {
+    let copy = Copy::new();
+    copy.unmap(&["de", "da"]);
+    let error = copy.error();
+    assert!(
+        error.starts_with("aircraft.yaml:")
+            && error.contains("no class is left")
+            && error.contains("`da_deg`, `de_deg`"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_signal_misspelt_in_the_channel_map_is_no_absence() {
+    let copy = Copy::new();
+    copy.spoil("aircraft.yaml", "{ signal: obes,", "{ signal: obse,");
+    let error = copy.error();
+    assert!(error.contains("`obes`; did you mean `obse`?"), "{error}");
+    // Misspelt where it is used, and absent: the other uses say what was meant.
+    let copy = Copy::new();
+    copy.unmap(&["obes"]);
+    copy.spoil(
+        "pipeline.yaml",
+        "excitation_flag: obes",
+        "excitation_flag: obse",
+    );
+    let error = copy.error();
+    assert!(error.contains("`obse`; did you mean `obes`?"), "{error}");
+}
+
+#[test]
+fn a_step_size_of_a_signal_that_nothing_else_names_is_refused() {
+    let copy = Copy::new();
+    let line = copy.spoil(
+        "pipeline.yaml",
+        "    pedal_in: 1\n",
+        "    pedal_in: 1\n    canard: 1\n",
+    );
+    assert_eq!(
+        copy.error(),
+        format!(
+            "pipeline.yaml:{}: segment: no channel gives the signal `canard`",
+            line + 1
+        )
+    );
+}
+
+#[test]
+fn what_files_lack_has_the_words_of_the_channel_map() {
+    let whole = Copy::new().load(Overrides::default()).unwrap();
+    let lacking = ["psi_deg", "obes", "dyv_deg"].map(str::to_owned).into();
+    let in_files = whole.absences_in_files(&lacking);
+    let copy = Copy::new();
+    copy.unmap(&["psi", "obes", "dyv"]);
+    let without = copy.load(Overrides::default()).unwrap();
+    let of_map = whole.absences();
+    let mut in_map = without.absences();
+    in_map.retain(|line| !of_map.contains(line));
+    assert_eq!(in_files, in_map);
+    assert_eq!(in_files.len(), 3, "{in_files:?}");
+    assert_eq!(whole.absences_in_files(&[].into()), Vec::<String>::new());
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::names::{is_given, known_signal};
+use super::names::spelt_signal;
 use super::numbers;
 use crate::aircraft::ThrustLine;
 use crate::config::checked::Config;
@@ -10,7 +10,7 @@ use crate::config::instruments::InstrumentErrors;
 use crate::config::source::Source;
 use crate::config::tunnel_tables::MISSPELT;
 use crate::error::{Result, similarity};
-use crate::flight::stand_in::{LATERAL, LONGITUDINAL};
+use crate::flight::absence::remedies;
 use crate::flight::{Channel, StandIn, signal};
 use crate::ingest;
 use crate::units::Unit;
@@ -85,7 +85,7 @@ pub(super) fn channels(config: &Config, source: &Source) -> Result<()> {
             let near = near.map(|name| format!("; did you mean `{required}` by `{name}`?"));
             let what = format!(
                 "no channel or constant gives the signal `{required}`{}",
-                near.unwrap_or_else(|| remedies(required))
+                near.unwrap_or_else(|| format!(": {}", remedies(&[*required])))
             );
             return Err(source.error("channels", what));
         }
@@ -138,82 +138,8 @@ fn misspelt<'a>(required: &str, signals: &[&'a str]) -> Option<&'a str> {
     near.max_by(|a, b| similarity(a, required).total_cmp(&similarity(b, required)))
 }
 
-/// Signals that follow from the fuel.
-const OF_FUEL: [&str; 7] = [
-    signal::MASS,
-    signal::IX,
-    signal::IY,
-    signal::IZ,
-    signal::X_CG,
-    signal::Y_CG,
-    signal::Z_CG,
-];
-
-/// Places where the source of a required signal may stand, in words.
-fn remedies(required: &str) -> String {
-    let constant = match required {
-        signal::TIME => {
-            return ": give the column that counts time its line under `channels`".to_owned();
-        }
-        signal::ALTITUDE => Some("26000"),
-        signal::ALPHA_VANE => Some("5"),
-        signal::VELOCITY => Some("400"),
-        signal::QBAR => Some("90"),
-        signal::MASS => Some("1000"),
-        signal::IX | signal::IY | signal::IZ => Some("20000"),
-        signal::X_CG | signal::Y_CG | signal::Z_CG => Some("0"),
-        _ => None,
-    };
-    let mut remedies = vec![format!(
-        ": give a line under `channels` to its column, or to a formula of several (`{{ signal: {required}, formula: … }}`)"
-    )];
-    if let Some(example) = constant {
-        remedies.push(format!(
-            "or its value under `constants` (`{required}: {example}`)"
-        ));
-    }
-    if OF_FUEL.contains(&required) {
-        remedies.push("or a table of it over the fuel (`table: …`, docs/recorder.md)".to_owned());
-    }
-    let otherwise = match required {
-        signal::ALTITUDE => format!("`{}` and `{}` are given", signal::VELOCITY, signal::QBAR),
-        signal::VELOCITY => format!(
-            "`{}` is given with `{}` or `{}`",
-            signal::ALTITUDE,
-            signal::MACH,
-            signal::QBAR
-        ),
-        signal::QBAR => format!(
-            "`{}` is given with `{}` or `{}`",
-            signal::ALTITUDE,
-            signal::VELOCITY,
-            signal::MACH
-        ),
-        signal::MACH => format!("`{}` or `{}` is given", signal::VELOCITY, signal::QBAR),
-        _ if LATERAL.contains(&required) => {
-            format!("all of {} are given", list(&LONGITUDINAL))
-        }
-        _ if LONGITUDINAL.contains(&required) => format!("all of {} are given", list(&LATERAL)),
-        _ => return remedies.join("; "),
-    };
-    remedies.push(format!("harvest does without it where {otherwise}"));
-    remedies.join("; ")
-}
-
-/// Names of signals in a list.
-fn list(signals: &[&str]) -> String {
-    let names: Vec<String> = signals.iter().map(|name| format!("`{name}`")).collect();
-    names.join(", ")
-}
-
-/// `true` for a signal without a source in whose place harvest puts an assumed value. That value may
-/// have a stated uncertainty: that of a thrust which is not recorded.
-fn has_stand_in(config: &Config, name: &str) -> bool {
-    let is_required = signal::REQUIRED.contains(&name);
-    is_required && StandIn::of(name, |other| is_given(config, other)).is_some()
-}
-
-/// Sizes of instrument errors: known signals, no negative sizes.
+/// Sizes of instrument errors: no misspelt signals, no negative sizes. A size may be that of an assumed
+/// value, such as a thrust that is not recorded.
 pub(super) fn instruments(
     errors: &BTreeMap<String, InstrumentErrors>,
     config: &Config,
@@ -222,9 +148,7 @@ pub(super) fn instruments(
     let mut examined = ingest::Settings::default().compatibility.ordinary;
     for (name, instrument) in errors {
         let error = |what: String| Err(source.error_under("instruments", name, what));
-        if !has_stand_in(config, name) {
-            known_signal(config, source, name, "instruments")?;
-        }
+        spelt_signal(config, source, name, "instruments")?;
         let uncertainty = instrument.uncertainty;
         let (ordinary, fault) = (instrument.ordinary.given(), instrument.fault.given());
         let sizes = [uncertainty.bias, uncertainty.scale_pct].map(Some);

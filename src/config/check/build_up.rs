@@ -1,6 +1,6 @@
 //! Checks of `model.yaml`: names are unique and resolve, and the kernel has room for the products.
 
-use super::names::{is_given, known_signal};
+use super::names::{is_given, known_signal, spelt_signal};
 use crate::aero::{Axis, Regressor};
 use crate::config::checked::Config;
 use crate::config::source::Source;
@@ -29,7 +29,10 @@ pub(super) fn buildup(config: &Config, source: &Source) -> Result<()> {
                 );
                 return Err(source.error(&derivative.name, what));
             }
-            known_signal(config, source, name, &derivative.name)?;
+            if signal::is_own(name) {
+                known_signal(config, source, name, &derivative.name)?;
+            }
+            spelt_signal(config, source, name, &derivative.name)?;
         }
     }
     few_products(config, source)?;

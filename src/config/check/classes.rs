@@ -1,6 +1,6 @@
 //! Checks of a maneuver class: statuses, weights, and the description that recognises it.
 
-use super::names::known_signal;
+use super::names::{known_signal, spelt_signal};
 use crate::aero::Output;
 use crate::config::checked::Config;
 use crate::config::source::Source;
@@ -119,8 +119,17 @@ fn word(output: Output) -> String {
 /// Checks the description by which maneuvers of the class are recognised.
 fn recognition(config: &Config, class: &Class, source: &Source) -> Result<()> {
     let rule = &class.recognition;
-    for name in rule.flags.keys().chain(rule.counted()) {
-        known_signal(config, source, name, &format!("class {}", class.name))?;
+    let user = format!("class {}", class.name);
+    for name in rule.flags.keys() {
+        spelt_signal(config, source, name, &user)?;
+    }
+    for name in rule.counted() {
+        // A signal without a size of its steps is none that the recorder merely lacks.
+        if config.segment.steps.contains_key(name) {
+            spelt_signal(config, source, name, &user)?;
+        } else {
+            known_signal(config, source, name, &user)?;
+        }
     }
     let error =
         |name: &str, what: &str| Err(source.error_under("recognise", name, of_class(class, what)));

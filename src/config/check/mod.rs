@@ -36,6 +36,9 @@ pub(super) fn whole(
     flying_qualities::check(config, files)?;
     match_tolerances::check(config, files)?;
     aircraft::instruments(instruments, config, &files.aircraft)?;
+    if let Some(what) = config.no_class_left() {
+        return Err(files.aircraft.error("channels", what));
+    }
     files.all().try_for_each(ranges::are_finite)?;
     ranges::of_pipeline(&files.pipeline)?;
     files.classes.iter().try_for_each(ranges::of_class)

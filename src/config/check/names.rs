@@ -1,9 +1,15 @@
 //! Checks of names that one file gives and another uses: signals and classes.
 
+use std::collections::BTreeSet;
+
 use crate::config::checked::Config;
 use crate::config::source::Source;
-use crate::error::{Result, did_you_mean};
+use crate::config::tunnel_tables::MISSPELT;
+use crate::error::{Error, Result, did_you_mean, similarity};
 use crate::flight::signal;
+
+/// Number of places of the configuration from which a name is no typing error: those are made once.
+const DELIBERATE: usize = 2;
 
 /// Names of all signals of the channel map and the constants.
 fn signals(config: &Config) -> impl Iterator<Item = &str> + Clone {
@@ -30,8 +36,79 @@ pub(super) fn known_signal(config: &Config, source: &Source, name: &str, user: &
     } else {
         did_you_mean(name, signals(config))
     };
+    Err(no_channel(source, name, user, &near))
+}
+
+/// Refuses a signal that is probably another one misspelt; `user` names what needs it. A recorder may
+/// lack any other signal: `check` lists it with the cost.
+pub(super) fn spelt_signal(config: &Config, source: &Source, name: &str, user: &str) -> Result<()> {
+    match meant(config, name) {
+        Some(meant) => {
+            let near = format!("; did you mean `{meant}`?");
+            Err(no_channel(source, name, user, &near))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Refuses a signal that a list describes, that no channel gives and that nothing else uses.
+pub(super) fn used_signal(config: &Config, source: &Source, name: &str, user: &str) -> Result<()> {
+    let places = places(config);
+    let uses = places.iter().filter(|place| place.contains(name)).count();
+    if uses < DELIBERATE && !signal::is_own(name) {
+        return known_signal(config, source, name, user);
+    }
+    spelt_signal(config, source, name, user)
+}
+
+fn no_channel(source: &Source, name: &str, user: &str, near: &str) -> Error {
     let what = format!("{user}: no channel gives the signal `{name}`{near}");
-    Err(source.error(name, what))
+    source.error(name, what)
+}
+
+/// Signal that was meant by a misspelt name. A typing error stands in one place of the configuration
+/// and is like a name that is right, or it stands in the channel map, whose signal nothing else uses.
+fn meant<'a>(config: &'a Config, name: &str) -> Option<&'a str> {
+    if is_given(config, name) || signal::is_own(name) {
+        return None;
+    }
+    let places = places(config);
+    let uses = |name: &str| places.iter().filter(|place| place.contains(name)).count();
+    let is_single = uses(name) < DELIBERATE;
+    let is_misspelt_in_map = |given: &str| uses(given) == 0 && !signal::is_own(given);
+    let given = signals(config).filter(|given| is_single || is_misspelt_in_map(given));
+    let used = places.iter().flatten().copied();
+    let used = used.filter(|used| is_single && uses(used) >= DELIBERATE);
+    let near = given.chain(used).filter(|other| *other != name);
+    let near = near.map(|other| (similarity(name, other), other));
+    let near = near.filter(|(score, _)| *score >= MISSPELT);
+    near.max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, near)| near)
+}
+
+/// Names of signals that each place of the configuration uses: the model, the lists of segment, each
+/// class.
+fn places(config: &Config) -> Vec<BTreeSet<&str>> {
+    let settings = &config.segment;
+    let derivatives = config.buildup.derivatives.iter();
+    let of_classes = config.classes.iter().map(|class| {
+        let names = class.recognition.signals();
+        names.collect()
+    });
+    let mut places: Vec<BTreeSet<&str>> = of_classes.collect();
+    places.extend([
+        derivatives.flat_map(|d| d.regressor.signals()).collect(),
+        [settings.excitation_flag.as_str()].into(),
+        settings.pilot_controls.iter().map(String::as_str).collect(),
+        settings.steps.keys().map(String::as_str).collect(),
+        settings
+            .quality
+            .actuators
+            .keys()
+            .map(String::as_str)
+            .collect(),
+    ]);
+    places
 }
 
 /// Refuses a class that the pipeline does not have.

@@ -1,6 +1,6 @@
 //! Checks of the stages' settings in `pipeline.yaml` against each other and against the other files.
 
-use super::names::{known_class, known_signal};
+use super::names::{known_class, spelt_signal, used_signal};
 use super::numbers;
 use crate::config::checked::Config;
 use crate::config::source::Source;
@@ -22,14 +22,13 @@ pub(super) fn stages(config: &Config, source: &Source) -> Result<()> {
 /// Checks signals and limits of segment.
 fn segment(config: &Config, source: &Source) -> Result<()> {
     let settings = &config.segment;
-    let named = settings
-        .steps
-        .keys()
-        .chain(&settings.pilot_controls)
-        .chain(settings.quality.actuators.keys());
+    let described = settings.steps.keys();
+    for name in described.chain(settings.quality.actuators.keys()) {
+        used_signal(config, source, name, "segment")?;
+    }
     let flag = std::iter::once(&settings.excitation_flag).filter(|flag| !flag.is_empty());
-    for name in flag.chain(named) {
-        known_signal(config, source, name, "segment")?;
+    for name in flag.chain(&settings.pilot_controls) {
+        spelt_signal(config, source, name, "segment")?;
     }
     let mut controls = settings.pilot_controls.iter();
     if let Some(name) = controls.find(|name| !settings.steps.contains_key(*name)) {
