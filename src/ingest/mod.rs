@@ -29,7 +29,7 @@ pub use channel::{
     ChannelPlan, ChannelReader, ConditionedChannel, Overlap, Signature, plan_channels,
 };
 pub use checks::LiftPoint;
-pub use clock::{Clock, Stretch, Survey, survey};
+pub use clock::{Clock, Stretch, Survey, check_clocks, survey};
 pub use column_source::ColumnSource;
 pub use compatibility::{Compatibility, ErrorEvidence};
 pub use computed_columns::ComputedColumns;

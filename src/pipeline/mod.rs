@@ -8,6 +8,7 @@
 //! cluster all use it. Its [`Campaign`] carries the state of each flight and maneuver. Results do
 //! not depend on threads: they are collected in the order of flights and maneuvers.
 
+mod archive_columns;
 mod campaign;
 mod conductor;
 mod estimate_step;
@@ -34,6 +35,7 @@ mod surfaces_step;
 mod model_stage;
 mod trend_stage;
 
+pub use archive_columns::{ArchiveColumns, examine_columns};
 pub use progress::Progress;
 
 pub(crate) use campaign::{Campaign, Failure, MissingArtefact, StageState};

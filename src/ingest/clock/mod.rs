@@ -12,4 +12,4 @@ mod tests;
 
 pub use sample_clock::Clock;
 pub(in crate::ingest) use sample_clock::Run;
-pub use survey::{Stretch, Survey, survey};
+pub use survey::{Stretch, Survey, check_clocks, survey};

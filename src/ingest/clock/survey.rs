@@ -49,6 +49,18 @@ pub struct Survey {
     pub problems: Vec<Problem>,
 }
 
+/// Checks that each file of a flight has a time channel.
+///
+/// # Errors
+/// The problem that refuses the flight.
+pub fn check_clocks(
+    source: &(impl ColumnSource + ?Sized),
+    channels: &BTreeMap<String, Channel>,
+) -> Result<(), Problem> {
+    let checked = TimeChannels::of(source, channels).check();
+    checked.map_err(|refusal| refusal.into_problem(source.flight_id()))
+}
+
 /// Surveys a flight.
 ///
 /// # Errors

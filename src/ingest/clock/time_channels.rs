@@ -71,6 +71,12 @@ impl<'a, S: ColumnSource + ?Sized> TimeChannels<'a, S> {
             })
     }
 
+    /// Checks that each file has a time channel.
+    pub fn check(&self) -> Result<(), Refusal> {
+        let mut files = 0..self.source.files();
+        files.try_for_each(|file| self.of_file(file).map(|_| ()))
+    }
+
     /// The time channel of a file with its factor to seconds.
     fn of_file(&self, file: usize) -> Result<(&str, f64), Refusal> {
         if self.channels.is_empty() {

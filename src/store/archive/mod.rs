@@ -20,4 +20,4 @@ mod walk;
 pub use flight_files::{FlightFiles, find};
 pub(super) use guard::guarded;
 pub use in_memory::read;
-pub use opened::{Opened, open};
+pub use opened::{Opened, mapped_columns, open};

@@ -1,6 +1,6 @@
 //! Opened files of a flight: footers, mapped columns, reading by ranges of rows.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -19,8 +19,8 @@ use super::guard::guarded;
 use super::numbers::{clock_factor, hand_over, refuse_other_types};
 use super::remote;
 use crate::error::{Error, Problem, ProblemStage};
-use crate::flight::channel::columns;
-use crate::flight::{Channel, signal};
+use crate::flight::channel::{RawColumn, columns};
+use crate::flight::{Channel, RawFlight, signal};
 use crate::ingest::ColumnSource;
 use crate::store::atomic::Draft;
 use crate::store::import::tall::Tall;
@@ -110,11 +110,7 @@ fn open_file(
         place: path.to_owned(),
         what,
     };
-    let object = object::is_object(path)
-        .then(|| object::Reader::open(path))
-        .transpose()
-        .map_err(|e| refused(e.to_string()))?;
-    let metadata = footer(path, object.as_ref()).map_err(refused)?;
+    let (object, metadata) = object_and_footer(path).map_err(refused)?;
     let is_channel = |name: &str| channels.contains_key(name);
     let tall = Tall::of(path, object.clone(), &metadata);
     let Some(tall) = tall.filter(|tall| tall.is_unmapped(is_channel)) else {
@@ -138,6 +134,70 @@ fn open_file(
         })
     };
     wide.into_iter().map(open_part).collect()
+}
+
+/// Mapped columns of a flight's files, file by file, with their units and without values. Of a file with
+/// one column a channel the footer is read alone.
+///
+/// # Errors
+/// As [`open`].
+pub fn mapped_columns(
+    files: &FlightFiles,
+    channels: &BTreeMap<String, Channel>,
+) -> Result<Vec<RawFlight>, Problem> {
+    let columns = columns(channels);
+    let of_file = |path: &PathBuf| {
+        let columns = guarded(|| columns_of_file(path, &columns));
+        let columns = columns.map_err(|reason| Problem {
+            stage: ProblemStage::Ingest,
+            flight_id: files.flight_id.clone(),
+            place: path.display().to_string(),
+            reason,
+        })?;
+        Ok(RawFlight {
+            flight_id: files.flight_id.clone(),
+            columns,
+        })
+    };
+    files.files.iter().map(of_file).collect()
+}
+
+fn columns_of_file(
+    path: &Path,
+    channels: &BTreeMap<String, Channel>,
+) -> Result<BTreeMap<String, RawColumn>, String> {
+    let (object, metadata) = object_and_footer(path)?;
+    let is_channel = |name: &str| channels.contains_key(name);
+    let column = |unit: Option<String>| RawColumn {
+        unit,
+        values: vec![],
+    };
+    if let Some(tall) =
+        Tall::of(path, object, &metadata).filter(|tall| tall.is_unmapped(is_channel))
+    {
+        let wanted: BTreeSet<&str> = channels.keys().map(String::as_str).collect();
+        let units = tall.units_of(&wanted).map_err(|e| e.to_string())?;
+        let stated = |unit: String| Some(unit).filter(|unit| !unit.is_empty());
+        let units = units.into_iter();
+        return Ok(units
+            .map(|(name, unit)| (name, column(stated(unit))))
+            .collect());
+    }
+    let opened = open_columns(path, channels, metadata)?;
+    let columns = opened.columns.into_iter();
+    Ok(columns
+        .map(|(name, one)| (name, column(one.unit)))
+        .collect())
+}
+
+/// Reader of an object, `None` for a file of the disk, and the footer.
+fn object_and_footer(path: &Path) -> Result<(Option<object::Reader>, ArrowReaderMetadata), String> {
+    let object = object::is_object(path)
+        .then(|| object::Reader::open(path))
+        .transpose()
+        .map_err(|e| e.to_string())?;
+    let metadata = footer(path, object.as_ref())?;
+    Ok((object, metadata))
 }
 
 /// Footer of a file or object.

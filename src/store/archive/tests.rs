@@ -329,3 +329,37 @@ proptest! {
         let _ = read_one(&bytes);
     }
 }
+
+#[test]
+fn mapped_columns_are_those_of_the_footer_or_the_names_of_a_tall_file() {
+    let text = |words: &[&str]| Arc::new(StringArray::from(words.to_vec())) as ArrayRef;
+    let tall = parquet(vec![
+        ("time", Some("s"), floats(&[0.0, 0.0, 0.1])),
+        ("name", None, text(&["q", "other", "q"])),
+        ("value", None, floats(&[1.0, 2.0, 3.0])),
+        ("unit", None, text(&["deg/s", "V", "deg/s"])),
+    ]);
+    let (_folder, archive) = archive(&[
+        ("tall.parquet", &tall),
+        ("text.parquet", b"no Parquet"),
+        ("wide.parquet", &simple(&[0.0, 0.1])),
+    ]);
+    for flight in find(&archive).unwrap() {
+        let listed = mapped_columns(&flight, &channels());
+        if flight.flight_id == "text" {
+            assert!(
+                listed
+                    .unwrap_err()
+                    .reason
+                    .contains("not a readable Parquet")
+            );
+            continue;
+        }
+        let listed = listed.unwrap();
+        let units = listed[0].columns.iter();
+        let units: Vec<(&str, Option<&str>)> = units
+            .map(|(name, column)| (name.as_str(), column.unit.as_deref()))
+            .collect();
+        assert_eq!(units, [("q", Some("deg/s")), ("time", Some("s"))]);
+    }
+}

@@ -1,5 +1,6 @@
 //! A tall file: its columns, and its rows in the order of the file.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -146,6 +147,34 @@ impl Tall {
         let field = self.metadata.schema().field_with_name(&self.name).ok();
         let is_text = field.is_some_and(|f| is_text(f.data_type()));
         is_text && !is_channel(&self.name) && !is_channel(&self.value)
+    }
+
+    /// Units of the clock and of the wanted names that the file has, by name; empty where it states
+    /// none. Reads no further than to the last of them.
+    ///
+    /// # Errors
+    /// [`Error::Archive`] for a file that is no readable Parquet.
+    pub fn units_of(&self, wanted: &BTreeSet<&str>) -> Result<BTreeMap<String, String>> {
+        let of_clock = self.time_unit.clone().unwrap_or_default();
+        let mut units = BTreeMap::from([(self.time.clone(), of_clock)]);
+        for batch in self.batches()? {
+            let batch = batch?;
+            let names = self.texts(&batch, &self.name)?;
+            let stated = self.unit.as_ref().map(|unit| self.texts(&batch, unit));
+            let stated = stated.transpose()?;
+            for row in 0..names.len() {
+                let name = text(&names, row);
+                if units.contains_key(name) || !wanted.contains(name) {
+                    continue;
+                }
+                let unit = stated.as_ref().map_or("", |stated| text(stated, row));
+                units.insert(name.to_owned(), unit.to_owned());
+            }
+            if wanted.iter().all(|name| units.contains_key(*name)) {
+                break;
+            }
+        }
+        Ok(units)
     }
 
     /// Passes each row on in the order of the file.
