@@ -82,7 +82,9 @@ Exit codes:
   1  could not run: a fault of the configuration, the archive or the disk, named in the message
   2  ran, and something was rejected: the table `problems` and the end of the report list it; `verify`: what
      is published is no longer valid
-     A derivative with too few maneuvers for a trend is in `problems` as well, and ends with 0
+     `check`: a run would refuse every flight
+     A signal that a recording lacks, and a derivative with too few maneuvers for a trend, are in `problems` as
+     well, and end with 0
   3  `diff`: a value moved by more than its uncertainty, vanished or changed; `status`: something is stale
   64 the command as typed is wrong; nothing was done
   75 a shard or a merge that another try may complete: the disk failed, a file could not be read, the store is in use";
