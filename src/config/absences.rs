@@ -37,12 +37,16 @@ impl Config {
             return None;
         }
         let names: BTreeSet<&str> = of_classes.into_iter().flatten().collect();
-        let given = || self.channels.values().map(|c| c.signal.as_str());
-        let named = |name: &&str| format!("`{name}`{}", did_you_mean(name, given()));
-        let names: Vec<String> = names.iter().map(named).collect();
+        let given = self.channels.values().map(|c| c.signal.as_str());
+        let near = match names.first() {
+            Some(name) if names.len() == 1 => did_you_mean(name, given),
+            _ => String::new(),
+        };
+        let names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+        let names = names.join(", ");
         Some(format!(
-            "no class is left: every one needs a signal that no channel gives. Give a line under `channels` to the column              of {}",
-            names.join(", ")
+            "no class is left: every one needs a signal that no channel gives. Give a line under `channels` to the \
+             column of {names}{near}"
         ))
     }
 }

@@ -47,16 +47,18 @@ impl Refusal {
     pub(super) fn of_signals(signals: &[&str], left_out: Vec<LeftOut>) -> Refusal {
         let mut own = left_out;
         own.retain(|one| signals.contains(&one.signal));
-        let line = match own.len() {
-            0 => "",
-            1 => "take its line out of the channel map and ",
-            _ => "take their lines out of the channel map and ",
+        let advice = remedies(signals);
+        let advice = match own.len() {
+            0 => format!(": {advice}"),
+            1 => format!(
+                ". Where the recorder lacks it, replace its line in the channel map: {advice}"
+            ),
+            _ => {
+                format!(
+                    ". Where the recorder lacks them, replace their lines in the channel map: {advice}"
+                )
+            }
         };
-        let advice = format!(
-            "Where the recorder lacks {}, {line}{}",
-            if signals.len() == 1 { "it" } else { "them" },
-            remedies(signals)
-        );
         let at_channel = |signal: &str| own.iter().find(|one| one.signal == signal);
         let refusals: Vec<Refusal> = signals
             .iter()
@@ -69,7 +71,7 @@ impl Refusal {
         let reasons: Vec<&str> = refusals.iter().map(|r| r.reason.as_str()).collect();
         Refusal {
             place: places.join(", "),
-            reason: format!("{}. {advice}", reasons.join("; ")),
+            reason: format!("{}{advice}", reasons.join("; ")),
         }
     }
 

@@ -308,7 +308,9 @@ fn a_stated_unit_that_contradicts_the_map_costs_no_flight_where_nothing_requires
     assert_relative_eq!(altitude, 20_000.0, max_relative = 1e-3);
     // Without the dynamic pressure the altitude is required.
     flight.raw.columns.remove("qbar");
-    assert_eq!(flight.refused().place, "channel `altitude`");
+    let refused = flight.refused();
+    assert_eq!(refused.place, "channel `altitude`, channel `qbar`");
+    assert!(refused.reason.contains("`furlong`"), "{refused:?}");
 }
 
 #[test]
@@ -419,7 +421,7 @@ fn all_absent_channels_that_refuse_a_flight_are_named_at_once_with_the_advice() 
     assert_eq!(refused.place, "channel `mass`, channel `Iy`");
     for words in [
         "channel `mass` (signal `mass_slug`) is not in the file; channel `Iy`",
-        "take their lines out of the channel map and give each a line under `channels`",
+        "replace their lines in the channel map: give each a line under `channels`",
         "under `constants` (`mass_slug: 1000`, `iy_slug_ft2: 20000`)",
     ] {
         assert!(refused.reason.contains(words), "{}", refused.reason);

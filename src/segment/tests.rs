@@ -912,7 +912,11 @@ fn the_row_of_a_missing_control_names_the_surfaces_that_stand_for_it() {
     let mut r = flight(60);
     three_two_one_one(&mut r, 21.0);
     r.signals.remove("stick_pitch_in");
-    let segmented = found(&r);
+    let mut classes = classes();
+    for class in &mut classes {
+        class.recognition.surfaces = vec!["de_deg".to_owned()];
+    }
+    let segmented = maneuvers(&r, &classes, &aircraft(), &settings());
     let [row] = &segmented.problems[..] else {
         panic!("{:?}", segmented.problems)
     };

@@ -412,7 +412,7 @@ fn a_channel_that_the_equations_can_do_without_is_reported_and_the_flight_goes_o
         "flight_001",
         &with_values(&pitch_steps(), "psi", |_, _| f64::NAN),
     );
-    campaign.ends("estimate", 2);
+    campaign.ends("estimate", 0);
     let problems = campaign.table("problems");
     assert_eq!(problems.len(), 1, "{problems:?}");
     assert_eq!(problems[0]["place"], "channel `psi`");
