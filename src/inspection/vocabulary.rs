@@ -216,8 +216,8 @@ const ENTRIES: &[Entry] = &[
     Entry {
         signal: signal::RPM_RIGHT,
         names: &["rpmr", "rpmright", "rightrpm", "rpm2", "n1r", "n2r", "rpmrh", "rrpm"],
-        words: &[&["rpm", "r"], &["rpm", "right"], &["rpm", "2"], &["rpm2"], &["rpm", "rh"], &["drehzahl", "re"],
-            &["drehzahl", "rechts"], &["regime", "d"], &["giri", "dx"], &["n2", "r"], &["n2", "2"], &["eng2", "n2"]],
+        words: &[&["rpm", "r"], &["rpm", "right"], &["rpm", "2"], &["rpm2"], &["rpm", "rh"], &["drehzahl", "r"],
+            &["drehzahl", "re"], &["drehzahl", "rechts"], &["drehzahl", "2"], &["regime", "d"], &["giri", "dx"], &["n2", "r"], &["n2", "2"], &["eng2", "n2"]],
     },
 ];
 
@@ -225,9 +225,13 @@ const ENTRIES: &[Entry] = &[
 #[must_use]
 pub fn meanings(spelling: &Spelling) -> Vec<(&'static str, f64)> {
     let joined = spelling.joined();
+    let is_right = has_side(spelling, |(_, right)| right);
     let meaning = |entry: &Entry| {
         if entry.names.contains(&joined.as_str()) {
             return Some((entry.signal, EXACT));
+        }
+        if entry.signal == signal::RPM_LEFT && is_right {
+            return None;
         }
         let is_contained = |words: &&[&str]| words.iter().all(|word| spelling.has(word));
         let longest = entry
@@ -338,12 +342,13 @@ pub fn is_derived(spelling: &Spelling) -> bool {
 /// `true` for a name of one of two surfaces or engines: `aileron_left`.
 #[must_use]
 pub fn is_one_side(spelling: &Spelling) -> bool {
-    let sides = || SIDES.iter().flat_map(|(left, right)| [left, right]);
     spelling.words.len() > 1
-        && spelling
-            .words
-            .iter()
-            .any(|word| sides().any(|side| side == word))
+        && (has_side(spelling, |(left, _)| left) || has_side(spelling, |(_, right)| right))
+}
+
+/// `true` if one of the words of a name is one of the words of a side.
+fn has_side(spelling: &Spelling, side: fn((&'static str, &'static str)) -> &'static str) -> bool {
+    SIDES.into_iter().any(|pair| spelling.has(side(pair)))
 }
 
 #[cfg(test)]
@@ -390,6 +395,20 @@ mod tests {
             "total_air_temperature",
         ] {
             assert_eq!(best(name), None, "{name}");
+        }
+    }
+
+    #[test]
+    fn an_engine_of_the_right_side_is_not_that_of_the_left() {
+        for (name, signal) in [
+            ("Drehzahl_L", signal::RPM_LEFT),
+            ("Drehzahl_R", signal::RPM_RIGHT),
+            ("Drehzahl_rechts", signal::RPM_RIGHT),
+            ("Drehzahl", signal::RPM_LEFT),
+        ] {
+            let meanings = meanings(&Spelling::of(name));
+            let signals: Vec<&str> = meanings.into_iter().map(|m| m.0).collect();
+            assert_eq!(signals, [signal], "{name}");
         }
     }
 
