@@ -487,12 +487,12 @@ fn unless_unknown_unit(facts: &ColumnFacts, is_sure: bool, evidence: String) -> 
 /// Range above which an angle is in degrees: no surface turns by as many radians.
 const LARGEST_RAD: f64 = 1.6;
 
-/// Unit of an input, and `true` if the file or the name states it. The unit of other angles follows
+/// Unit of an input, and `true` if the file or the name states it clearly. The unit of other angles follows
 /// from their range; controls are numbers.
 fn input_unit(facts: &ColumnFacts, input: &InputColumn) -> (Unit, bool) {
     let number = Unit::of_signal("");
     if let Some(unit) = facts.unit {
-        return (unit, true);
+        return (unit, !facts.has_ambiguous_unit);
     }
     let (low, high) = facts.range.unwrap_or_default();
     let degrees = Unit::of_signal("_deg");

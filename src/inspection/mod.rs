@@ -26,6 +26,8 @@ mod quantity;
 mod recording;
 mod signs;
 mod steps;
+#[cfg(test)]
+mod test_flight;
 mod vocabulary;
 mod words;
 

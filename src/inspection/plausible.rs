@@ -19,10 +19,14 @@ pub struct ColumnFacts {
     pub spelling: Spelling,
     /// Unit that the file or the name states, where harvest has it.
     pub unit: Option<Unit>,
+    /// `true` if that unit is only the end of a name, which may mean something else.
+    pub has_ambiguous_unit: bool,
     /// Unit that the file states and harvest does not have.
     pub unknown_unit: Option<String>,
     /// Range without spikes; `None` without a number.
     pub range: Option<(f64, f64)>,
+    /// `true` for a column with at most two values, such as a flag.
+    pub is_switch: bool,
 }
 
 impl ColumnFacts {
@@ -51,13 +55,32 @@ fn column_facts(recordings: &[Recording], name: &str) -> ColumnFacts {
     let parsed = stated.as_deref().and_then(|unit| Unit::parse(unit).ok());
     let values = || columns().flat_map(|c| c.values.iter().copied());
     let range = quantile(values(), ENDS).zip(quantile(values(), 1.0 - ENDS));
+    let spelled = spelled_unit(&spelling).filter(|_| stated.is_none());
     ColumnFacts {
         name: name.to_owned(),
-        unit: parsed.or(spelled_unit(&spelling).filter(|_| stated.is_none())),
+        unit: parsed.or(spelled),
+        has_ambiguous_unit: spelled.is_some() && spelling.may_be_measured,
         unknown_unit: stated.filter(|_| parsed.is_none()),
         spelling,
         range,
+        is_switch: is_switch(values()),
     }
+}
+
+/// `true` for a series of at most two values. No motion has so few.
+fn is_switch(values: impl Iterator<Item = f64>) -> bool {
+    let mut finite = values.filter(|value| value.is_finite());
+    let Some(first) = finite.next() else {
+        return true;
+    };
+    #[expect(clippy::float_cmp, reason = "a switch has exactly its two values")]
+    let mut others = finite.filter(|value| *value != first);
+    let Some(second) = others.next() else {
+        return true;
+    };
+    #[expect(clippy::float_cmp, reason = "a switch has exactly its two values")]
+    let is_second = |value: f64| value == second;
+    others.all(is_second)
 }
 
 /// Unit that a name ends with, unless the rest of the name means quantities that have other units: the `m` of `alpha_m`
@@ -75,7 +98,7 @@ pub fn candidates(facts: &[ColumnFacts], clock: &ClockColumn) -> Candidates {
     let columns = || {
         facts
             .iter()
-            .filter(|c| c.name != clock.name && !c.is_constant())
+            .filter(|c| c.name != clock.name && !c.is_constant() && !c.is_switch)
     };
     let of = |quantity: Quantity| {
         let mut of_name: Vec<Candidate> = columns().filter_map(|c| named(quantity, c)).collect();
@@ -119,10 +142,13 @@ fn candidate(quantity: Quantity, facts: &ColumnFacts, weight: f64) -> Option<Can
             !plausible_signs(quantity, low * factor, high * factor).is_empty()
         })
     };
-    let units: Vec<&'static str> = match facts.unit {
-        Some(unit) => std::iter::once(unit.name).filter(fits).collect(),
-        None => quantity.units().iter().copied().filter(fits).collect(),
-    };
+    let stated = facts.unit.map(|unit| unit.name);
+    let usual = quantity.units().iter().copied();
+    let usual = usual.filter(|unit| match stated {
+        Some(stated) => facts.has_ambiguous_unit && *unit != stated,
+        None => true,
+    });
+    let units: Vec<&'static str> = stated.into_iter().chain(usual).filter(fits).collect();
     let signs = |unit: &&'static str| {
         let factor = quantity.factor(unit).unwrap_or(f64::NAN);
         plausible_signs(quantity, low * factor, high * factor)
@@ -165,5 +191,35 @@ fn limits(quantity: Quantity) -> (f64, f64) {
         Quantity::Psi => (-6.3, 6.3),
         Quantity::An | Quantity::Ax | Quantity::Ay => (-650.0, 650.0),
         Quantity::Qbar => (0.0, 6000.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inspection::test_flight::{TestFlight, searched, test_column, times};
+
+    #[test]
+    fn a_switch_is_no_motion() {
+        let mut recording = TestFlight::default().recording(&[("x1", Quantity::An, "g")]);
+        let switch = |t: &f64| if t.sin() > 0.5 { 1.0 } else { 0.0 };
+        let values: Vec<f64> = times().iter().map(switch).collect();
+        recording.columns.push(test_column("x2", values));
+        let (_, candidates) = searched(&recording);
+        let of_an = candidates[&Quantity::An].iter().map(|c| c.column.as_str());
+        assert_eq!(of_an.collect::<Vec<_>>(), ["x1"]);
+    }
+
+    #[test]
+    fn an_altitude_with_the_end_m_may_be_measured_in_feet() {
+        for (name, units) in [
+            ("altitude_m", &["m", "ft"][..]),
+            ("altitude [m]", &["m"]),
+            ("altitude", &["ft", "m"]),
+        ] {
+            let recording = TestFlight::default().recording(&[(name, Quantity::Altitude, "ft")]);
+            let (_, candidates) = searched(&recording);
+            assert_eq!(candidates[&Quantity::Altitude][0].units, units, "{name}");
+        }
     }
 }

@@ -90,6 +90,8 @@ pub struct Spelling {
     pub words: Vec<String>,
     /// Unit that the name states.
     pub unit: Option<Unit>,
+    /// `true` if the unit is the end `_m`, which may also mean measured.
+    pub may_be_measured: bool,
 }
 
 impl Spelling {
@@ -100,6 +102,7 @@ impl Spelling {
             return Spelling {
                 words: words(head),
                 unit: Some(unit),
+                may_be_measured: false,
             };
         }
         let mut words = words(name);
@@ -115,7 +118,12 @@ impl Spelling {
             words.truncate(words.len() - ending.len());
             Unit::parse(unit).ok()
         });
-        Spelling { words, unit }
+        let may_be_measured = ending.is_some_and(|(ending, _)| *ending == ["m"]);
+        Spelling {
+            words,
+            unit,
+            may_be_measured,
+        }
     }
 
     /// All words in one.
