@@ -298,12 +298,22 @@ impl Findings<'_> {
                 .iter()
                 .filter(|c| self.is_free(c) && c.range.is_some());
             let named = free.filter(converts).filter_map(|c| Some((weight(c)?, c)));
-            let named = named.max_by(|a, b| a.0.total_cmp(&b.0));
-            let channel = named.and_then(|(_, facts)| match *name {
+            let mut named: Vec<(f64, &ColumnFacts)> = named.collect();
+            named.sort_by(|a, b| b.0.total_cmp(&a.0));
+            let Some((best, facts)) = named.first() else {
+                continue;
+            };
+            let channel = match *name {
                 signal::AIR_TEMPERATURE => temperature_channel(facts),
                 name => Some(constant_channel(facts, name)),
-            });
-            self.channels.extend(channel);
+            };
+            let rivals = named.iter().skip(1);
+            let rival = rivals
+                .filter(|(weight, _)| weight >= best)
+                .map(|(_, c)| c)
+                .next();
+            self.channels
+                .extend(channel.map(|own| unless_shared(own, rival.copied())));
         }
     }
 
@@ -435,6 +445,21 @@ fn constant_channel(facts: &ColumnFacts, name: &str) -> Channel {
     }
 }
 
+/// A channel, marked as unsure if the name of another column means the signal as well.
+fn unless_shared(channel: Channel, rival: Option<&ColumnFacts>) -> Channel {
+    match rival {
+        Some(rival) => Channel {
+            is_sure: false,
+            evidence: format!(
+                "{}; but `{}` may be {} as well",
+                channel.evidence, rival.name, channel.signal
+            ),
+            ..channel
+        },
+        None => channel,
+    }
+}
+
 /// Temperatures of the air from the ground to the stratosphere, K.
 const AIR_KELVIN: std::ops::Range<f64> = 180.0..335.0;
 
@@ -525,4 +550,27 @@ fn rounded(value: f64) -> f64 {
     let places = (1.0 - value.abs().log10().floor()).max(0.0);
     let scale = 10_f64.powf(places);
     (value * scale).round() / scale
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inspection::test_flight::{TestFlight, test_column, times};
+
+    #[test]
+    fn a_signal_that_two_names_mean_equally_is_not_sure() {
+        let is_sure = |names: &[&str]| {
+            let mut recording = TestFlight::default().recording(&[]);
+            for name in names {
+                let mut column = test_column(name, times().iter().map(|t| 90.0 + t).collect());
+                column.stated = Some("kg".to_owned());
+                recording.columns.push(column);
+            }
+            let found = inspect(&[recording]).expect("a clock");
+            let mass = found.channels.iter().find(|c| c.signal == signal::MASS);
+            mass.map(|channel| channel.is_sure)
+        };
+        assert_eq!(is_sure(&["mass"]), Some(true));
+        assert_eq!(is_sure(&["mass", "masa"]), Some(false));
+    }
 }
