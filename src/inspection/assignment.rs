@@ -24,6 +24,9 @@ pub const HOLDS: f64 = 0.1;
 const NAMELESS_FIT: f64 = 0.02;
 /// Factor by which every other column without a telling name must fit worse.
 const NAMELESS_LEAD: f64 = 10.0;
+/// Least information, as the logarithm of a growth of misfits, in each such column. A constant satisfies an equation between
+/// levels, such as that of the dynamic pressure, if its value happens to fit.
+const NAMELESS_INFORMATION: f64 = 1.0;
 /// Largest number of combinations of such columns that are tried for one equation.
 const MOST_TRIALS: usize = 4_000;
 /// Largest misfit at which a column counts as the integral of another; it is large because bank
@@ -158,7 +161,9 @@ impl Search<'_> {
             };
             let next = fits.iter().find(|(_, trial)| differs(trial));
             let next = next.map_or(f64::INFINITY, |next| next.0);
-            if *ratio < NAMELESS_FIT && next > NAMELESS_LEAD * ratio {
+            let informs = |q: &Quantity| self.information(best, *q) > NAMELESS_INFORMATION;
+            if *ratio < NAMELESS_FIT && next > NAMELESS_LEAD * ratio && missing.iter().all(informs)
+            {
                 *assignment = best.clone();
                 return true;
             }
@@ -259,18 +264,58 @@ impl Search<'_> {
     /// Misfit of an equation.
     #[must_use]
     pub fn misfit(&self, equation: Equation, assignment: &Assignment) -> Option<Misfit> {
+        self.misfit_of(equation, assignment, |_| None)
+    }
+
+    /// Misfit of an equation with other values in place of the columns of some quantities.
+    fn misfit_of<'a>(
+        &'a self,
+        equation: Equation,
+        assignment: &Assignment,
+        replaced: impl Fn(Quantity) -> Option<&'a [f64]>,
+    ) -> Option<Misfit> {
         misfit(
             equation,
             &self.grid.stretches,
             self.grid.step_s,
             |quantity| {
                 let choice = assignment.get(&quantity)?;
+                let recorded = || self.grid.columns.get(&choice.column).map(Vec::as_slice);
                 Some(Scaled {
-                    values: self.grid.columns.get(&choice.column)?,
+                    values: replaced(quantity).or_else(recorded)?,
                     factor: choice.sign * quantity.factor(choice.unit)?,
                 })
             },
         )
+    }
+
+    /// Growth of the physical cost when the values of a quantity are reflected about their mean. Motion that the
+    /// equations confirm would fit worse; noise and constants fit as well. 0 without a column.
+    #[must_use]
+    pub fn information(&self, assignment: &Assignment, quantity: Quantity) -> f64 {
+        let own = assignment.get(&quantity);
+        let Some(values) = own.and_then(|choice| self.grid.columns.get(&choice.column)) else {
+            return 0.0;
+        };
+        let reflected = about_mean(values);
+        let growth = |equation: Equation| {
+            let own = self.misfit(equation, assignment)?.ratio;
+            let replaced = |q: Quantity| (q == quantity).then_some(&reflected[..]);
+            let other = self.misfit_of(equation, assignment, replaced)?.ratio;
+            Some((other / own).ln())
+        };
+        let equations = Equation::ALL.into_iter();
+        let equations = equations.filter(|e| e.contains(quantity));
+        equations.filter_map(growth).sum()
+    }
+
+    /// `true` if the name of a quantity's column suggests the quantity.
+    #[must_use]
+    pub fn is_named(&self, quantity: Quantity, assignment: &Assignment) -> bool {
+        let own = assignment.get(&quantity);
+        let candidates = self.candidates.get(&quantity).into_iter().flatten();
+        let mut named = candidates.filter(|candidate| candidate.weight > 0.0);
+        own.is_some_and(|own| named.any(|candidate| candidate.column == own.column))
     }
 
     /// Sum of the logarithms of the misfits of the equations that contain one of some quantities.
@@ -561,6 +606,13 @@ fn turned(assignment: &Assignment, reversed: impl Iterator<Item = Quantity>) -> 
     trial
 }
 
+/// A series reflected about its mean.
+fn about_mean(values: &[f64]) -> Vec<f64> {
+    let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    let mean = finite.iter().sum::<f64>() / finite.len() as f64;
+    values.iter().map(|value| 2.0 * mean - value).collect()
+}
+
 /// A choice with its sign multiplied.
 fn with_sign(choice: &Choice, sign: f64) -> Choice {
     Choice {
@@ -591,4 +643,33 @@ pub fn with<const N: usize>(
     let mut trial = assignment.clone();
     trial.extend(changes);
     trial
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inspection::test_flight::{TestFlight, searched, test_column, times};
+
+    fn best(values: &[(&str, fn(f64) -> f64)]) -> Assignment {
+        let altitude = ("altitude [ft]", Quantity::Altitude, "ft");
+        let mut recording = TestFlight::default().recording(&[altitude]);
+        let column = |(name, value): &(&str, fn(f64) -> f64)| {
+            test_column(name, times().into_iter().map(value).collect())
+        };
+        recording.columns.extend(values.iter().map(column));
+        let (grid, candidates) = searched(&recording);
+        let search = Search {
+            grid: &grid,
+            candidates: &candidates,
+        };
+        search.best()
+    }
+
+    #[test]
+    fn columns_that_hardly_move_are_no_mach_number_and_no_speed() {
+        // 480 ft/s have Mach 0.45 at the mean altitude.
+        let found = best(&[("x1", |t| 480.0 + 1e-3 * t), ("x2", |t| 0.45 - 1e-6 * t)]);
+        let quantities: Vec<&Quantity> = found.keys().collect();
+        assert_eq!(quantities, [&Quantity::Altitude]);
+    }
 }

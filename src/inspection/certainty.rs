@@ -1,11 +1,15 @@
 //! Certainty of an assignment: whether the recording allows another one as well.
 
+use std::collections::BTreeMap;
+
 use super::assignment::{Assignment, HOLDS, Search, with};
 use super::equations::Equation;
 use super::quantity::Quantity;
+use super::rescaling::rescalings;
 use super::signs::{Reversal, SignCosts};
 
-/// Misfit above which an equation contradicts its columns: one of them is wrong.
+/// Misfit above which an equation contradicts all of its columns: one of them is wrong. The columns that it
+/// requires are not sure at a misfit above [`HOLDS`].
 const CONTRADICTS: f64 = 0.3;
 /// Least cost of every other unit and sign, relative to the chosen ones: the logarithm of the
 /// misfits' common growth.
@@ -25,57 +29,116 @@ pub struct Verdict {
     pub evidence: String,
 }
 
-/// Certainty of a quantity that has a column; `signs` are the costs of all reversals of the assignment.
+/// Certainty of each quantity that has a column.
 #[must_use]
-pub fn verdict(
-    (search, signs): (&Search, &SignCosts),
-    assignment: &Assignment,
-    quantity: Quantity,
-) -> Verdict {
-    let Some((equation, ratio)) = best_equation(search, assignment, quantity) else {
-        return Verdict {
+pub fn verdicts(search: &Search, assignment: &Assignment) -> BTreeMap<Quantity, Verdict> {
+    let examination = Examination {
+        search,
+        assignment,
+        signs: search.signs(assignment),
+        rescalings: rescalings(search, assignment, LEAST_MARGIN),
+    };
+    let quantities = assignment.keys();
+    let mut verdicts: BTreeMap<Quantity, Verdict> = quantities
+        .map(|quantity| (*quantity, examination.verdict(*quantity)))
+        .collect();
+    while let Some(quantity) = examination.unsupported(&verdicts) {
+        if let Some(verdict) = verdicts.get_mut(&quantity) {
+            verdict.is_sure = false;
+            verdict.evidence += "; but a column of that equation is itself not sure";
+        }
+    }
+    verdicts
+}
+
+/// An assignment with its rivals.
+struct Examination<'a> {
+    search: &'a Search<'a>,
+    assignment: &'a Assignment,
+    /// Costs of all reversals of signs.
+    signs: SignCosts,
+    /// For each quantity, the smallest set that fits nearly as well in other units.
+    rescalings: BTreeMap<Quantity, Vec<Quantity>>,
+}
+
+impl Examination<'_> {
+    fn verdict(&self, quantity: Quantity) -> Verdict {
+        let (search, assignment) = (self.search, self.assignment);
+        let unsure = |evidence: String| Verdict {
             is_sure: false,
             margin: 0.0,
-            evidence:
+            evidence,
+        };
+        let Some((equation, ratio)) = best_equation(search, assignment, quantity) else {
+            return unsure(
                 "by its name; no equation of motion relates it to the other recorded quantities"
                     .to_owned(),
+            );
         };
-    };
-    let held = format!("{} holds to {:.1} %", equation.name(), 100.0 * ratio.sqrt());
-    if ratio > HOLDS {
-        return Verdict {
-            is_sure: false,
-            margin: 0.0,
-            evidence: format!("{held} only"),
-        };
+        let held = format!("{} holds to {:.1} %", equation.name(), 100.0 * ratio.sqrt());
+        if ratio > HOLDS {
+            return unsure(format!("{held} only"));
+        }
+        if let Some(other) = contradiction(search, assignment, quantity) {
+            return unsure(format!("{held}; but {} does not", other.name()));
+        }
+        let margin = margin(search, assignment, quantity);
+        let objection = self.objection(quantity, margin);
+        Verdict {
+            is_sure: objection.is_none(),
+            margin,
+            evidence: objection.map_or_else(|| held.clone(), |o| format!("{held}; but {o}")),
+        }
     }
-    if let Some(other) = contradiction(search, assignment, quantity) {
-        return Verdict {
-            is_sure: false,
-            margin: 0.0,
-            evidence: format!("{held}; but {} does not", other.name()),
-        };
-    }
-    let margin = margin(search, assignment, quantity);
-    let rival = rival(signs, quantity);
-    let mirrored = Quantity::LATERAL.contains(&quantity) && !has_usual_side(assignment);
-    let evidence = if mirrored {
-        format!("{held}; but as many lateral signs would be usual in the mirror image")
-    } else if margin < LEAST_MARGIN {
-        format!("{held}; but another unit or sign fits nearly as well")
-    } else if let Some(rival) = &rival {
-        let names: Vec<&str> = rival.iter().map(|q| q.signal()).collect();
-        format!(
-            "{held}; but {} reversed together fit nearly as well",
+
+    /// Reason for which a quantity is not sure although its equations hold.
+    fn objection(&self, quantity: Quantity, margin: f64) -> Option<String> {
+        let (search, assignment) = (self.search, self.assignment);
+        let listed = |quantities: &[Quantity]| {
+            let names: Vec<&str> = quantities.iter().map(|q| q.signal()).collect();
             names.join(", ")
-        )
-    } else {
-        held
-    };
-    Verdict {
-        is_sure: margin >= LEAST_MARGIN && rival.is_none() && !mirrored,
-        margin,
-        evidence,
+        };
+        if Quantity::LATERAL.contains(&quantity) && !has_usual_side(assignment) {
+            return Some("as many lateral signs would be usual in the mirror image".to_owned());
+        }
+        if margin < LEAST_MARGIN {
+            return Some("another unit or sign fits nearly as well".to_owned());
+        }
+        if let Some(rival) = rival(&self.signs, quantity) {
+            return Some(format!(
+                "{} reversed together fit nearly as well",
+                listed(&rival)
+            ));
+        }
+        if let Some(rival) = self.rescalings.get(&quantity) {
+            return Some(format!(
+                "{} in other units fit nearly as well",
+                listed(rival)
+            ));
+        }
+        let information = search.information(assignment, quantity);
+        (information < LEAST_MARGIN)
+            .then(|| "noise or a constant in its place would fit as well".to_owned())
+    }
+
+    /// A quantity that counts as sure although each of its equations rests on a column that neither a name nor
+    /// other equations confirm.
+    fn unsupported(&self, verdicts: &BTreeMap<Quantity, Verdict>) -> Option<Quantity> {
+        let is_confirmed = |quantity: &Quantity| {
+            self.search.is_named(*quantity, self.assignment)
+                || verdicts.get(quantity).is_some_and(|v| v.is_sure)
+        };
+        let is_supported = |quantity: Quantity| {
+            let equations = own_equations(self.search, self.assignment, quantity).into_iter();
+            let mut holding = equations.filter(|(_, ratio)| *ratio <= HOLDS);
+            holding.any(|(equation, _)| {
+                let (needed, _) = equation.quantities();
+                needed.iter().filter(|q| **q != quantity).all(is_confirmed)
+            })
+        };
+        let mut sure = verdicts.iter().filter(|(_, verdict)| verdict.is_sure);
+        sure.find(|(quantity, _)| !is_supported(**quantity))
+            .map(|(quantity, _)| *quantity)
     }
 }
 
@@ -98,25 +161,41 @@ fn rival(signs: &SignCosts, quantity: Quantity) -> Option<Vec<Quantity>> {
 fn contradiction(search: &Search, assignment: &Assignment, quantity: Quantity) -> Option<Equation> {
     let mut equations = Equation::ALL.into_iter().filter(|e| e.contains(quantity));
     equations.find(|e| {
+        let is_required = e.quantities().0.contains(&quantity);
+        let most = if is_required { HOLDS } else { CONTRADICTS };
         let misfit = search.misfit(*e, assignment);
-        misfit.is_some_and(|misfit| misfit.ratio > CONTRADICTS)
+        misfit.is_some_and(|misfit| misfit.ratio > most)
     })
 }
 
-/// Equation that holds best among those that contain a quantity.
+/// Equation that holds best among those of a quantity.
 fn best_equation(
     search: &Search,
     assignment: &Assignment,
     quantity: Quantity,
 ) -> Option<(Equation, f64)> {
-    let best = |is_own: fn(Equation, Quantity) -> bool| {
+    let own = own_equations(search, assignment, quantity).into_iter();
+    own.min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Equations that require a quantity, with their misfits; if there are none, those that contain it.
+fn own_equations(
+    search: &Search,
+    assignment: &Assignment,
+    quantity: Quantity,
+) -> Vec<(Equation, f64)> {
+    let of = |is_own: fn(Equation, Quantity) -> bool| -> Vec<(Equation, f64)> {
         let equations = Equation::ALL.into_iter().filter(|e| is_own(*e, quantity));
         equations
             .filter_map(|e| Some((e, search.misfit(e, assignment)?.ratio)))
-            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .collect()
     };
-    best(|equation, quantity| equation.quantities().0.contains(&quantity))
-        .or_else(|| best(Equation::contains))
+    let required = of(|equation, quantity| equation.quantities().0.contains(&quantity));
+    if required.is_empty() {
+        of(Equation::contains)
+    } else {
+        required
+    }
 }
 
 /// Least growth of the physical cost over all other units and signs of a quantity, alone or together
@@ -173,4 +252,122 @@ fn has_usual_side(assignment: &Assignment) -> bool {
     };
     let reversed = signs().filter(|choice| choice.sign < 0.0).count();
     signs().count() - reversed >= reversed + MAJORITY
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inspection::recording::Recording;
+    use crate::inspection::test_flight::{
+        Recorded, TestFlight, assigned, searched, test_column, times,
+    };
+
+    const COLUMNS: [Recorded; 12] = [
+        ("alpha", Quantity::Alpha, "deg"),
+        ("beta", Quantity::Beta, "deg"),
+        ("tas", Quantity::Velocity, "ft/s"),
+        ("altitude", Quantity::Altitude, "ft"),
+        ("p", Quantity::P, "deg/s"),
+        ("q", Quantity::Q, "deg/s"),
+        ("r", Quantity::R, "deg/s"),
+        ("theta", Quantity::Theta, "deg"),
+        ("phi", Quantity::Phi, "deg"),
+        ("nz", Quantity::An, "g"),
+        ("ax", Quantity::Ax, "g"),
+        ("ay", Quantity::Ay, "g"),
+    ];
+
+    fn verdicts_of(recording: &Recording, columns: &[Recorded]) -> BTreeMap<Quantity, Verdict> {
+        let (grid, candidates) = searched(recording);
+        let search = Search {
+            grid: &grid,
+            candidates: &candidates,
+        };
+        verdicts(&search, &assigned(columns))
+    }
+
+    /// A recording with other values in a column.
+    fn with_values(recording: &Recording, name: &str, values: Vec<f64>) -> Recording {
+        let mut changed = recording.clone();
+        changed.columns.retain(|column| column.name != name);
+        changed.columns.push(test_column(name, values));
+        changed
+    }
+
+    #[test]
+    fn columns_that_obey_the_equations_are_sure() {
+        let verdicts = verdicts_of(&TestFlight::default().recording(&COLUMNS), &COLUMNS);
+        let unsure: Vec<_> = verdicts.iter().filter(|(_, v)| !v.is_sure).collect();
+        assert!(unsure.is_empty(), "{unsure:#?}");
+    }
+
+    #[test]
+    fn noise_with_the_right_mean_is_not_sure() {
+        let flight = TestFlight {
+            bank: 0.1,
+            pitching: 0.1,
+            ..TestFlight::default()
+        };
+        let recording = flight.recording(&COLUMNS);
+        let noise = |t: &f64| 1.0 + 0.1 * (40.0 * t * t).sin();
+        let noisy = with_values(&recording, "nz", times().iter().map(noise).collect());
+        let verdict = &verdicts_of(&noisy, &COLUMNS)[&Quantity::An];
+        assert!(!verdict.is_sure, "{verdict:?}");
+        assert!(verdict.evidence.contains("noise"), "{verdict:?}");
+    }
+
+    #[test]
+    fn no_column_is_sure_by_an_equation_with_an_unnamed_column_that_is_not() {
+        let columns = [
+            ("altitude", Quantity::Altitude, "ft"),
+            ("mach", Quantity::Mach, "-"),
+            ("x1", Quantity::Velocity, "ft/s"),
+        ];
+        let (grid, candidates) = searched(&TestFlight::default().recording(&columns));
+        let search = Search {
+            grid: &grid,
+            candidates: &candidates,
+        };
+        let assignment = assigned(&columns);
+        let examination = Examination {
+            search: &search,
+            assignment: &assignment,
+            signs: search.signs(&assignment),
+            rescalings: BTreeMap::new(),
+        };
+        let unsupported = |velocity_is_sure: bool| {
+            let verdict = |quantity: &Quantity| Verdict {
+                is_sure: *quantity != Quantity::Velocity || velocity_is_sure,
+                margin: 1.0,
+                evidence: String::new(),
+            };
+            let verdicts = assignment.keys().map(|q| (*q, verdict(q))).collect();
+            examination.unsupported(&verdicts)
+        };
+        assert_eq!(unsupported(true), None);
+        assert!(unsupported(false).is_some());
+    }
+
+    #[test]
+    fn an_altitude_that_contradicts_the_climb_is_not_sure() {
+        // Feet that the name states as metres: the speed of sound is nearly the same.
+        let columns = [
+            ("alpha", Quantity::Alpha, "deg"),
+            ("tas", Quantity::Velocity, "ft/s"),
+            ("mach", Quantity::Mach, "-"),
+            ("altitude [m]", Quantity::Altitude, "ft"),
+            ("theta", Quantity::Theta, "deg"),
+        ];
+        let recording = TestFlight {
+            bank: 0.0,
+            ..TestFlight::default()
+        }
+        .recording(&columns);
+        let stated = columns.map(|column| match column {
+            (name, Quantity::Altitude, _) => (name, Quantity::Altitude, "m"),
+            column => column,
+        });
+        let verdict = &verdicts_of(&recording, &stated)[&Quantity::Altitude];
+        assert!(!verdict.is_sure, "{verdict:?}");
+    }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::assignment::{Assignment, Candidates, Search};
-use super::certainty::verdict;
+use super::certainty::verdicts;
 use super::clock::{ClockColumn, find_clock};
 use super::grid::Grid;
 use super::inputs::{InputColumn, inputs, kind_of, rate};
@@ -189,12 +189,14 @@ impl Findings<'_> {
     }
 
     fn add_motion(&mut self, search: &Search, assignment: &Assignment) {
-        let signs = search.signs(assignment);
+        let mut verdicts = verdicts(search, assignment);
         for (quantity, choice) in assignment {
             let Some(facts) = self.facts.iter().find(|c| c.name == choice.column) else {
                 continue;
             };
-            let verdict = verdict((search, &signs), assignment, *quantity);
+            let Some(verdict) = verdicts.remove(quantity) else {
+                continue;
+            };
             let unit = Unit::parse(choice.unit).ok();
             let turn = unit.and_then(|u| Unit::of_signal(signal::PSI).factor_to(u));
             let is_heading = *quantity == Quantity::Psi;

@@ -8,7 +8,7 @@
 //!
 //! In the order of use: `recording` (the input), `words` and `vocabulary` (names), `mirror_images`, `quantity`,
 //! `clock`, `grid` (one step for all columns), `plausible` (candidates), `equations`, `assignment`
-//! (the search, over `signs`), `certainty`, `effects` and `inputs` (surfaces and controls), `steps`
+//! (the search, over `signs`), `rescaling`, `certainty`, `effects` and `inputs` (surfaces and controls), `steps`
 //! (which of them step), `findings`, and `draft` (YAML).
 
 mod assignment;
@@ -24,6 +24,7 @@ mod mirror_images;
 mod plausible;
 mod quantity;
 mod recording;
+mod rescaling;
 mod signs;
 mod steps;
 #[cfg(test)]

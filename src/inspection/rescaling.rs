@@ -1,0 +1,173 @@
+//! Joint changes of units: the cost of an assignment with any set of its quantities in other units.
+//!
+//! Kinematics of small angles are linear: attitudes and rates in degrees obey them as well as in radians,
+//! if all that are linked change together. Such a set may contain any number of quantities, so all combinations of units are
+//! tried. This is cheap: the misfit of an equation is computed once for each combination of its own quantities.
+
+use std::collections::BTreeMap;
+
+use super::assignment::{Assignment, Choice, Search};
+use super::equations::Equation;
+use super::quantity::Quantity;
+
+/// A combination of units: for each quantity the place of its unit, 0 for the assigned one.
+type Combination = Vec<usize>;
+
+/// Physical costs of an assignment in all combinations of units.
+struct UnitCosts {
+    /// Quantities whose columns may have several units.
+    quantities: Vec<Quantity>,
+    /// Number of units of each quantity.
+    units: Vec<usize>,
+    equations: Vec<EquationCosts>,
+}
+
+/// Costs of one equation.
+struct EquationCosts {
+    /// Places of its quantities among those with several units.
+    members: Vec<usize>,
+    /// Logarithm of the misfit in each combination of the members' units.
+    costs: Vec<f64>,
+}
+
+/// For each quantity, the smallest set of quantities, this one included, that fits nearly as well in other
+/// units: its cost grows by less than `least_growth` against the best fit that leaves the quantity's unit.
+#[must_use]
+pub fn rescalings(
+    search: &Search,
+    assignment: &Assignment,
+    least_growth: f64,
+) -> BTreeMap<Quantity, Vec<Quantity>> {
+    let costs = UnitCosts::of(search, assignment);
+    let combinations = costs.combinations();
+    let judged: Vec<(f64, &Combination)> =
+        combinations.iter().map(|c| (costs.cost(c), c)).collect();
+    let places = costs.quantities.iter().enumerate();
+    let rivals = places.filter_map(|(place, quantity)| {
+        let kept = judged.iter().filter(|(_, c)| c[place] == 0);
+        let least = kept.map(|(cost, _)| *cost).fold(f64::INFINITY, f64::min);
+        let changed = judged.iter().filter(|(_, c)| c[place] != 0);
+        let fitting = changed.filter(|(cost, _)| *cost < least + least_growth);
+        let changes = |c: &Combination| c.iter().filter(|unit| **unit != 0).count();
+        let (_, fewest) = fitting.min_by_key(|(_, c)| changes(c))?;
+        let members = costs.quantities.iter().zip(fewest.iter());
+        let members = members.filter(|(_, unit)| **unit != 0).map(|(q, _)| *q);
+        Some((*quantity, members.collect()))
+    });
+    rivals.collect()
+}
+
+impl UnitCosts {
+    fn of(search: &Search, assignment: &Assignment) -> UnitCosts {
+        let several = assignment.iter().filter_map(|(quantity, own)| {
+            let others = search.alternatives(*quantity, assignment).into_iter();
+            #[expect(clippy::float_cmp, reason = "signs are 1 or -1")]
+            let rescaled = others.filter(|choice| choice.sign == own.sign);
+            let choices: Vec<Choice> = std::iter::once(own.clone()).chain(rescaled).collect();
+            (choices.len() > 1).then_some((*quantity, choices))
+        });
+        let several: Vec<(Quantity, Vec<Choice>)> = several.collect();
+        let equations = Equation::ALL.into_iter();
+        let equations = equations.filter_map(|e| equation_costs(search, assignment, &several, e));
+        UnitCosts {
+            equations: equations.collect(),
+            units: several.iter().map(|(_, choices)| choices.len()).collect(),
+            quantities: several.into_iter().map(|(quantity, _)| quantity).collect(),
+        }
+    }
+
+    /// All combinations of units. The first is that of the assignment.
+    fn combinations(&self) -> Vec<Combination> {
+        combinations(&self.units)
+    }
+
+    fn cost(&self, combination: &Combination) -> f64 {
+        let own = |equation: &EquationCosts| {
+            let digits = equation.members.iter();
+            let place = digits.fold(0, |place, m| place * self.units[*m] + combination[*m]);
+            equation.costs[place]
+        };
+        self.equations.iter().map(own).sum()
+    }
+}
+
+/// Costs of an equation; `None` for one that lacks a quantity.
+fn equation_costs(
+    search: &Search,
+    assignment: &Assignment,
+    several: &[(Quantity, Vec<Choice>)],
+    equation: Equation,
+) -> Option<EquationCosts> {
+    let places = several.iter().enumerate();
+    let members: Vec<usize> = places
+        .filter(|(_, (quantity, _))| equation.contains(*quantity))
+        .map(|(place, _)| place)
+        .collect();
+    let units: Vec<usize> = members.iter().map(|m| several[*m].1.len()).collect();
+    let cost = |combination: Combination| {
+        let mut trial = assignment.clone();
+        for (member, unit) in members.iter().zip(combination) {
+            let (quantity, choices) = &several[*member];
+            trial.insert(*quantity, choices[unit].clone());
+        }
+        Some(search.misfit(equation, &trial)?.ratio.ln())
+    };
+    let costs: Option<Vec<f64>> = combinations(&units).into_iter().map(cost).collect();
+    Some(EquationCosts {
+        costs: costs?,
+        members,
+    })
+}
+
+/// All combinations of places below some numbers, the last place first to change.
+fn combinations(numbers: &[usize]) -> Vec<Combination> {
+    let mut all = vec![Combination::new()];
+    for number in numbers {
+        let longer = |c: &Combination| {
+            let c = c.clone();
+            (0..*number).map(move |place| [&c[..], &[place]].concat())
+        };
+        all = all.iter().flat_map(longer).collect();
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inspection::test_flight::{Recorded, TestFlight, assigned, searched};
+
+    #[test]
+    fn small_lateral_angles_and_rates_may_all_be_in_the_other_unit() {
+        use Quantity::{P, Phi, Psi, Q, R, Theta};
+        let lateral = [
+            ("theta_deg", Theta, "deg"),
+            ("phi", Phi, "rad"),
+            ("p", P, "rad/s"),
+            ("psi", Psi, "rad"),
+            ("r", R, "rad/s"),
+        ];
+        let rivals = |bank: f64, columns: &[Recorded]| {
+            let flight = TestFlight {
+                bank,
+                pitch: 0.5,
+                ..TestFlight::default()
+            };
+            let (grid, candidates) = searched(&flight.recording(columns));
+            let search = Search {
+                grid: &grid,
+                candidates: &candidates,
+            };
+            let least_growth = 0.4;
+            rescalings(&search, &assigned(columns), least_growth)
+        };
+        // All four are linked: the yaw rate is part of the roll equation.
+        let linked = rivals(0.03, &lateral);
+        for quantity in [P, R, Phi, Psi] {
+            assert_eq!(linked.get(&quantity), Some(&vec![P, R, Phi, Psi]));
+        }
+        // Large angles are not linear.
+        let with_pitch = [&lateral[..], &[("q_dps", Q, "deg/s")]].concat();
+        assert_eq!(rivals(0.6, &with_pitch), BTreeMap::new());
+    }
+}
