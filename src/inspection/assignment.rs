@@ -3,7 +3,7 @@
 //! The cost of an assignment is the sum of the logarithms of the equations' misfits; names, stated units
 //! and usual signs break ties. Descent changes one quantity at a time, then two.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::equations::{Equation, Misfit, Scaled, misfit};
 use super::grid::Grid;
@@ -24,9 +24,9 @@ pub const HOLDS: f64 = 0.1;
 const NAMELESS_FIT: f64 = 0.02;
 /// Factor by which every other column without a telling name must fit worse.
 const NAMELESS_LEAD: f64 = 10.0;
-/// Least information, as the logarithm of a growth of misfits, in each such column. A constant satisfies an equation between
-/// levels, such as that of the dynamic pressure, if its value happens to fit.
-const NAMELESS_INFORMATION: f64 = 1.0;
+/// Least information in each such column, as the logarithm of a growth of misfits. A constant satisfies an
+/// equation between levels, such as that of the dynamic pressure, if its value happens to fit.
+const NAMELESS_INFORMATION: f64 = 0.4;
 /// Largest number of combinations of such columns that are tried for one equation.
 const MOST_TRIALS: usize = 4_000;
 /// Largest misfit at which a column counts as the integral of another; it is large because bank
@@ -77,6 +77,14 @@ pub type Assignment = BTreeMap<Quantity, Choice>;
 /// Candidates of each quantity.
 pub type Candidates = BTreeMap<Quantity, Vec<Candidate>>;
 
+/// Result of a search.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    pub assignment: Assignment,
+    /// Quantities with the best of several columns without telling names that fit nearly as well.
+    pub proposed: BTreeSet<Quantity>,
+}
+
 /// Search over one grid.
 #[derive(Clone, Copy, Debug)]
 pub struct Search<'a> {
@@ -89,14 +97,17 @@ impl Search<'_> {
     /// angles or rates in the other unit. Columns without a telling name are added afterwards, if
     /// only one of them fits.
     #[must_use]
-    pub fn best(&self) -> Assignment {
+    pub fn best(&self) -> Found {
         let mut assignment = self.best_start();
         self.descend(&mut assignment, true);
-        self.seed_rotation(&mut assignment);
+        let proposed = self.seed_rotation(&mut assignment);
         loop {
             self.descend(&mut assignment, true);
             if !self.complete(&mut assignment) {
-                return assignment;
+                return Found {
+                    assignment,
+                    proposed,
+                };
             }
         }
     }
@@ -186,8 +197,9 @@ impl Search<'_> {
     }
 
     /// Adds attitudes and rates whose names tell nothing: pairs in which one column is the integral
-    /// of the other, in the order in which the equations of all three attitudes hold best.
-    fn seed_rotation(&self, assignment: &mut Assignment) {
+    /// of the other, in the order in which the equations of all three attitudes hold best. Returns them if
+    /// another order or other columns fit nearly as well.
+    fn seed_rotation(&self, assignment: &mut Assignment) -> BTreeSet<Quantity> {
         let pairs = [
             (Quantity::Theta, Quantity::Q),
             (Quantity::Phi, Quantity::P),
@@ -195,7 +207,7 @@ impl Search<'_> {
         ];
         let rotation = pairs.iter().flat_map(|(a, b)| [a, b]);
         if rotation.clone().any(|q| assignment.contains_key(q)) {
-            return;
+            return BTreeSet::new();
         }
         let integrals = self.integrals();
         let mut ranked: Vec<(f64, Assignment)> = Vec::new();
@@ -218,14 +230,18 @@ impl Search<'_> {
         }
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
         let Some((cost, best)) = ranked.first() else {
-            return;
+            return BTreeSet::new();
         };
         let differs =
             |trial: &Assignment| rotation.clone().any(|q| trial[q].column != best[q].column);
         let next = ranked.iter().find(|(_, trial)| differs(trial));
-        if next.is_none_or(|(next, _)| next - cost > ROTATION_LEAD) {
+        let leads = next.is_none_or(|(next, _)| next - cost > ROTATION_LEAD);
+        let is_plausible = self.all_hold(best);
+        if leads || is_plausible {
             assignment.clone_from(best);
         }
+        let proposed = rotation.filter(|_| is_plausible && !leads);
+        proposed.copied().collect()
     }
 
     /// Pairs of columns of which the first is the integral of the second, the best first.
@@ -662,7 +678,7 @@ mod tests {
             grid: &grid,
             candidates: &candidates,
         };
-        search.best()
+        search.best().assignment
     }
 
     #[test]
@@ -671,5 +687,32 @@ mod tests {
         let found = best(&[("x1", |t| 480.0 + 1e-3 * t), ("x2", |t| 0.45 - 1e-6 * t)]);
         let quantities: Vec<&Quantity> = found.keys().collect();
         assert_eq!(quantities, [&Quantity::Altitude]);
+    }
+
+    #[test]
+    fn a_rotation_without_names_that_two_columns_fit_is_proposed() {
+        use Quantity::{P, Phi, Psi, Q, R, Theta};
+        let columns = [
+            ("x1", Theta, "rad"),
+            ("x2", Q, "rad/s"),
+            ("x3", Phi, "rad"),
+            ("x4", P, "rad/s"),
+            ("x5", Psi, "rad"),
+            ("x6", R, "rad/s"),
+            ("x7", Q, "rad/s"),
+        ];
+        let (grid, candidates) = searched(&TestFlight::default().recording(&columns));
+        let search = Search {
+            grid: &grid,
+            candidates: &candidates,
+        };
+        let found = search.best();
+        assert_eq!(found.proposed, BTreeSet::from([P, Q, R, Theta, Phi, Psi]));
+        let choice = |quantity: &Quantity| found.assignment[quantity].column.as_str();
+        assert_eq!(
+            [Theta, Phi, P, Psi, R].each_ref().map(choice),
+            ["x1", "x3", "x4", "x5", "x6"]
+        );
+        assert!(["x2", "x7"].contains(&choice(&Q)));
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::assignment::{Assignment, HOLDS, Search, with};
+use super::assignment::{Assignment, Found, HOLDS, Search, with};
 use super::equations::Equation;
 use super::quantity::Quantity;
 use super::rescaling::rescalings;
@@ -31,7 +31,8 @@ pub struct Verdict {
 
 /// Certainty of each quantity that has a column.
 #[must_use]
-pub fn verdicts(search: &Search, assignment: &Assignment) -> BTreeMap<Quantity, Verdict> {
+pub fn verdicts(search: &Search, found: &Found) -> BTreeMap<Quantity, Verdict> {
+    let assignment = &found.assignment;
     let examination = Examination {
         search,
         assignment,
@@ -42,6 +43,12 @@ pub fn verdicts(search: &Search, assignment: &Assignment) -> BTreeMap<Quantity, 
     let mut verdicts: BTreeMap<Quantity, Verdict> = quantities
         .map(|quantity| (*quantity, examination.verdict(*quantity)))
         .collect();
+    for quantity in &found.proposed {
+        if let Some(verdict) = verdicts.get_mut(quantity) {
+            verdict.is_sure = false;
+            verdict.evidence += "; but other columns without telling names fit nearly as well";
+        }
+    }
     while let Some(quantity) = examination.unsupported(&verdicts) {
         if let Some(verdict) = verdicts.get_mut(&quantity) {
             verdict.is_sure = false;
@@ -256,6 +263,8 @@ fn has_usual_side(assignment: &Assignment) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
     use crate::inspection::recording::Recording;
     use crate::inspection::test_flight::{
@@ -283,7 +292,11 @@ mod tests {
             grid: &grid,
             candidates: &candidates,
         };
-        verdicts(&search, &assigned(columns))
+        let found = Found {
+            assignment: assigned(columns),
+            proposed: BTreeSet::new(),
+        };
+        verdicts(&search, &found)
     }
 
     /// A recording with other values in a column.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::assignment::{Assignment, Candidates, Search};
+use super::assignment::{Assignment, Candidates, Found, Search};
 use super::certainty::verdicts;
 use super::clock::{ClockColumn, find_clock};
 use super::grid::Grid;
@@ -116,18 +116,19 @@ fn inspect_columns(recordings: &[Recording]) -> Result<Inspection, String> {
         grid,
         candidates: &candidates,
     };
-    let assignment = search(&coarse).best();
+    let found = search(&coarse).best();
+    let assignment = &found.assignment;
     let mut findings = Findings {
         facts: &facts,
         channels: vec![time_channel(&clock, &facts)],
     };
-    findings.add_motion(&search(&fine), &assignment);
-    let inputs = inputs((&fine, &grid), &assignment, &facts);
+    findings.add_motion(&search(&fine), &found);
+    let inputs = inputs((&fine, &grid), assignment, &facts);
     findings.add_inputs(&inputs, &grid);
     findings.add_constants();
     findings.doubt_inertias();
     findings.add_flags(recordings);
-    let unused = findings.unused(&candidates, &assignment);
+    let unused = findings.unused(&candidates, assignment);
     let channels = findings.channels;
     Ok(Inspection {
         channels,
@@ -188,9 +189,9 @@ impl Findings<'_> {
         }
     }
 
-    fn add_motion(&mut self, search: &Search, assignment: &Assignment) {
-        let mut verdicts = verdicts(search, assignment);
-        for (quantity, choice) in assignment {
+    fn add_motion(&mut self, search: &Search, found: &Found) {
+        let mut verdicts = verdicts(search, found);
+        for (quantity, choice) in &found.assignment {
             let Some(facts) = self.facts.iter().find(|c| c.name == choice.column) else {
                 continue;
             };

@@ -114,8 +114,7 @@ impl TestFlight {
     }
 
     /// Values of a quantity at each sample, in rad, ft, s and slug.
-    #[must_use]
-    pub fn values(self, quantity: Quantity) -> Vec<f64> {
+    fn values(self, quantity: Quantity) -> Vec<f64> {
         let altitudes = self.altitudes();
         let value = |(t, altitude): (f64, f64)| match quantity {
             Quantity::Alpha => self.alpha(t),
