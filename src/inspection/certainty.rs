@@ -123,6 +123,10 @@ impl Examination<'_> {
                 listed(rival)
             ));
         }
+        if Quantity::LATERAL.contains(&quantity) {
+            // They vary about zero, so that the margin has compared their reflection.
+            return None;
+        }
         let information = search.information(assignment, quantity);
         (information < LEAST_MARGIN)
             .then(|| "noise or a constant in its place would fit as well".to_owned())
