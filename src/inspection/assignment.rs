@@ -666,12 +666,14 @@ mod tests {
     use super::*;
     use crate::inspection::test_flight::{TestFlight, searched, test_column, times};
 
-    fn best(values: &[(&str, fn(f64) -> f64)]) -> Assignment {
+    /// A column and its values over time.
+    type Motion = (&'static str, fn(f64) -> f64);
+
+    fn best(values: &[Motion]) -> Assignment {
         let altitude = ("altitude [ft]", Quantity::Altitude, "ft");
         let mut recording = TestFlight::default().recording(&[altitude]);
-        let column = |(name, value): &(&str, fn(f64) -> f64)| {
-            test_column(name, times().into_iter().map(value).collect())
-        };
+        let column =
+            |(name, value): &Motion| test_column(name, times().into_iter().map(value).collect());
         recording.columns.extend(values.iter().map(column));
         let (grid, candidates) = searched(&recording);
         let search = Search {
