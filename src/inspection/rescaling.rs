@@ -2,7 +2,7 @@
 //!
 //! Kinematics of small angles are linear: attitudes and rates in degrees obey them as well as in radians,
 //! if all that are linked change together. Such a set may contain any number of quantities, so all combinations of units are
-//! tried. This is cheap: the misfit of an equation is computed once for each combination of its own quantities.
+//! tried. The misfit of an equation is computed once for each combination of its own quantities.
 
 use std::collections::BTreeMap;
 
@@ -39,22 +39,28 @@ pub fn rescalings(
     least_growth: f64,
 ) -> BTreeMap<Quantity, Vec<Quantity>> {
     let costs = UnitCosts::of(search, assignment);
-    let combinations = costs.combinations();
-    let judged: Vec<(f64, &Combination)> =
-        combinations.iter().map(|c| (costs.cost(c), c)).collect();
-    let places = costs.quantities.iter().enumerate();
-    let rivals = places.filter_map(|(place, quantity)| {
-        let kept = judged.iter().filter(|(_, c)| c[place] == 0);
-        let least = kept.map(|(cost, _)| *cost).fold(f64::INFINITY, f64::min);
-        let changed = judged.iter().filter(|(_, c)| c[place] != 0);
-        let fitting = changed.filter(|(cost, _)| *cost < least + least_growth);
-        let changes = |c: &Combination| c.iter().filter(|unit| **unit != 0).count();
-        let (_, fewest) = fitting.min_by_key(|(_, c)| changes(c))?;
-        let members = costs.quantities.iter().zip(fewest.iter());
-        let members = members.filter(|(_, unit)| **unit != 0).map(|(q, _)| *q);
-        Some((*quantity, members.collect()))
-    });
-    rivals.collect()
+    let mut least = vec![f64::INFINITY; costs.quantities.len()];
+    for combination in combinations(&costs.units) {
+        let cost = costs.cost(&combination);
+        for (least, unit) in least.iter_mut().zip(&combination) {
+            if *unit == 0 {
+                *least = least.min(cost);
+            }
+        }
+    }
+    let mut fewest: BTreeMap<Quantity, Vec<Quantity>> = BTreeMap::new();
+    for combination in combinations(&costs.units) {
+        let cost = costs.cost(&combination);
+        let changed = costs.changed(&combination);
+        for (quantity, least) in costs.quantities.iter().zip(&least) {
+            let is_rival = changed.contains(quantity) && cost < least + least_growth;
+            let is_fewest = |known: &Vec<Quantity>| known.len() <= changed.len();
+            if is_rival && !fewest.get(quantity).is_some_and(is_fewest) {
+                fewest.insert(*quantity, changed.clone());
+            }
+        }
+    }
+    fewest
 }
 
 impl UnitCosts {
@@ -76,12 +82,16 @@ impl UnitCosts {
         }
     }
 
-    /// All combinations of units. The first is that of the assignment.
-    fn combinations(&self) -> Vec<Combination> {
-        combinations(&self.units)
+    /// Quantities in another unit than the assigned one.
+    fn changed(&self, combination: &[usize]) -> Vec<Quantity> {
+        let units = self.quantities.iter().zip(combination);
+        units
+            .filter(|(_, unit)| **unit != 0)
+            .map(|(quantity, _)| *quantity)
+            .collect()
     }
 
-    fn cost(&self, combination: &Combination) -> f64 {
+    fn cost(&self, combination: &[usize]) -> f64 {
         let own = |equation: &EquationCosts| {
             let digits = equation.members.iter();
             let place = digits.fold(0, |place, m| place * self.units[*m] + combination[*m]);
@@ -112,30 +122,44 @@ fn equation_costs(
         }
         Some(search.misfit(equation, &trial)?.ratio.ln())
     };
-    let costs: Option<Vec<f64>> = combinations(&units).into_iter().map(cost).collect();
+    let costs: Option<Vec<f64>> = combinations(&units).map(cost).collect();
     Some(EquationCosts {
         costs: costs?,
         members,
     })
 }
 
-/// All combinations of places below some numbers, the last place first to change.
-fn combinations(numbers: &[usize]) -> Vec<Combination> {
-    let mut all = vec![Combination::new()];
-    for number in numbers {
-        let longer = |c: &Combination| {
-            let c = c.clone();
-            (0..*number).map(move |place| [&c[..], &[place]].concat())
-        };
-        all = all.iter().flat_map(longer).collect();
-    }
-    all
+/// All combinations of places below some numbers, the last place first to change. They are made one by one: a
+/// recording without units has hundreds of thousands.
+fn combinations(numbers: &[usize]) -> impl Iterator<Item = Combination> {
+    let count: usize = numbers.iter().product();
+    (0..count).map(|index| {
+        let mut rest = index;
+        let mut places: Combination = numbers
+            .iter()
+            .rev()
+            .map(|number| {
+                let place = rest % number;
+                rest /= number;
+                place
+            })
+            .collect();
+        places.reverse();
+        places
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::inspection::test_flight::{Recorded, TestFlight, assigned, searched};
+
+    #[test]
+    fn combinations_are_those_of_an_odometer() {
+        let all: Vec<Combination> = combinations(&[2, 3]).collect();
+        assert_eq!(all, [[0, 0], [0, 1], [0, 2], [1, 0], [1, 1], [1, 2]]);
+        assert_eq!(combinations(&[]).collect::<Vec<_>>(), [vec![]; 1]);
+    }
 
     #[test]
     fn small_lateral_angles_and_rates_may_all_be_in_the_other_unit() {

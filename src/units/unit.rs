@@ -95,6 +95,7 @@ pub(super) const UNITS: &[Unit] = &[
     unit("deg", Some("_deg"), Quantity::Angle, 1.0),
     unit("rad", None, Quantity::Angle, DEG),
     rare("mrad", Quantity::Angle, 1e-3 * DEG),
+    rare("arcmin", Quantity::Angle, 1.0 / 60.0),
     unit("deg/s", Some("_deg_s"), Quantity::AngularRate, 1.0),
     unit("rad/s", None, Quantity::AngularRate, DEG),
     unit(
@@ -107,6 +108,7 @@ pub(super) const UNITS: &[Unit] = &[
     unit("g", Some("_g"), Quantity::Acceleration, 1.0),
     unit("ft/s2", None, Quantity::Acceleration, 1.0 / G0_FT_S2),
     unit("m/s2", None, Quantity::Acceleration, FT / G0_FT_S2),
+    rare("mg", Quantity::Acceleration, 1e-3),
     unit("ft/s", Some("_ft_s"), Quantity::Velocity, 1.0),
     unit("m/s", None, Quantity::Velocity, FT),
     unit("kt", None, Quantity::Velocity, 1852.0 / 3600.0 * FT),
@@ -137,6 +139,7 @@ pub(super) const UNITS: &[Unit] = &[
     rare("kgf", Quantity::Force, KILOGRAM_FORCE_N * LBF),
     unit("slug", Some("_slug"), Quantity::Mass, 1.0),
     unit("lb", None, Quantity::Mass, 1.0 / G0_FT_S2),
+    rare("klb", Quantity::Mass, 1000.0 / G0_FT_S2),
     unit("kg", None, Quantity::Mass, SLUG),
     rare("t", Quantity::Mass, 1000.0 * SLUG),
     unit("slug ft2", Some("_slug_ft2"), Quantity::Inertia, 1.0),
@@ -374,10 +377,10 @@ impl Unit {
 
     /// The pound-force for a pound where the target is a force; any other unit as it is.
     fn as_force_of(self, target: Unit) -> Unit {
-        if self.name == "lb" && target.quantity == Quantity::Force {
-            unit("lb", None, Quantity::Force, 1.0)
-        } else {
-            self
+        match self.name {
+            "lb" if target.quantity == Quantity::Force => unit("lb", None, Quantity::Force, 1.0),
+            "klb" if target.quantity == Quantity::Force => rare("klb", Quantity::Force, 1000.0),
+            _ => self,
         }
     }
 }
