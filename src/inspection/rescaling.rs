@@ -158,7 +158,7 @@ mod tests {
     fn combinations_are_those_of_an_odometer() {
         let all: Vec<Combination> = combinations(&[2, 3]).collect();
         assert_eq!(all, [[0, 0], [0, 1], [0, 2], [1, 0], [1, 1], [1, 2]]);
-        assert_eq!(combinations(&[]).collect::<Vec<_>>(), [vec![]; 1]);
+        assert_eq!(combinations(&[]).collect::<Vec<_>>(), [Combination::new()]);
     }
 
     #[test]
