@@ -179,9 +179,8 @@ impl<'a> Recording<'a> {
                     refusal: empty_channel(name, channel, clock.rows),
                     is_absent: true,
                 });
-            } else if let Some(share) = share_with_value(&statistics, clock.samples)
-                .filter(|share| is_replaceable(signal) && *share < least_share(signal))
-            {
+            } else if is_replaceable(signal) && 2 * with_value(&statistics) < clock.samples {
+                let share = with_value(&statistics) as f64 / clock.samples as f64;
                 left_out.push(LeftOut {
                     signal,
                     refusal: sparse_channel(name, channel, share),
@@ -226,21 +225,10 @@ impl<'a> Recording<'a> {
     }
 }
 
-/// Share of the samples of a channel that have a value; `None` without samples.
-fn share_with_value(statistics: &ChannelStatistics, samples: usize) -> Option<f64> {
+/// Number of samples of a channel that have a value.
+fn with_value(statistics: &ChannelStatistics) -> usize {
     let kept = [Mark::Measured, Mark::Bridged, Mark::Despiked, Mark::Between];
-    let count: usize = kept.map(|mark| statistics.count(mark)).iter().sum();
-    (samples > 0).then(|| count as f64 / samples as f64)
-}
-
-/// Share of samples with a value below which a replaceable channel is left out. A gap costs the maneuvers
-/// in it. The stand-ins of Mach and altitude cost hardly more than that, so few gaps suffice; the others are
-/// kept where they have a value.
-fn least_share(signal: &str) -> f64 {
-    match signal {
-        signal::MACH | signal::ALTITUDE => 0.9,
-        _ => 0.5,
-    }
+    kept.map(|mark| statistics.count(mark)).iter().sum()
 }
 
 /// Problem of the failed relations, with the instrument faults found besides.

@@ -328,21 +328,6 @@ fn a_replaceable_channel_without_values_in_most_samples_is_left_out() {
     assert!(ingested.record.values(signal::THETA).unwrap()[5].is_nan());
 }
 
-#[test]
-fn mach_and_altitude_with_a_gap_of_a_fifth_have_their_stand_ins_throughout() {
-    let mut flight = Flight::noisy();
-    for column in ["mach", "altitude"] {
-        flight.values(column)[ROWS * 4 / 5..].fill(f64::NAN);
-    }
-    let ingested = flight.ingest().unwrap();
-    let places: Vec<&str> = ingested.problems.iter().map(|p| p.place.as_str()).collect();
-    assert_eq!(places, ["channel `altitude`", "channel `mach`"]);
-    for signal in [signal::MACH, signal::ALTITUDE] {
-        let values = ingested.record.values(signal).unwrap();
-        assert!(values.iter().all(|v| v.is_finite()), "{signal}");
-    }
-}
-
 /// A flight whose inertia about x is a table over fuel that burns from 300 kg to 100 kg.
 fn with_inertia_over(at: [f64; 2]) -> Flight {
     let mut flight = Flight::steady();
