@@ -3,7 +3,7 @@
 //! Motion at the aircraft's frequencies hardly contributes to second and third differences, and their
 //! median leaves out steps.
 
-use super::order_statistics::SIGMA_PER_MAD;
+use super::order_statistics::{SIGMA_PER_MAD, upper_median_in_place};
 
 /// Second difference of three samples.
 #[must_use]
@@ -16,6 +16,21 @@ pub fn second(u: &[f64; 3]) -> f64 {
 #[must_use]
 pub fn third(u: &[f64; 4]) -> f64 {
     u[3] - 3.0 * u[2] + 3.0 * u[1] - u[0]
+}
+
+/// Standard deviation of the white noise of samples, from their finite second differences; `None` with
+/// fewer than two of them.
+#[must_use]
+pub fn white_noise(samples: &[f64]) -> Option<f64> {
+    let mut sizes: Vec<f64> = samples
+        .array_windows()
+        .map(|w| second(w).abs())
+        .filter(|size| size.is_finite())
+        .collect();
+    if sizes.len() < 2 {
+        return None;
+    }
+    Some(noise_of_second(upper_median_in_place(&mut sizes)?))
 }
 
 /// Standard deviation of white noise from the median size of its second differences.
@@ -69,5 +84,7 @@ mod tests {
             0.02,
             epsilon = 6e-4
         );
+        assert_abs_diff_eq!(white_noise(&samples).unwrap(), 0.02, epsilon = 6e-4);
+        assert_eq!(white_noise(&[0.0, 1.0, f64::NAN, 2.0]), None);
     }
 }

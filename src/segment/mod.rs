@@ -26,10 +26,9 @@ mod tests;
 use std::collections::BTreeSet;
 
 use crate::aircraft::Aircraft;
-use crate::error::Problem;
 use crate::flight::Record;
 use crate::maneuver::{Acceptance, Class};
-use noisy_controls::without_noisy_controls;
+use noisy_controls::{control_noise, without_noisy_controls};
 use recognition::detections::Detections;
 use recognition::found::FoundManeuver;
 use recognition::overlaps::without_overlaps;
@@ -76,9 +75,12 @@ pub fn maneuvers(
     aircraft: &Aircraft,
     settings: &Settings,
 ) -> Segmented {
-    let (record, of_noise) = without_noisy_controls(record, settings);
+    let mut problems = problems::of_missing_signals(record, classes, settings);
+    let control_noise = control_noise(record, settings);
+    let (record, of_noise) = without_noisy_controls(record, settings, &control_noise);
+    problems.extend(of_noise);
     let record = record.as_ref();
-    let detections = Detections::of(record, settings);
+    let detections = Detections::of(record, settings, &control_noise);
     let recognised_as = with_surfaces_for_controls(record, classes, settings);
     let recognition = recognise(&detections, &recognised_as);
     let maneuver = |found: &FoundManeuver, window: (f64, f64)| {
@@ -100,11 +102,7 @@ pub fn maneuvers(
     let nothing = nothing_found(&detections, &recognition);
     recognition.unknown.extend(nothing);
     let windows = windows(&detections, &recognition.found);
-    let mut problems = problems::of_unknown(record, &recognition.unknown);
-    let missing = problems::of_missing_signals(record, classes, settings);
-    let is_noisy = |p: &Problem| of_noise.iter().any(|noisy| noisy.place == p.place);
-    problems.extend(missing.into_iter().filter(|p| !is_noisy(p)));
-    problems.extend(of_noise.iter().cloned());
+    problems.extend(problems::of_unknown(record, &recognition.unknown));
     problems.extend(problems::of_stuck_flags(record, &recognition.found));
     let mut maneuvers = Vec::new();
     for (found, window) in recognition.found.iter().zip(windows) {

@@ -3,6 +3,7 @@
 //! recorded; surfaces stand for it.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 
 use super::problems::at_place;
 use super::settings::Settings;
@@ -10,39 +11,36 @@ use super::steps::detection::level_noise;
 use crate::error::Problem;
 use crate::flight::Record;
 
+/// Standard deviation of each recorded control's changes between levels that its noise causes.
+pub(super) type ControlNoise<'a> = BTreeMap<&'a str, f64>;
+
+pub(super) fn control_noise<'a>(record: &Record, settings: &'a Settings) -> ControlNoise<'a> {
+    let controls = settings.pilot_controls.iter();
+    let noise = |control| level_noise(record, control, settings);
+    controls
+        .filter_map(|control| Some((control.as_str(), noise(control)?)))
+        .collect()
+}
+
 /// The record without the pilot's controls whose smallest step is within their noise, and a problem
 /// for each of them.
 pub(super) fn without_noisy_controls<'r>(
     record: &'r Record,
     settings: &Settings,
+    noise: &ControlNoise,
 ) -> (Cow<'r, Record>, Vec<Problem>) {
-    let noisy: Vec<(&String, f64)> = settings
-        .pilot_controls
-        .iter()
-        .filter_map(|control| Some((control, hidden_size(record, control, settings)?)))
-        .collect();
-    if noisy.is_empty() {
-        return (Cow::Borrowed(record), Vec::new());
-    }
-    let mut others = record.clone();
-    others
-        .signals
-        .retain(|name, _| !noisy.iter().any(|(control, _)| *control == name));
-    let problem = |(control, hidden): &(&String, f64)| {
+    let (mut others, mut problems) = (Cow::Borrowed(record), Vec::new());
+    for (control, noise) in noise {
+        let hidden = settings.steps_over_noise * noise;
+        let Some(smallest) = settings.steps.get(*control).filter(|step| hidden > **step) else {
+            continue;
+        };
+        others.to_mut().signals.remove(*control);
         let reason = format!(
-            "its noise hides steps of less than {hidden:.2} of `{control}`, and {:.2} is a step (segment: steps). \
-             The control is left out; steps of surfaces stand for the pilot's",
-            settings.steps[*control]
+            "its noise hides steps of less than {hidden:.2} of `{control}`, and {smallest:.2} is a step (segment: steps). \
+             The control is left out; steps of surfaces stand for the pilot's"
         );
-        at_place(record, (*control).clone(), reason)
-    };
-    let problems = noisy.iter().map(problem).collect();
-    (Cow::Owned(others), problems)
-}
-
-/// Size of the steps of a control that its noise hides; `None` if that is less than its smallest step.
-fn hidden_size(record: &Record, control: &str, settings: &Settings) -> Option<f64> {
-    let smallest = settings.steps.get(control)?;
-    let hidden = settings.steps_over_noise * level_noise(record, control, settings)?;
-    (hidden > *smallest).then_some(hidden)
+        problems.push(at_place(record, (*control).to_owned(), reason));
+    }
+    (others, problems)
 }

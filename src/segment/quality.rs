@@ -8,8 +8,7 @@ use super::settings::{Actuator, QualityLimits};
 use crate::aero::{Axis, Output};
 use crate::flight::{Record, signal};
 use crate::maneuver::{Acceptance, Class, Maneuver, Quality};
-use crate::numerics::differences;
-use crate::numerics::order_statistics::upper_median_in_place;
+use crate::numerics::differences::white_noise;
 use crate::numerics::sample_count::nearest;
 use crate::units::RAD;
 
@@ -239,15 +238,7 @@ fn mean_square(values: &[f64], about: About) -> Option<f64> {
 fn signal_to_noise(record: &Record, signals: &[&str], part: &RangeInclusive<usize>) -> Option<f64> {
     let of_signal = |name: &&str| -> Option<f64> {
         let values = record.values(name)?.get(part.clone())?;
-        let mut sizes: Vec<f64> = values
-            .array_windows()
-            .map(|w| differences::second(w).abs())
-            .filter(|d| d.is_finite())
-            .collect();
-        if sizes.len() < 2 {
-            return None;
-        }
-        let noise = differences::noise_of_second(upper_median_in_place(&mut sizes)?);
+        let noise = white_noise(values)?;
         ratio(Some(mean_square(values, About::Line)?.sqrt()), Some(noise))
     };
     signals.iter().filter_map(of_signal).max_by(f64::total_cmp)

@@ -5,9 +5,8 @@
 //! through feedback. The other steps of surfaces are uncommanded by the pilot: they distinguish
 //! excitation from ordinary flying without any flag.
 
-use std::collections::BTreeMap;
-
 use crate::flight::Record;
+use crate::segment::noisy_controls::ControlNoise;
 use crate::segment::settings::Settings;
 use crate::segment::steps::detection;
 use crate::segment::steps::hidden_halves::add_hidden_halves_of_all;
@@ -30,8 +29,7 @@ pub(in crate::segment) struct Detections<'a> {
     /// True if one of the pilot's controls is recorded. Otherwise the pilot's inputs cannot be
     /// separated from the system's.
     pub pilot_is_recorded: bool,
-    /// Standard deviation of each pilot control's changes that its noise causes.
-    control_noise: BTreeMap<&'a str, f64>,
+    control_noise: &'a ControlNoise<'a>,
     /// True if the excitation flag is recorded and not stuck.
     flag_varies: bool,
     /// Times during which a varying flag is down between two times that it is up, of at least the
@@ -40,7 +38,11 @@ pub(in crate::segment) struct Detections<'a> {
 }
 
 impl<'a> Detections<'a> {
-    pub fn of(record: &'a Record, settings: &'a Settings) -> Detections<'a> {
+    pub fn of(
+        record: &'a Record,
+        settings: &'a Settings,
+        control_noise: &'a ControlNoise,
+    ) -> Detections<'a> {
         let (steps, deflections) = detection::detect(record, settings);
         let is_recorded = |name: &String| {
             record
@@ -55,7 +57,7 @@ impl<'a> Detections<'a> {
             deflections,
             uncommanded: Steps::default(),
             pilot_is_recorded: settings.pilot_controls.iter().any(is_recorded),
-            control_noise: control_noise(record, settings),
+            control_noise,
             flag_varies: varies(flag),
             flag_gaps: gaps(flag, record, settings.shortest_pause_s),
         };
@@ -148,14 +150,6 @@ impl<'a> Detections<'a> {
             .map(|c| self.steps.between(c, from_s, to_s).len())
             .sum()
     }
-}
-
-fn control_noise<'a>(record: &Record, settings: &'a Settings) -> BTreeMap<&'a str, f64> {
-    let controls = settings.pilot_controls.iter();
-    let noise = |control| detection::level_noise(record, control, settings);
-    controls
-        .filter_map(|control| Some((control.as_str(), noise(control)?)))
-        .collect()
 }
 
 /// True for a flag that is up in some samples and down in others.

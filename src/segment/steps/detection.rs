@@ -15,6 +15,7 @@
 
 use super::step::{SignalSteps, Step, Steps};
 use crate::flight::Record;
+use crate::numerics::differences::white_noise;
 use crate::numerics::order_statistics::{
     SIGMA_PER_MAD, lower_quantile_in_place, upper_median_in_place,
 };
@@ -96,26 +97,16 @@ pub(in crate::segment) fn largest_change(
         .fold(0.0, f64::max)
 }
 
-/// Second differences of white noise have √6 times its standard deviation.
-const SECOND_DIFFERENCES: f64 = 6.0;
-
-/// Standard deviation of the changes between levels that white noise of a signal causes, from the
-/// second differences of its samples: motion hardly enters them. `None` without samples.
+/// Standard deviation of the changes between levels that white noise of a signal causes. `None`
+/// without samples.
 pub(in crate::segment) fn level_noise(
     record: &Record,
     signal: &str,
     settings: &Settings,
 ) -> Option<f64> {
-    let values = record.values(signal)?;
-    let second_difference = |v: &[f64]| (v[2] - 2.0 * v[1] + v[0]).abs();
-    let mut sizes: Vec<f64> = values
-        .windows(3)
-        .map(second_difference)
-        .filter(|size| size.is_finite())
-        .collect();
-    let of_samples = SIGMA_PER_MAD * upper_median_in_place(&mut sizes)?;
+    let noise = white_noise(record.values(signal)?)?;
     let length = Window::of(record, settings).level as f64;
-    Some(of_samples * (2.0 / (SECOND_DIFFERENCES * length)).sqrt())
+    Some(noise * (2.0 / length).sqrt())
 }
 
 /// Standard deviation of uncommanded changes. Steps are few, so it follows from the median size of
