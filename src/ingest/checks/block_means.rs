@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::earth::air;
 use crate::flight::{Correction, signal};
 use crate::ingest::settings::Checks;
+use crate::numerics::order_statistics::upper_median;
 use crate::numerics::sample_count::whole_steps;
 
 /// Signals that the relations and the checks of mass, inertias and engines use.
@@ -158,6 +159,19 @@ impl BlockMeans {
 
     pub fn has(&self, signal: &str) -> bool {
         self.means.contains_key(signal)
+    }
+
+    /// Median of a signal's finite means.
+    pub fn median(&self, signal: &str) -> Option<f64> {
+        let means = (0..self.count).map(|block| self.mean(signal, block));
+        upper_median(means.filter(|mean| mean.is_finite()))
+    }
+
+    /// Median size of the changes of a signal from one block to the next.
+    pub fn median_change(&self, signal: &str) -> Option<f64> {
+        let at = |block: usize| self.mean(signal, block);
+        let changes = (1..self.count).map(|block| (at(block) - at(block - 1)).abs());
+        upper_median(changes.filter(|change| change.is_finite()))
     }
 
     /// `true` if a signal never changes. Noise changes every signal except that of a dead sensor.

@@ -1,9 +1,7 @@
 //! Check of the engines' channels, which no kinematic relation contains.
 
 use super::block_means::BlockMeans;
-use super::mass_properties::median;
 use crate::flight::signal;
-use crate::numerics::order_statistics::upper_median;
 use crate::units::G0_FT_S2;
 
 /// Signals of the engines.
@@ -22,15 +20,13 @@ const SMALL_RPM: f64 = 100.0;
 
 /// Finds a signal of an engine that is nothing but noise, and not by small changes about zero.
 pub fn useless_engine_signal(blocks: &BlockMeans, name: &str) -> Option<String> {
-    let size = median(blocks, name)?.abs();
+    let size = blocks.median(name)?.abs();
     let small = if name == signal::THRUST {
-        SMALL_SHARE_OF_WEIGHT * G0_FT_S2 * median(blocks, signal::MASS)?
+        SMALL_SHARE_OF_WEIGHT * G0_FT_S2 * blocks.median(signal::MASS)?
     } else {
         SMALL_RPM
     };
-    let change = |block: usize| (blocks.mean(name, block) - blocks.mean(name, block - 1)).abs();
-    let changes = (1..blocks.count).map(change);
-    let typical = upper_median(changes.filter(|change| change.is_finite()))?;
+    let typical = blocks.median_change(name)?;
     (typical > small.max(LIVELIEST_SHARE * size)).then(|| {
         format!(
             "it changes by {typical:.0} from one {:.1} s to the next, and its median is {size:.0}: it is nothing \

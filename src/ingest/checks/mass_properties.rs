@@ -112,8 +112,8 @@ const DENSEST_SLUG_FT3: f64 = 0.003;
 /// no relation is checked.
 pub fn impossible_velocity(blocks: &BlockMeans, settings: &Checks) -> Option<ImpossibleSignal> {
     let (velocity, qbar) = (
-        median(blocks, signal::VELOCITY)?,
-        median(blocks, signal::QBAR)?,
+        blocks.median(signal::VELOCITY)?,
+        blocks.median(signal::QBAR)?,
     );
     let most = 0.5 * DENSEST_SLUG_FT3 * velocity * velocity;
     let is_at_rest = velocity < settings.least_velocity_ft_s;
@@ -129,7 +129,7 @@ pub fn impossible_velocity(blocks: &BlockMeans, settings: &Checks) -> Option<Imp
 fn not_positive(blocks: &BlockMeans, name: &'static str) -> Option<ImpossibleSignal> {
     let may_be_zero = [signal::VELOCITY, signal::QBAR].contains(&name);
     let is_wrong = |median: &f64| *median < 0.0 || *median == 0.0 && !may_be_zero;
-    let median = median(blocks, name).filter(is_wrong)?;
+    let median = blocks.median(name).filter(is_wrong)?;
     let unit = Unit::of_signal(name).name;
     Some(ImpossibleSignal {
         signal: name,
@@ -140,7 +140,7 @@ fn not_positive(blocks: &BlockMeans, name: &'static str) -> Option<ImpossibleSig
 /// Principal moments of inertia that are not positive, or of which one exceeds the sum of the others.
 fn impossible_inertia(blocks: &BlockMeans) -> Option<ImpossibleSignal> {
     let inertia = [signal::IX, signal::IY, signal::IZ, signal::IXZ];
-    let [x, y, z, xz] = inertia.map(|name| median(blocks, name));
+    let [x, y, z, xz] = inertia.map(|name| blocks.median(name));
     let (x, y, z, xz) = (x?, y?, z?, xz?);
     if xz * xz >= x * z {
         return Some(ImpossibleSignal {
@@ -172,7 +172,7 @@ fn impossible_inertia(blocks: &BlockMeans) -> Option<ImpossibleSignal> {
 /// Finds a roll inertia for which the mass would lie at the axis, or beyond the wing tips. Inertias
 /// that are all in one wrong unit keep their ratios, so only the mass and the span contradict them.
 pub fn impossible_gyration(blocks: &BlockMeans, aircraft: &Aircraft) -> Option<ImpossibleSignal> {
-    let (inertia, mass) = (median(blocks, signal::IX)?, median(blocks, signal::MASS)?);
+    let (inertia, mass) = (blocks.median(signal::IX)?, blocks.median(signal::MASS)?);
     let share = (inertia / mass).sqrt() / (0.5 * aircraft.span_ft);
     (share.is_finite() && !GYRATION.contains(&share)).then(|| ImpossibleSignal {
         signal: signal::IX,
@@ -196,7 +196,7 @@ pub fn impossible_centre(blocks: &BlockMeans, aircraft: &Aircraft) -> Option<Imp
         (signal::Z_CG, sensor.z_ft),
     ];
     axes.into_iter().zip(FARTHEST_SPANS).find_map(|((name, at_ft), spans)| {
-        let centre = median(blocks, name)?;
+        let centre = blocks.median(name)?;
         let is_outside = (centre - at_ft).abs() > spans * aircraft.span_ft;
         is_outside.then(|| ImpossibleSignal {
             signal: name,
@@ -259,10 +259,4 @@ fn probable_unit(stated: &str, lift: f64) -> Option<&'static str> {
         .min_by(|a, b| strangeness(a).total_cmp(&strangeness(b)))
         .filter(|unit| strangeness(unit) < (lift / TYPICAL_LIFT).ln().abs())
         .map(|unit| unit.name)
-}
-
-/// Median of a signal's finite block means.
-pub fn median(blocks: &BlockMeans, name: &str) -> Option<f64> {
-    let means = (0..blocks.count).map(|block| blocks.mean(name, block));
-    upper_median(means.filter(|mean| mean.is_finite()))
 }

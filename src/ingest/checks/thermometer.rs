@@ -1,9 +1,8 @@
 //! Check of the temperature of the air, which no kinematic relation decides.
 
 use super::block_means::BlockMeans;
-use super::mass_properties::{ImpossibleSignal, median};
+use super::mass_properties::ImpossibleSignal;
 use crate::flight::signal;
-use crate::numerics::order_statistics::upper_median;
 
 /// Temperatures of the air up to 100,000 ft, K, with a margin of 10 K beyond the extremes on record
 /// (MIL-STD-210C: 184 to 331 K).
@@ -37,7 +36,8 @@ pub fn impossible_temperature(blocks: &BlockMeans) -> Option<ImpossibleSignal> {
 }
 
 fn wrong_size(blocks: &BlockMeans) -> Option<String> {
-    let median = median(blocks, signal::AIR_TEMPERATURE).filter(|k| !AIR_KELVIN.contains(k))?;
+    let median = blocks.median(signal::AIR_TEMPERATURE);
+    let median = median.filter(|k| !AIR_KELVIN.contains(k))?;
     Some(format!(
         "its median is {median:.1} K, and air has {} to {} K: is it in degC or degF?",
         AIR_KELVIN.start, AIR_KELVIN.end
@@ -45,9 +45,7 @@ fn wrong_size(blocks: &BlockMeans) -> Option<String> {
 }
 
 fn nothing_but_noise(blocks: &BlockMeans) -> Option<String> {
-    let at = |block: usize| blocks.mean(signal::AIR_TEMPERATURE, block);
-    let changes = (1..blocks.count).map(|block| (at(block) - at(block - 1)).abs());
-    let median = upper_median(changes.filter(|change| change.is_finite()))?;
+    let median = blocks.median_change(signal::AIR_TEMPERATURE)?;
     (median > LIVELIEST_KELVIN).then(|| {
         format!(
             "it changes by {median:.1} K from one {:.1} s to the next: it is nothing but noise",
