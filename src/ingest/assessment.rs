@@ -14,7 +14,7 @@ use super::clock::Stretch;
 use super::compatibility::{ErrorEvidence, Findings, OnFault};
 use super::context::Context;
 use super::examination::{Examination, Outcome, RecordReader, RelationResult};
-use super::refusal::{LeftOut, Refusal};
+use super::refusal::{Refusal, UnreadChannel};
 use super::settings::OnFailedCheck;
 use super::table_ends::held_throughout;
 use crate::error::Problem;
@@ -174,14 +174,14 @@ impl<'a> Recording<'a> {
             let (name, channel, statistics) = (one.name, one.channel, one.statistics);
             let signal = channel.signal.as_str();
             if statistics.count(Mark::Missing) == clock.samples {
-                left_out.push(LeftOut {
+                left_out.push(UnreadChannel {
                     signal,
                     refusal: empty_channel(name, channel, clock.rows),
                     is_absent: true,
                 });
             } else if is_replaceable(signal) && 2 * with_value(&statistics) < clock.samples {
                 let share = with_value(&statistics) as f64 / clock.samples as f64;
-                left_out.push(LeftOut {
+                left_out.push(UnreadChannel {
                     signal,
                     refusal: sparse_channel(name, channel, share),
                     is_absent: false,

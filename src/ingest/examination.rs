@@ -202,18 +202,20 @@ impl Examination<'_> {
         let engines =
             engines.filter_map(|name| Some((*name, useless_engine_signal(blocks, name)?)));
         let found = temperature.into_iter().chain(engines);
-        let leave_out = |(name, reason): (&str, String)| {
-            let verdict = reason.clone();
-            self.leave_out(name, verdict, self.context.refusal(name, reason))
-        };
         let recorded = found.filter(|(name, _)| self.is_recorded(name));
-        recorded.map(leave_out).collect()
+        let left_out = recorded.map(|(name, reason)| self.leave_out_for(name, reason));
+        left_out.collect()
+    }
+
+    /// `true` for a signal that the stretch can do without.
+    fn can_do_without(&self, signal: &str) -> bool {
+        let is_other = |name: &str| name != signal && self.is_recorded(name);
+        self.context.can_do_without(signal, is_other)
     }
 
     /// `true` for a faulty channel that the stretch can do without.
     fn is_useless(&self, fault: &FaultyChannel) -> bool {
-        let is_other = |name: &str| name != fault.signal && self.is_recorded(name);
-        self.context.can_do_without(&fault.signal, is_other)
+        self.can_do_without(&fault.signal)
     }
 
     /// `true` if channels are faulty, and the stretch can do without all of them.
@@ -253,15 +255,16 @@ impl Examination<'_> {
 
     /// Channels whose values no error of an instrument explains and that the stretch can do without.
     fn inexplicable(&self, findings: &Findings) -> Vec<LeftOut> {
-        let leave_out = |(name, fault): (&str, String)| {
-            let is_other = |other: &str| other != name && self.is_recorded(other);
-            let is_useless = self.context.can_do_without(name, is_other);
-            is_useless.then(|| {
-                let refusal = self.context.refusal(name, fault.clone());
-                self.leave_out(name, fault, refusal)
-            })
-        };
-        findings.inexplicable().filter_map(leave_out).collect()
+        let inexplicable = findings.inexplicable();
+        let useless = inexplicable.filter(|(name, _)| self.can_do_without(name));
+        let left_out = useless.map(|(name, fault)| self.leave_out_for(name, fault));
+        left_out.collect()
+    }
+
+    /// A channel that is left out for a reason that is also its verdict.
+    fn leave_out_for(&self, name: &str, reason: String) -> LeftOut {
+        let verdict = reason.clone();
+        self.leave_out(name, verdict, self.context.refusal(name, reason))
     }
 
     /// A channel that is left out, with its stand-in and the cost.

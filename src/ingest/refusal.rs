@@ -44,7 +44,7 @@ impl Refusal {
 
     /// Refusal of a flight for required signals without a source: at the channel of each where the
     /// channel map has one, with the remedies.
-    pub(super) fn of_signals(signals: &[&str], left_out: Vec<LeftOut>) -> Refusal {
+    pub(super) fn of_signals(signals: &[&str], left_out: Vec<UnreadChannel>) -> Refusal {
         let mut own = left_out;
         own.retain(|one| signals.contains(&one.signal));
         let advice = remedies(signals);
@@ -92,14 +92,14 @@ impl Refusal {
 }
 
 /// A channel that is left out of a flight.
-pub(super) struct LeftOut<'a> {
+pub(super) struct UnreadChannel<'a> {
     pub signal: &'a str,
     pub refusal: Refusal,
     /// `false` for a channel whose recorded values cannot be used.
     pub is_absent: bool,
 }
 
-impl LeftOut<'_> {
+impl UnreadChannel<'_> {
     /// The row of a flight that is read without the channel: the stand-in and the cost.
     pub(super) fn into_problem(self, stand_ins: &[(String, StandIn)], flight_id: &str) -> Problem {
         let stage = if self.is_absent {

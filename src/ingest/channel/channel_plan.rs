@@ -9,7 +9,7 @@ use crate::flight::{Channel, signal};
 use crate::ingest::clock::Clock;
 use crate::ingest::column_source::ColumnSource;
 use crate::ingest::context::Context;
-use crate::ingest::refusal::{LeftOut, Refusal};
+use crate::ingest::refusal::{Refusal, UnreadChannel};
 use crate::units::{Conversion, Unit};
 
 /// Relative difference below which two factors are the same unit: rounding of the factors.
@@ -46,7 +46,7 @@ fn plan<'a>(
     flight_id: &str,
 ) -> Result<(Vec<ChannelPlan<'a>>, Vec<Problem>), Refusal> {
     let mut plans: BTreeMap<&str, ChannelPlan> = BTreeMap::new();
-    let mut left_out: Vec<LeftOut> = Vec::new();
+    let mut left_out: Vec<UnreadChannel> = Vec::new();
     let is_mapped = |signal: &str| context.channels.values().any(|c| c.signal == signal);
     let is_useless =
         |signal: &str| context.can_do_without(signal, |other| other != signal && is_mapped(other));
@@ -68,7 +68,7 @@ fn plan<'a>(
             }
             Err(refusal) => {
                 let is_absent = is_lacking(source, name, channel);
-                left_out.push(LeftOut {
+                left_out.push(UnreadChannel {
                     signal: &channel.signal,
                     refusal,
                     is_absent,
