@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::checked::Config;
-use crate::aero::{Axis, Output};
+use crate::aero::{Axis, Derivative, Output};
 use crate::error::did_you_mean;
 use crate::flight::signal;
 use crate::flight::stand_in::{StandIn, cost};
@@ -220,15 +220,20 @@ impl<'a> Recorder<'a> {
             let mut statuses = statuses().filter_map(|statuses| statuses.get(name));
             statuses.any(|status| *status != Status::Inactive)
         };
-        let mut derivatives = self.config.buildup.derivatives_of(class.axis);
-        derivatives.any(|d| d.regressor.signals().any(|s| s == surface) && is_active(&d.name))
+        self.derivatives_of(surface, class)
+            .any(|d| is_active(&d.name))
     }
 
     /// `true` for a class of an axis in which the tunnel has a derivative of a surface.
     fn has_value(&self, class: &Class, surface: &str) -> bool {
-        let mut derivatives = self.config.buildup.derivatives_of(class.axis);
-        derivatives
-            .any(|d| d.regressor.signals().any(|s| s == surface) && self.config.tunnel.has(&d.name))
+        self.derivatives_of(surface, class)
+            .any(|d| self.config.tunnel.has(&d.name))
+    }
+
+    /// Derivatives of a class's axis whose regressors contain a surface.
+    fn derivatives_of(&self, surface: &str, class: &Class) -> impl Iterator<Item = &Derivative> {
+        let derivatives = self.config.buildup.derivatives_of(class.axis);
+        derivatives.filter(move |d| d.regressor.signals().any(|s| s == surface))
     }
 
     /// Signals without which the maneuvers of a class are not recognised, unless the analyst gives
