@@ -170,6 +170,9 @@ impl<'a> Recording<'a> {
             let is_other = |name: &str| name != signal && signals.contains(&name);
             signal::REQUIRED.contains(&signal) && context.can_do_without(signal, is_other)
         };
+        // The clock also runs while the recorder is off.
+        let written = conditioned.iter().map(|one| with_value(&one.statistics));
+        let written = written.max().unwrap_or(0);
         for one in conditioned {
             let (name, channel, statistics) = (one.name, one.channel, one.statistics);
             let signal = channel.signal.as_str();
@@ -179,8 +182,8 @@ impl<'a> Recording<'a> {
                     refusal: empty_channel(name, channel, clock.rows),
                     is_absent: true,
                 });
-            } else if is_replaceable(signal) && 2 * with_value(&statistics) < clock.samples {
-                let share = with_value(&statistics) as f64 / clock.samples as f64;
+            } else if is_replaceable(signal) && 2 * with_value(&statistics) < written {
+                let share = with_value(&statistics) as f64 / written as f64;
                 left_out.push(UnreadChannel {
                     signal,
                     refusal: sparse_channel(name, channel, share),

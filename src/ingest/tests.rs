@@ -328,6 +328,19 @@ fn a_replaceable_channel_without_values_in_most_samples_is_left_out() {
     assert!(ingested.record.values(signal::THETA).unwrap()[5].is_nan());
 }
 
+#[test]
+fn a_recorder_that_was_off_most_of_the_time_costs_no_channel() {
+    let mut flight = Flight::noisy();
+    let (on, off) = (ROWS / 4, ROWS / 2);
+    for (row, time) in flight.values("time").iter_mut().enumerate() {
+        *time += (row / on * off) as f64 * STEP_S;
+    }
+    let ingested = flight.ingest().unwrap();
+    assert_eq!(reasons(&ingested), Vec::<&str>::new());
+    assert_eq!(ingested.record.samples, ROWS + 3 * off);
+    assert!(ingested.record.is_recorded(signal::MACH));
+}
+
 /// A flight whose inertia about x is a table over fuel that burns from 300 kg to 100 kg.
 fn with_inertia_over(at: [f64; 2]) -> Flight {
     let mut flight = Flight::steady();

@@ -213,10 +213,11 @@ pub fn empty_channel(name: &str, channel: &Channel, rows: usize) -> Refusal {
     Refusal::of_channel(name, reason)
 }
 
-/// Refusal of a channel that has no value in most of the samples.
+/// Refusal of a channel that has no value in most of the samples in which the recorder was on; `share` of
+/// them have one.
 pub fn sparse_channel(name: &str, channel: &Channel, share: f64) -> Refusal {
     let reason = format!(
-        "channel `{name}` (signal `{}`) has a value in {:.1} % of the samples only, and is left out",
+        "channel `{name}` (signal `{}`) has a value in {:.1} % of the recorded samples only, and is left out",
         channel.signal,
         100.0 * share
     );
