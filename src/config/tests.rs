@@ -1390,11 +1390,11 @@ fn numbers_that_no_campaign_has_are_refused_at_their_line() {
         ("memory_mb: 200 #", "memory_mb", "-1 #"),
         ("memory_mb: 200 #", "memory_mb", ".nan #"),
         ("longest_bridge_s: 0.25", "longest_bridge_s", "-0.25"),
-        ("longest_clock_gap_s: 60", "longest_clock_gap_s", ".inf"),
+        ("longest_clock_gap_s: 600", "longest_clock_gap_s", ".inf"),
         ("alpha_step_deg: 5", "alpha_step_deg", "0.00001"),
         ("marked_share: 0.2", "marked_share", "20"),
         ("stick_lat_in: 1", "stick_lat_in", "0"),
-        ("standard_errors: 3", "standard_errors", "-3"),
+        ("standard_errors: 1", "standard_errors", "-1"),
         (
             "histories_at_alpha_deg: 30",
             "histories_at_alpha_deg",

@@ -14,8 +14,9 @@ settings! {
         /// see `docs/ingest.md`, and none if this is 0.
         pub longest_bridge_s: f64 = 0.25,
         /// Longest gap of the clock that is kept as missing samples, s. After a longer one the flight
-        /// goes on as another stretch: `flight_001.2`. No maneuver lasts as long as the default.
-        pub longest_clock_gap_s: f64 = 60.0,
+        /// goes on as another stretch: `flight_001.2`, with instrument errors of its own. Many recorders
+        /// are off between test points, for minutes.
+        pub longest_clock_gap_s: f64 = 600.0,
         /// Memory that reading may use at once, MB (10⁶ bytes), over all flights in work. It sets how
         /// many flights are read at once and in how large pieces. Results do not depend on it.
         #[serde(skip_serializing)]

@@ -312,13 +312,13 @@ mod tests {
     #[test]
     fn a_long_gap_begins_a_stretch_and_a_short_one_does_not() {
         let merged_pieces = merged(
-            &[file(&[(0, 0, 0.0), (0, 400, 30.0), (0, 800, 200.0)])],
+            &[file(&[(0, 0, 0.0), (0, 400, 30.0), (0, 800, 2000.0)])],
             false,
         );
         assert_eq!(merged_pieces.sequences.len(), 2);
         assert_eq!(
             merged_pieces.sequences[1].cause.as_deref(),
-            Some("the clock lacks 160.0 s from 40.0 s to 200.0 s")
+            Some("the clock lacks 1960.0 s from 40.0 s to 2000.0 s")
         );
     }
 

@@ -36,8 +36,12 @@ pub struct Clock {
 }
 
 /// Largest number of samples per recorded row. With more empty samples than that the step is not
-/// the recorder's.
+/// the recorder's, or the recorder was off.
 const SAMPLES_PER_ROW: usize = 10;
+
+/// Smallest mean number of rows in a run of a recorder that was off. With a step that is not the
+/// recorder's, most rows are runs by themselves.
+const ROWS_PER_RUN: usize = 10;
 
 /// Upper limit of a sample's number, which only a damaged time reaches.
 const MOST_SAMPLES: usize = usize::MAX / 2;
@@ -152,7 +156,8 @@ impl ClockBuilder {
             ));
         }
         clock.jitter_s = (self.squares / clock.rows as f64).sqrt() * self.step_s;
-        let is_sparse = clock.samples / SAMPLES_PER_ROW > clock.rows;
+        let is_sparse = clock.samples / SAMPLES_PER_ROW > clock.rows
+            && clock.rows / ROWS_PER_RUN < clock.runs.len();
         if is_sparse || clock.jitter_s > MOST_JITTER * self.step_s {
             return Err(format!(
                 "{} rows span {:.1} s, {} steps of {:.3} ms, and scatter about them by {:.3} ms: \
