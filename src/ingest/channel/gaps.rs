@@ -69,9 +69,11 @@ impl Reach {
         }
     }
 
-    /// Samples of a gap that may be bridged where a channel has a value every `period` samples.
+    /// Samples of a gap that may be bridged where a channel has a value every `period` samples. The
+    /// samples between two values are no part of what was lost.
     fn between(self, period: usize) -> usize {
-        self.longest.max(self.lost_update(period))
+        let lost = self.longest + period.saturating_sub(1);
+        lost.max(self.lost_update(period))
     }
 
     /// Samples of a gap at an end that may be filled.
@@ -249,6 +251,22 @@ mod tests {
         // Two lost updates of the velocity are too many, of the altitude they are not.
         assert_eq!(missing_at_2_hz(s::VELOCITY, &[3, 4]), 59);
         assert_eq!(missing_at_2_hz(s::ALTITUDE, &[3, 4]), 0);
+    }
+
+    #[test]
+    fn a_dropout_of_a_slow_channel_is_as_long_as_its_lost_updates() {
+        // At 10 Hz two lost updates are 0.2 s, though their gap has 11 samples of 0.025 s.
+        let missing = |lost: Range<usize>| {
+            let mut values: Vec<f64> = (0..60)
+                .map(|k| if k % 4 == 0 { f64::from(k) } else { GAP })
+                .collect();
+            lost.for_each(|update| values[4 * update] = GAP);
+            let reach = Reach::of(s::BETA_VANE, 0.25, 0.025);
+            bridge_gaps(&mut values[..57], reach, Bridge::Line, |_| 4);
+            values[..57].iter().filter(|v| v.is_nan()).count()
+        };
+        assert_eq!(missing(5..7), 0);
+        assert_eq!(missing(5..8), 15);
     }
 
     #[test]
