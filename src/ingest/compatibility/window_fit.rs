@@ -69,7 +69,8 @@ pub struct WindowFit<'a> {
     pub gradient: DVector<f64>,
     /// Twice the cost.
     pub cost: f64,
-    /// Information and gradient with the noise of the inputs counted; set by [`WindowFit::reweigh`].
+    /// Information and gradient with the noise of the inputs counted; set by
+    /// [`WindowFit::count_input_noise`].
     pub evidence: Arc<(DMatrix<f64>, DVector<f64>)>,
     input_noise: Arc<InputNoise>,
 }
@@ -237,11 +238,10 @@ impl<'a> WindowFit<'a> {
             self.variances[output] = level.max(least * least);
         }
         self.weigh(context);
-        self.count_input_noise(context);
     }
 
     /// Computes the evidence. A window whose own parameters are not determined has none.
-    fn count_input_noise(&mut self, context: &FitContext) {
+    pub fn count_input_noise(&mut self, context: &FitContext) {
         if !self.input_noise.serves(&self.variances) {
             let covariance = self.input_noise_covariance();
             self.input_noise = Arc::new(InputNoise {
