@@ -187,12 +187,12 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         Ok(response)
     }
 
-    /// Computes the innovations alone, whitened with the gains of these parameters.
+    /// Computes the innovations and their cost alone, whitened with the gains of these parameters.
     ///
     /// # Errors
     /// [`Diverged`] when the state leaves its bounds or the filter has no finite gain.
     pub fn innovations(&self, parameters: &[f64]) -> Result<FilterResponse, Diverged> {
-        let gains = self.gains(parameters)?;
+        let gains = self.gains_alone(parameters)?;
         let mut response = FilterResponse::empty(self.samples(), self.parameters());
         self.run(parameters, &gains, &mut response, None::<&mut NormalSums>)?;
         self.add_covariance_part(parameters, &gains, &mut response);
@@ -389,6 +389,19 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
 
     /// Gains of all patterns with their slopes.
     fn gains(&self, parameters: &[f64]) -> Result<Vec<PatternGain<NX>>, Diverged> {
+        self.gains_at(parameters, true)
+    }
+
+    /// Gains of all patterns without slopes.
+    fn gains_alone(&self, parameters: &[f64]) -> Result<Vec<PatternGain<NX>>, Diverged> {
+        self.gains_at(parameters, false)
+    }
+
+    fn gains_at(
+        &self,
+        parameters: &[f64],
+        with_slopes: bool,
+    ) -> Result<Vec<PatternGain<NX>>, Diverged> {
         let numbered = (self.first_noise()..).zip(self.noise_parameters.iter().copied());
         let gains = Arch::new().dispatch(GainsAt::<NX, E> {
             linearised: &self.linearised,
@@ -398,6 +411,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
             derivatives: &parameters[..self.case.derivatives()],
             noise: self.noise(parameters),
             noise_parameters: numbered.collect(),
+            with_slopes,
             equations: PhantomData,
         });
         gains.ok_or(Diverged { sample: 0 })

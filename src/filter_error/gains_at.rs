@@ -1,4 +1,5 @@
-//! Gains of a maneuver's filter for given parameters, with their slopes along all of them.
+//! Gains of a maneuver's filter for given parameters, with their slopes along all of them where they are
+//! wanted.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use std::marker::PhantomData;
@@ -10,7 +11,7 @@ use super::gains::{
     ParameterSlope, Pattern, PatternGain, gains, steady_variance_slopes, steady_variances,
 };
 use super::input_noise::InputNoise;
-use super::linearised::{Discrete, Linearised};
+use super::linearised::{Discrete, DiscreteSystem, Linearised};
 use super::noise::{Noise, NoiseParameter};
 use super::riccati::{NoisySystem, States, SteadyFilter};
 use crate::dynamics::{InGusts, OUTPUTS};
@@ -28,6 +29,8 @@ pub(super) struct GainsAt<'a, const NX: usize, E: InGusts<NX>> {
     pub noise: Noise,
     /// Parameters of the noise with their numbers.
     pub noise_parameters: Vec<(usize, NoiseParameter)>,
+    /// `false` for gains without slopes.
+    pub with_slopes: bool,
     pub equations: PhantomData<E>,
 }
 
@@ -37,27 +40,19 @@ impl<const NX: usize, E: InGusts<NX>> WithSimd for GainsAt<'_, NX, E> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
         let decay = decay_matrix::<NX, E>(self.noise.decay(self.step_s));
-        let (discrete, by_derivative) = self.linearised.discrete(self.derivatives);
-        let (of_inputs, of_inputs_slopes) = self.input_noise.covariance(self.derivatives);
+        let discrete = self.linearised.discrete(self.derivatives);
+        let of_inputs = self.input_noise.covariance(self.derivatives);
         let system = NoisySystem {
-            a: product(&discrete.step, &decay),
-            c: discrete.outputs,
+            a: product(&discrete.system.step, &decay),
+            c: discrete.system.outputs,
             q: self.noise.covariance::<NX, E>(self.step_s) + of_inputs,
             r: steady_variances(&self.noise, self.patterns),
         };
-        let mut slopes = Vec::with_capacity(self.derivatives.len() + self.noise_parameters.len());
-        for (parameter, (slope, q)) in by_derivative.iter().zip(of_inputs_slopes).enumerate() {
-            slopes.push(ParameterSlope {
-                parameter,
-                system: derivative_slope(slope, q, &decay),
-            });
-        }
-        for (parameter, kind) in &self.noise_parameters {
-            slopes.push(ParameterSlope {
-                parameter: *parameter,
-                system: self.noise_slope(*kind, &discrete),
-            });
-        }
+        let slopes = if self.with_slopes {
+            self.slopes(&discrete, &decay)
+        } else {
+            Vec::new()
+        };
         let is_still = self.noise.is_still() && self.input_noise.is_zero();
         let filter = if is_still {
             SteadyFilter::still(system)
@@ -75,6 +70,26 @@ impl<const NX: usize, E: InGusts<NX>> WithSimd for GainsAt<'_, NX, E> {
 }
 
 impl<const NX: usize, E: InGusts<NX>> GainsAt<'_, NX, E> {
+    /// Slopes of the system along all parameters.
+    #[inline(always)]
+    fn slopes(&self, discrete: &DiscreteSystem<NX>, decay: &States<NX>) -> Vec<ParameterSlope<NX>> {
+        let of_inputs = self.input_noise.covariance_slopes(self.derivatives);
+        let mut slopes = Vec::with_capacity(self.derivatives.len() + self.noise_parameters.len());
+        for (parameter, (slope, q)) in discrete.slopes().iter().zip(of_inputs).enumerate() {
+            slopes.push(ParameterSlope {
+                parameter,
+                system: derivative_slope(slope, q, decay),
+            });
+        }
+        for (parameter, kind) in &self.noise_parameters {
+            slopes.push(ParameterSlope {
+                parameter: *parameter,
+                system: self.noise_slope(*kind, &discrete.system),
+            });
+        }
+        slopes
+    }
+
     /// Slope of the system along a parameter of the noise.
     #[inline(always)]
     fn noise_slope(&self, kind: NoiseParameter, discrete: &Discrete<NX>) -> NoisySystem<NX> {

@@ -59,20 +59,27 @@ impl<const NX: usize> InputNoise<NX> {
         self.effects.is_empty()
     }
 
-    /// Covariance of the states' noise in a step, and its slope along each of some free derivatives.
-    pub fn covariance(&self, derivatives: &[f64]) -> (States<NX>, Vec<States<NX>>) {
+    /// Covariance of the states' noise in a step with these free derivatives.
+    pub fn covariance(&self, derivatives: &[f64]) -> States<NX> {
         let mut covariance = States::zeros();
+        for effect in &self.effects {
+            let sum = effect.sum(derivatives);
+            covariance += sum * sum.transpose();
+        }
+        covariance
+    }
+
+    /// Slopes of [`Self::covariance`] along the derivatives.
+    pub fn covariance_slopes(&self, derivatives: &[f64]) -> Vec<States<NX>> {
         let mut slopes = vec![States::zeros(); derivatives.len()];
         for effect in &self.effects {
-            let free = effect.free.iter();
-            let sum = free.fold(effect.held, |sum, (j, own)| sum + own * derivatives[*j]);
-            covariance += sum * sum.transpose();
+            let sum = effect.sum(derivatives);
             for (j, own) in &effect.free {
                 let half = own * sum.transpose();
                 slopes[*j] += half + half.transpose();
             }
         }
-        (covariance, slopes)
+        slopes
     }
 }
 
@@ -139,5 +146,11 @@ impl<const NX: usize> StateEffect<NX> {
             held: SVector::zeros(),
             free: vec![],
         }
+    }
+
+    /// Effect with these free derivatives.
+    fn sum(&self, derivatives: &[f64]) -> SVector<f64, NX> {
+        let free = self.free.iter();
+        free.fold(self.held, |sum, (j, own)| sum + own * derivatives[*j])
     }
 }

@@ -97,26 +97,45 @@ impl<const NX: usize> Linearised<NX> {
         }
     }
 
-    /// System of one step with these derivatives, and its slope along each.
+    /// System of one step with these derivatives.
     #[inline(always)]
-    pub fn discrete(&self, derivatives: &[f64]) -> (Discrete<NX>, Vec<Discrete<NX>>) {
+    pub fn discrete(&self, derivatives: &[f64]) -> DiscreteSystem<'_, NX> {
         let mut mean = self.held;
         for (free, value) in self.free.iter().zip(derivatives) {
             mean.add(free, *value);
         }
         let exponential = Exponential::of(mean.rates * self.step_s);
-        let mut slopes = Vec::with_capacity(self.free.len());
-        for free in &self.free {
+        DiscreteSystem {
+            linearised: self,
+            system: Discrete {
+                step: exponential.sums[ORDER],
+                outputs: mean.outputs,
+            },
+            exponential,
+        }
+    }
+}
+
+/// System of one step for given derivatives.
+pub(super) struct DiscreteSystem<'a, const NX: usize> {
+    linearised: &'a Linearised<NX>,
+    pub system: Discrete<NX>,
+    exponential: Exponential<NX>,
+}
+
+impl<const NX: usize> DiscreteSystem<'_, NX> {
+    /// Slopes of the system along the free derivatives.
+    #[inline(always)]
+    pub fn slopes(&self) -> Vec<Discrete<NX>> {
+        let Linearised { step_s, free, .. } = self.linearised;
+        let mut slopes = Vec::with_capacity(free.len());
+        for free in free {
             slopes.push(Discrete {
-                step: exponential.slope(&(free.rates * self.step_s)),
+                step: self.exponential.slope(&(free.rates * *step_s)),
                 outputs: free.outputs,
             });
         }
-        let system = Discrete {
-            step: exponential.sums[ORDER],
-            outputs: mean.outputs,
-        };
-        (system, slopes)
+        slopes
     }
 }
 

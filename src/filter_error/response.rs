@@ -59,7 +59,7 @@ impl FilterResponse {
     }
 
     /// Sets the cost to ½ Σ (v' S⁻¹ v + log|S|), and adds the parts of gradient and information that come
-    /// from the slopes of S. `pattern_of` has the pattern of each sample.
+    /// from the slopes of S, where the gains have any. `pattern_of` has the pattern of each sample.
     pub(super) fn add_covariance<const NX: usize>(
         &mut self,
         gains: &[PatternGain<NX>],
@@ -71,6 +71,9 @@ impl FilterResponse {
         for (number, (pattern, gain)) in patterns.iter().zip(gains).enumerate() {
             let samples = pattern.samples as f64;
             self.cost += 0.5 * samples * gain.log_determinant;
+            if gain.slopes.is_empty() {
+                continue;
+            }
             let products = innovation_products(number, &self.innovations, pattern_of);
             let excess = Outputs::identity() * samples - gain.inverse * products;
             let traces = covariance_traces(gain, &excess);

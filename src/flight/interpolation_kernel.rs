@@ -2,6 +2,10 @@
 //! neighbours. Its slope is continuous, so a delay can be estimated with the exact derivative of
 //! the interpolated value.
 
+#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
+
+use pulp::{Arch, Simd, WithSimd};
+
 /// Number of samples that an interpolated value depends on.
 const WIDTH: usize = 4;
 
@@ -77,10 +81,11 @@ impl InterpolationKernel {
             }
             return;
         };
-        for (to, near) in to.iter_mut().zip(inside.windows(WIDTH)) {
-            let weighted = self.weights.iter().zip(near);
-            *to = weighted.fold(0.0, |sum, (weight, value)| sum + weight * value);
-        }
+        Arch::new().dispatch(Interpolation {
+            weights: self.weights,
+            values: inside,
+            to,
+        });
     }
 
     /// Distributes values at sample `k` and the samples after it over the samples from which they
@@ -95,11 +100,11 @@ impl InterpolationKernel {
             }
             return;
         };
-        for (i, weight) in self.weights.iter().enumerate() {
-            for (to, value) in to[first + i..].iter_mut().zip(values) {
-                *to += weight * value;
-            }
-        }
+        Arch::new().dispatch(Distribution {
+            weights: self.weights,
+            values,
+            to: &mut to[first..],
+        });
     }
 
     /// Samples, weights and slopes of the weights at sample `k` of `samples`. The end sample stands
@@ -112,6 +117,45 @@ impl InterpolationKernel {
             .zip(self.slopes)
             .enumerate()
             .map(move |(i, (weight, slope))| (place(i), weight, slope))
+    }
+}
+
+/// Weighted sums of four values each, compiled for the processor at hand.
+struct Interpolation<'a> {
+    weights: [f64; WIDTH],
+    values: &'a [f64],
+    to: &'a mut [f64],
+}
+
+impl WithSimd for Interpolation<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let [a, b, c, d] = self.weights;
+        for (to, near) in self.to.iter_mut().zip(self.values.windows(WIDTH)) {
+            *to = a * near[0] + b * near[1] + c * near[2] + d * near[3];
+        }
+    }
+}
+
+/// The transpose of [`Interpolation`].
+struct Distribution<'a> {
+    weights: [f64; WIDTH],
+    values: &'a [f64],
+    to: &'a mut [f64],
+}
+
+impl WithSimd for Distribution<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for (i, weight) in self.weights.into_iter().enumerate() {
+            for (to, value) in self.to[i..].iter_mut().zip(self.values) {
+                *to += weight * value;
+            }
+        }
     }
 }
 

@@ -9,8 +9,10 @@ use crate::units::Unit;
 /// Report of a channel whose table holds the value of an end throughout a flight; `None` for others.
 pub fn held_throughout(name: &str, channel: &Channel, blocks: &BlockMeans) -> Option<Refusal> {
     let formula = channel.formula.as_ref()?;
-    let mut means = (0..blocks.count).map(|block| blocks.mean(&channel.signal, block));
-    let first = means.find(|mean| mean.is_finite())?;
+    let means = blocks.means_of(&channel.signal);
+    let first = (0..blocks.count)
+        .map(|block| means.mean(block))
+        .find(|mean| mean.is_finite())?;
     if !blocks.is_constant(&channel.signal) {
         return None;
     }

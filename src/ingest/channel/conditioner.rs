@@ -441,7 +441,10 @@ impl Conditioner {
 
 /// The finite values and their places.
 fn finite_values(values: &[f64]) -> (Vec<usize>, Vec<f64>) {
-    UpdateRate::FULL.recorded(values, 0).unzip()
+    let is_finite = |k: &usize| values[*k].is_finite();
+    let places: Vec<usize> = (0..values.len()).filter(is_finite).collect();
+    let finite = places.iter().map(|k| values[*k]).collect();
+    (places, finite)
 }
 
 /// Ranges in which at least `least` values are equal, with the number of these values. Missing
@@ -451,10 +454,14 @@ fn equal_runs(values: &[f64], least: usize) -> Vec<(Range<usize>, usize)> {
         let runs = long_runs(values, least).into_iter();
         return runs.map(|run| (run.clone(), run.len())).collect();
     }
-    let (places, finite) = finite_values(values);
+    let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    let runs = long_runs(&finite, least);
+    if runs.is_empty() {
+        return Vec::new();
+    }
+    let (places, _) = finite_values(values);
     let place = |run: &Range<usize>| places[run.start]..places[run.end - 1] + 1;
-    let runs = long_runs(&finite, least).into_iter();
-    runs.map(|run| (place(&run), run.len())).collect()
+    runs.iter().map(|run| (place(run), run.len())).collect()
 }
 
 /// A range of the values alone.

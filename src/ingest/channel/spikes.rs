@@ -47,11 +47,9 @@ const LEAST_REACH: usize = 4;
 
 /// Estimates the level with which a spike is compared, and the standard deviation of the noise.
 pub fn noise_levels(values: &[f64]) -> (f64, f64) {
-    let mut deviations: Vec<f64> = (1..values.len())
-        .step_by(STRIDE)
-        .map(|k| off_mean(values, k).abs())
-        .filter(|r| r.is_finite())
-        .collect();
+    let mut deviations = Vec::with_capacity(values.len() / STRIDE + 1);
+    let sampled = values.windows(3).step_by(STRIDE);
+    deviations.extend(sampled.map(off_neighbours).filter(|r| r.is_finite()));
     if deviations.is_empty() {
         return (0.0, f64::NAN);
     }
@@ -106,7 +104,12 @@ pub fn remove(
 /// `true` if the second of three samples is off the mean of the others by more than a level. False
 /// beside a gap.
 fn is_candidate(three: &[f64], level: f64) -> bool {
-    (three[1] - 0.5 * (three[0] + three[2])).abs() > level
+    off_neighbours(three) > level
+}
+
+/// Distance of the second of three samples from the mean of the others; NaN beside a gap.
+fn off_neighbours(three: &[f64]) -> f64 {
+    (three[1] - 0.5 * (three[0] + three[2])).abs()
 }
 
 /// `true` if some sample between the first and the last is a candidate.

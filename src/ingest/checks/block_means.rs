@@ -163,14 +163,16 @@ impl BlockMeans {
 
     /// Median of a signal's finite means.
     pub fn median(&self, signal: &str) -> Option<f64> {
-        let means = (0..self.count).map(|block| self.mean(signal, block));
+        let means = self.means_of(signal);
+        let means = (0..self.count).map(|block| means.mean(block));
         upper_median(means.filter(|mean| mean.is_finite()))
     }
 
     /// Median size of the changes of a signal from one block to the next.
     pub fn median_change(&self, signal: &str) -> Option<f64> {
-        let at = |block: usize| self.mean(signal, block);
-        let changes = (1..self.count).map(|block| (at(block) - at(block - 1)).abs());
+        let means = self.means_of(signal);
+        let change = |block: usize| (means.mean(block) - means.mean(block - 1)).abs();
+        let changes = (1..self.count).map(change);
         upper_median(changes.filter(|change| change.is_finite()))
     }
 
@@ -198,9 +200,14 @@ impl BlockMeans {
     }
 
     fn mostly_exceeds(&self, signal: &str, level: f64) -> bool {
-        let means = (0..self.count).map(|block| self.mean(signal, block));
-        let finite: Vec<f64> = means.filter(|v| v.is_finite()).collect();
-        2 * finite.iter().filter(|v| v.abs() > level).count() > finite.len()
+        let means = self.means_of(signal);
+        let means = (0..self.count).map(|block| means.mean(block));
+        let (mut above, mut finite) = (0, 0);
+        for mean in means.filter(|mean| mean.is_finite()) {
+            above += usize::from(mean.abs() > level);
+            finite += 1;
+        }
+        2 * above > finite
     }
 
     /// These means with one signal multiplied by a factor: a trial correction of its channel.
@@ -228,11 +235,6 @@ impl BlockMeans {
             }
         }
         changed
-    }
-
-    /// Mean of a signal over a block; NaN if the block has too few samples.
-    pub fn mean(&self, signal: &str, block: usize) -> f64 {
-        self.means_of(signal).mean(block)
     }
 
     /// Means of one signal over all blocks.

@@ -63,18 +63,16 @@ pub struct LiftPoint {
 /// Normal force coefficients of a flight, medians of bins of angle of attack.
 pub fn lift_curve(blocks: &BlockMeans, aircraft: &Aircraft, settings: &Checks) -> Vec<LiftPoint> {
     let mut bins: BTreeMap<usize, Vec<LiftPoint>> = BTreeMap::new();
-    for block in 0..blocks.count {
-        if let Some(lift) = lift(blocks, block, aircraft, settings) {
-            let alpha_deg = blocks.mean(signal::ALPHA_VANE, block);
-            let point = LiftPoint {
-                alpha_deg,
-                mach: blocks.mean(signal::MACH, block),
-                normal_force: lift * (alpha_deg * RAD).sin(),
-            };
-            bins.entry(whole_steps(alpha_deg, BIN_DEG))
-                .or_default()
-                .push(point);
-        }
+    let mach = blocks.means_of(signal::MACH);
+    for lift in lifts(blocks, aircraft, settings) {
+        let point = LiftPoint {
+            alpha_deg: lift.alpha_deg,
+            mach: mach.mean(lift.block),
+            normal_force: lift.per_sin_alpha * (lift.alpha_deg * RAD).sin(),
+        };
+        bins.entry(whole_steps(lift.alpha_deg, BIN_DEG))
+            .or_default()
+            .push(point);
     }
     let bins = bins.into_values().filter(|bin| bin.len() >= FEWEST_IN_BIN);
     let median = |bin: &[LiftPoint], of: fn(&LiftPoint) -> f64| upper_median(bin.iter().map(of));
@@ -216,8 +214,9 @@ pub fn impossible_mass(
     mass_unit: Option<&str>,
     settings: &Checks,
 ) -> Option<ImpossibleSignal> {
-    let lift = (0..blocks.count).filter_map(|block| lift(blocks, block, aircraft, settings));
-    let lift: Vec<f64> = lift.collect();
+    let lift: Vec<f64> = lifts(blocks, aircraft, settings)
+        .map(|lift| lift.per_sin_alpha)
+        .collect();
     if lift.len() < FEWEST_BLOCKS {
         return None;
     }
@@ -234,15 +233,41 @@ pub fn impossible_mass(
     })
 }
 
-/// Normal force coefficient over sin α in a block of flight at an angle of attack.
-fn lift(blocks: &BlockMeans, block: usize, aircraft: &Aircraft, settings: &Checks) -> Option<f64> {
-    let mean = |name: &str| blocks.mean(name, block);
-    let (alpha_deg, qbar) = (mean(signal::ALPHA_VANE), mean(signal::QBAR));
-    let is_flying = mean(signal::VELOCITY) > settings.least_velocity_ft_s && qbar > 0.0;
-    let force = mean(signal::MASS) * mean(signal::AN) * G0_FT_S2;
-    let lift = force / (qbar * aircraft.wing_area_ft2 * (alpha_deg * RAD).sin());
-    let is_lifting = (LEAST_ALPHA_DEG..90.0).contains(&alpha_deg);
-    (is_flying && is_lifting && lift.is_finite()).then_some(lift)
+/// Lift in a block of flight at an angle of attack.
+struct BlockLift {
+    block: usize,
+    alpha_deg: f64,
+    /// Normal force coefficient over sin α.
+    per_sin_alpha: f64,
+}
+
+/// Lift in each block in which the aircraft flies at an angle of attack.
+fn lifts(
+    blocks: &BlockMeans,
+    aircraft: &Aircraft,
+    settings: &Checks,
+) -> impl Iterator<Item = BlockLift> {
+    let signals = [
+        signal::ALPHA_VANE,
+        signal::QBAR,
+        signal::VELOCITY,
+        signal::MASS,
+        signal::AN,
+    ]
+    .map(|name| blocks.means_of(name));
+    let lift = move |block: usize| {
+        let [alpha_deg, qbar, velocity, mass, an] = signals.map(|means| means.mean(block));
+        let is_flying = velocity > settings.least_velocity_ft_s && qbar > 0.0;
+        let force = mass * an * G0_FT_S2;
+        let per_sin_alpha = force / (qbar * aircraft.wing_area_ft2 * (alpha_deg * RAD).sin());
+        let is_lifting = (LEAST_ALPHA_DEG..90.0).contains(&alpha_deg);
+        (is_flying && is_lifting && per_sin_alpha.is_finite()).then_some(BlockLift {
+            block,
+            alpha_deg,
+            per_sin_alpha,
+        })
+    };
+    (0..blocks.count).filter_map(lift)
 }
 
 /// Unit of mass, other than the stated one, in which a record would have the most usual lift.

@@ -55,7 +55,8 @@ fn nothing_but_noise(blocks: &BlockMeans) -> Option<String> {
 }
 
 fn unchanged_in_a_climb(blocks: &BlockMeans) -> Option<String> {
-    let altitudes = (0..blocks.count).map(|block| blocks.mean(signal::ALTITUDE, block));
+    let altitudes = blocks.means_of(signal::ALTITUDE);
+    let altitudes = (0..blocks.count).map(|block| altitudes.mean(block));
     let (low, high) = altitudes
         .filter(|altitude| *altitude < LOWER_STRATOSPHERE_FT)
         .fold(

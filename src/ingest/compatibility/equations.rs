@@ -18,7 +18,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use super::parameters::{INPUTS, OUTPUTS, input, output};
 use crate::aircraft::{Aircraft, Flow, Position};
 use crate::dynamics::lever;
-use crate::earth::{Air, air};
+use crate::earth::{Air, air, air_gradients};
 use crate::numerics::trig::sin_cos;
 use crate::units::DEG;
 
@@ -344,10 +344,6 @@ pub fn reading_slopes(
     ReadingSlopes { by_state, by_rates }
 }
 
-/// Half the altitude difference over which the slopes of the atmosphere are taken, ft: short against
-/// its layers, long against rounding.
-const SLOPE_REACH_FT: f64 = 5.0;
-
 /// Air at an altitude with its slopes per ft.
 struct AirWithSlopes {
     density: f64,
@@ -357,17 +353,15 @@ struct AirWithSlopes {
 }
 
 impl AirWithSlopes {
+    /// A temperature ratio changes no relative slope.
     fn at(altitude_ft: f64, temperature_ratio: f64) -> AirWithSlopes {
-        let air = |altitude_ft: f64| air_at(altitude_ft, temperature_ratio);
-        let here = air(altitude_ft);
-        let up = air(altitude_ft + SLOPE_REACH_FT);
-        let down = air(altitude_ft - SLOPE_REACH_FT);
-        let span_ft = 2.0 * SLOPE_REACH_FT;
+        let here = air_at(altitude_ft, temperature_ratio);
+        let gradients = air_gradients(altitude_ft);
         AirWithSlopes {
             density: here.density_slug_ft3,
-            density_slope: (up.density_slug_ft3 - down.density_slug_ft3) / span_ft,
+            density_slope: here.density_slug_ft3 * gradients.density,
             sound: here.sound_ft_s,
-            sound_slope: (up.sound_ft_s - down.sound_ft_s) / span_ft,
+            sound_slope: here.sound_ft_s * gradients.sound,
         }
     }
 }

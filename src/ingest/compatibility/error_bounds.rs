@@ -123,12 +123,18 @@ impl JointState<'_> {
 /// down). A relative error of the former looks like an error of the accelerometer's scale
 /// multiplied by this ratio.
 fn turning_over_force(windows: &[Window]) -> [f64; 3] {
-    std::array::from_fn(|i| {
-        let input = input::FORWARD + i;
-        let turning = swings(windows, |w, k| w.turning(k)[i]);
-        let force = swings(windows, |w, k| {
-            input_factor(input) * w.inputs[input][w.margin + k]
-        });
+    let mut swings = [[0.0; 2]; 3];
+    for window in windows {
+        let turns: Vec<_> = (0..window.samples).map(|k| window.turning(k)).collect();
+        for (i, [turning, force]) in swings.iter_mut().enumerate() {
+            let input = input::FORWARD + i;
+            let forces = window.inputs[input][window.margin..].iter();
+            let forces = forces.take(window.samples);
+            *turning += swing(turns.iter().map(|turn| turn[i]));
+            *force += swing(forces.map(|force| input_factor(input) * force));
+        }
+    }
+    swings.map(|[turning, force]| {
         if force > 0.0 {
             (turning / force).sqrt()
         } else {
@@ -137,12 +143,8 @@ fn turning_over_force(windows: &[Window]) -> [f64; 3] {
     })
 }
 
-/// Sum over windows of the squared deviations of a quantity from its mean in the window.
-fn swings(windows: &[Window], value: impl Fn(&Window, usize) -> f64) -> f64 {
-    let of_window = |window: &Window| {
-        let values = (0..window.samples).map(|k| value(window, k));
-        let finite: Vec<f64> = values.filter(|v| v.is_finite()).collect();
-        squares_about_mean(&finite)
-    };
-    windows.iter().map(of_window).sum()
+/// Sum of the squared deviations of a quantity from its mean in a window.
+fn swing(values: impl Iterator<Item = f64>) -> f64 {
+    let finite: Vec<f64> = values.filter(|v| v.is_finite()).collect();
+    squares_about_mean(&finite)
 }

@@ -41,12 +41,12 @@
 
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixViewMut, DVector, Dyn, U1};
 use pulp::Arch;
 
 use super::equations::STATES;
 use super::parameters::{INPUTS, KINDS, Kind, OUTPUTS, PARAMETERS, Parameters, place};
-use super::reconstruction::{DRIVING, ROW, Row};
+use super::reconstruction::{DRIVING, LOCAL, ROW, Row};
 use super::window::{Window, input_factor};
 use super::window_sums::{ALL, LinearisedWindow, ReducedInformation, place_among_all};
 use crate::numerics::symmetric;
@@ -77,7 +77,8 @@ pub fn score_covariance(
         let mut own = scores.columns_mut(INPUTS * block, INPUTS);
         own.gemm(1.0, &by_start, moves, 0.0);
     }
-    let mut scores = information.eliminated(&scores);
+    information.eliminate(&mut scores);
+    let mut scores = scores.rows_mut(LOCAL, PARAMETERS);
     make_consistent(&mut scores, window, &information.shared);
     Some(&scores * scores.transpose())
 }
@@ -99,7 +100,11 @@ fn sum_later(products: &mut DMatrix<f64>) {
 /// Corrects the scores of all blocks so that their sum for constant noise is exactly the score H b of
 /// a bias b. Blocks approximate the sum; without the correction, combinations of parameters with
 /// almost no information would seem to separate noise from bias.
-fn make_consistent(scores: &mut DMatrix<f64>, window: &Window, information: &DMatrix<f64>) {
+fn make_consistent(
+    scores: &mut DMatrixViewMut<f64, U1, Dyn>,
+    window: &Window,
+    information: &DMatrix<f64>,
+) {
     let length = block_length(window);
     let samples = |block: usize| length.min(window.samples - block * length) as f64;
     let mut lacking = DMatrix::from_fn(PARAMETERS, INPUTS, |j, input| {

@@ -10,7 +10,7 @@
 
 use rayon::prelude::*;
 
-use super::joint_state::{JointState, Posterior, kind_of};
+use super::joint_state::{JointState, Posterior, SETTLED, kind_of};
 use super::parameters::{
     ALL_KINDS, INPUTS, INSTRUMENTS, PARAMETERS, Parameters, is_observable, output, place,
 };
@@ -104,6 +104,7 @@ pub fn fit(
             state.prior[j] = settings.ordinary.of_parameter(j);
         }
         state.settle()?;
+        state.count_input_noise();
         posterior = state.posterior()?;
         bounds = state.bounds(windows)?;
     }
@@ -148,13 +149,16 @@ fn estimated(windows: &[Window]) -> [bool; PARAMETERS] {
 /// that is certainly larger than ordinary.
 fn reweight(state: &mut JointState) -> Option<()> {
     for round in 0..ROUNDS {
-        let steps = state.settle()?;
-        if round >= LEAST_ROUNDS && steps == 1 {
+        let largest = state.settle()?;
+        // Nothing reads the evidence of a round that keeps the wide prior.
+        if round + 1 < WIDE_ROUNDS {
+            continue;
+        }
+        state.count_input_noise();
+        if round >= LEAST_ROUNDS && largest < SETTLED {
             break;
         }
-        if round + 1 >= WIDE_ROUNDS {
-            state.prior = reweighted_prior(state)?;
-        }
+        state.prior = reweighted_prior(state)?;
     }
     Some(())
 }
@@ -182,6 +186,7 @@ fn free_surest(state: &mut JointState) -> Option<()> {
         };
         state.prior[j] = prior;
         state.settle()?;
+        state.count_input_noise();
     }
     Some(())
 }

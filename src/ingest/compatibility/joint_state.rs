@@ -14,10 +14,6 @@ use super::settings::Compatibility;
 use super::window_fit::{FitContext, WindowFit};
 use crate::numerics::symmetric;
 
-/// Largest number of Gauss-Newton steps between two estimates of R: more would converge for weights
-/// that change anyway.
-const STEPS: usize = 2;
-
 /// Largest number of halvings of a step that raises the cost; after them the step is dropped. A Gauss-Newton
 /// step that raises the cost at 1/32 of its length is wrong in its direction, and not in its length.
 const HALVINGS: usize = 5;
@@ -26,12 +22,13 @@ const HALVINGS: usize = 5;
 /// interpolated sensitivities is not exact, so its last steps may raise the cost by this amount.
 const LEAST_RISE: f64 = 0.01;
 
-/// Largest move of a parameter, as a share of its bound, at which the fit is settled.
-const SETTLED: f64 = 0.05;
+/// Largest move of a parameter, as a share of its bound, at which the fit is settled. Such a step is not
+/// taken: the estimates are computed to first order about the parameters, and contain it.
+pub const SETTLED: f64 = 0.1;
 
 /// Largest move of a parameter, as a share of its bound, for which the sensitivities remain usable:
-/// they change with the motion, which a move of one bound hardly changes.
-const LINEAR: f64 = 1.0;
+/// they change with the motion, which a move of two bounds hardly changes.
+const LINEAR: f64 = 2.0;
 
 /// Standard deviation of the delays' weighted mean, s: a tenth of the error of the equations'
 /// timing, so that the mean does not move.
@@ -87,20 +84,27 @@ impl JointState<'_> {
             .fold(zero, |sum, window| sum + window.information())
     }
 
-    /// Takes steps until the parameters settle, then estimates R anew. Returns the number of steps.
-    pub fn settle(&mut self) -> Option<usize> {
-        let mut steps = 0;
-        while steps < STEPS {
-            steps += 1;
-            if self.step()? < SETTLED {
-                break;
-            }
+    /// Takes a step, and a second one where the first has left the range of the sensitivities, then
+    /// estimates R anew: more steps would converge for weights that change anyway. Returns the largest
+    /// move of the first step over its bound.
+    pub fn settle(&mut self) -> Option<f64> {
+        let largest = self.step()?;
+        if largest > LINEAR {
+            self.step()?;
         }
         let context = &self.context;
         self.windows
             .par_iter_mut()
             .for_each(|window| window.reweigh(context));
-        Some(steps)
+        Some(largest)
+    }
+
+    /// Counts the inputs' noise in the evidence of the windows.
+    pub fn count_input_noise(&mut self) {
+        let context = &self.context;
+        self.windows
+            .par_iter_mut()
+            .for_each(|window| window.count_input_noise(context));
     }
 
     /// Estimates of the shared parameters from the windows' evidence, to first order about the present
@@ -135,11 +139,15 @@ impl JointState<'_> {
         })
     }
 
-    /// Takes one step of all parameters. Returns the largest move of a shared one over its bound;
-    /// zero if no fraction of the step lowers the cost.
+    /// Takes one step of all parameters, unless they are settled. Returns the largest move of a shared
+    /// one over its bound; zero if no fraction of the step lowers the cost.
     fn step(&mut self) -> Option<f64> {
         let inverse = self.inverse(&self.information())?;
         let step = &inverse * self.gradient();
+        let largest = self.largest_move(&self.moved(&step, 1.0), &inverse);
+        if largest < SETTLED {
+            return Some(largest);
+        }
         let cost = self.cost(&self.windows, &self.shared);
         let mut share = 1.0;
         for _ in 0..=HALVINGS {

@@ -275,7 +275,7 @@ impl Linearisation<'_> {
             let by_state = &linearised[POINT[stage]].slopes.by_state;
             for i in 0..STATES {
                 for lane in (0..WIDE).step_by(SIDE_BY_SIDE * S::F64_LANES) {
-                    let mut slope = Sum::<S>::of(&forcing[POINT[stage]][i], lane);
+                    let mut slope = Sum::<S>::of(simd, &forcing[POINT[stage]][i], lane);
                     for &j in equations::RATES_BY_STATE[i] {
                         slope.add(simd, by_state[(i, j)], &at[j]);
                     }
@@ -315,7 +315,7 @@ impl Linearisation<'_> {
                 }
             }
             for lane in (0..WIDE).step_by(SIDE_BY_SIDE * S::F64_LANES) {
-                let mut slope = Sum::<S>::of(&rows[o], lane);
+                let mut slope = Sum::<S>::of(simd, &rows[o], lane);
                 for &i in equations::READINGS_BY_STATE[o] {
                     slope.add(simd, gain * at.by_state[(o, i)], &s[i]);
                 }
@@ -383,11 +383,12 @@ struct Sum<S: Simd> {
 impl<S: Simd> Sum<S> {
     /// Sum that begins with a row.
     #[inline(always)]
-    fn of(row: &Row, first: usize) -> Self {
-        Sum {
-            first,
-            lanes: std::array::from_fn(|n| load::<S>(row, first + n * S::F64_LANES)),
+    fn of(simd: S, row: &Row, first: usize) -> Self {
+        let mut lanes = [simd.splat_f64s(0.0); SIDE_BY_SIDE];
+        for n in 0..SIDE_BY_SIDE {
+            lanes[n] = load::<S>(row, first + n * S::F64_LANES);
         }
+        Sum { first, lanes }
     }
 
     #[inline(always)]

@@ -69,7 +69,8 @@ pub struct WindowFit<'a> {
     pub gradient: DVector<f64>,
     /// Twice the cost.
     pub cost: f64,
-    /// Information and gradient with the noise of the inputs counted; set by [`WindowFit::reweigh`].
+    /// Information and gradient with the noise of the inputs counted; set by
+    /// [`WindowFit::count_input_noise`].
     pub evidence: Arc<(DMatrix<f64>, DVector<f64>)>,
     input_noise: Arc<InputNoise>,
 }
@@ -237,11 +238,10 @@ impl<'a> WindowFit<'a> {
             self.variances[output] = level.max(least * least);
         }
         self.weigh(context);
-        self.count_input_noise(context);
     }
 
     /// Computes the evidence. A window whose own parameters are not determined has none.
-    fn count_input_noise(&mut self, context: &FitContext) {
+    pub fn count_input_noise(&mut self, context: &FitContext) {
         if !self.input_noise.serves(&self.variances) {
             let covariance = self.input_noise_covariance();
             self.input_noise = Arc::new(InputNoise {
@@ -261,15 +261,14 @@ impl<'a> WindowFit<'a> {
     /// Sums of squares of an output's slow residuals, of its reconstructed motion and of the motion's rate.
     pub fn residuals_and_motion(&self, context: &FitContext, output: usize) -> Squares {
         let measured = &self.window.outputs[output];
-        let counted = context
-            .compared(self.window)
-            .filter(|k| measured[*k].is_finite());
-        let (residuals, motion): (Vec<f64>, Vec<f64>) = counted
-            .map(|k| {
-                let residual = self.comparison.residuals[output][k];
-                (residual, measured[k] - residual)
-            })
-            .unzip();
+        let samples = context.compared(self.window);
+        let mut residuals = Vec::with_capacity(samples.len());
+        let mut motion = Vec::with_capacity(samples.len());
+        for k in samples.filter(|k| measured[*k].is_finite()) {
+            let residual = self.comparison.residuals[output][k];
+            residuals.push(residual);
+            motion.push(measured[k] - residual);
+        }
         let rate = |w: &[f64]| (w[1] - w[0]) / self.window.step_s;
         Squares {
             residuals: slow_squares(&residuals),

@@ -16,7 +16,7 @@ use super::reconstruction::{LOCAL, Path, PathSensitivities, ROW, Row, WIDE, shar
 use super::window::Window;
 use crate::flight::interpolation_kernel::InterpolationKernel;
 use crate::numerics::row_products::StridedRows;
-use crate::numerics::simd::{AlignedBuffer, VECTOR};
+use crate::numerics::simd::{AlignedBuffer, VECTOR, load, store};
 
 /// Rows of an output that are summed together: they stay in the processor's first cache.
 const CHUNK: usize = 16;
@@ -41,8 +41,33 @@ pub struct Comparison {
     pub squares: [f64; OUTPUTS],
     /// Residuals, distributed over the nodes.
     sums: [Vec<f64>; OUTPUTS],
-    /// Numbers of samples, distributed over the nodes.
-    counts: [Vec<f64>; OUTPUTS],
+    distribution: NodeDistribution,
+}
+
+/// Distribution of a window's samples over the nodes around them.
+#[derive(Clone, Debug)]
+struct NodeDistribution {
+    nodes: usize,
+    samples_per_node: usize,
+    /// Samples that are compared.
+    samples: Range<usize>,
+    /// Samples by which each output was measured earlier.
+    late: [f64; OUTPUTS],
+}
+
+impl NodeDistribution {
+    /// Sums over the nodes of values at the samples of an output.
+    fn sums(&self, output: usize, value: impl Fn(usize) -> f64) -> Vec<f64> {
+        let (mut sums, mut values) = (vec![0.0; self.nodes], Vec::new());
+        for phase in phases(self.samples_per_node, self.late[output], &self.samples) {
+            values.clear();
+            values.extend(phase.samples().map(&value));
+            phase
+                .kernel
+                .share_out(phase.points.start, &values, &mut sums);
+        }
+        sums
+    }
 }
 
 /// Samples at the same distance after points that are `spacing` samples apart.
@@ -85,18 +110,23 @@ impl Comparison {
         shared: &Parameters,
         samples: &Range<usize>,
     ) -> Comparison {
-        let zeros = || std::array::from_fn(|_| vec![0.0; window.nodes()]);
+        let errors: [_; OUTPUTS] = std::array::from_fn(|output| {
+            ALL_KINDS.map(|kind| shared[place(INPUTS + output, kind)])
+        });
         let mut comparison = Comparison {
             residuals: std::array::from_fn(|_| vec![f64::NAN; window.samples]),
             squares: [0.0; OUTPUTS],
-            sums: zeros(),
-            counts: zeros(),
+            sums: std::array::from_fn(|_| Vec::new()),
+            distribution: NodeDistribution {
+                nodes: window.nodes(),
+                samples_per_node: window.samples_per_node(),
+                samples: samples.clone(),
+                late: errors.map(|error| error[Kind::Delay as usize] / window.step_s),
+            },
         };
-        for output in 0..OUTPUTS {
-            let error = ALL_KINDS.map(|kind| shared[place(INPUTS + output, kind)]);
+        for (output, error) in errors.into_iter().enumerate() {
             comparison.compare(output, window, &path.readings[output], error, samples);
-            let late = error[Kind::Delay as usize] / window.step_s;
-            comparison.share_out(output, window.samples_per_node(), late, samples);
+            comparison.share_out(output);
         }
         comparison
     }
@@ -124,42 +154,59 @@ impl Comparison {
     }
 
     /// Distributes the residuals of an output over the nodes.
-    fn share_out(&mut self, output: usize, spacing: usize, late: f64, samples: &Range<usize>) {
+    fn share_out(&mut self, output: usize) {
         let residuals = &self.residuals[output];
-        let (mut values, mut counted) = (Vec::new(), Vec::new());
-        for phase in phases(spacing, late, samples) {
-            values.clear();
-            counted.clear();
-            for residual in phase.samples().map(|k| residuals[k]) {
-                let counts = residual.is_finite();
-                let value = if counts { residual } else { 0.0 };
-                self.squares[output] += value * value;
-                values.push(value);
-                counted.push(f64::from(u8::from(counts)));
+        let counted = |k: usize| {
+            if residuals[k].is_finite() {
+                residuals[k]
+            } else {
+                0.0
             }
-            let first = phase.points.start;
-            phase
-                .kernel
-                .share_out(first, &values, &mut self.sums[output]);
-            phase
-                .kernel
-                .share_out(first, &counted, &mut self.counts[output]);
-        }
+        };
+        let samples = self.distribution.samples.clone();
+        self.squares[output] = samples.map(|k| counted(k).powi(2)).sum();
+        self.sums[output] = self.distribution.sums(output, counted);
+    }
+
+    /// Numbers of an output's samples that count, distributed over the nodes.
+    fn counts(&self, output: usize) -> Vec<f64> {
+        let residuals = &self.residuals[output];
+        self.distribution
+            .sums(output, |k| f64::from(u8::from(residuals[k].is_finite())))
     }
 
     /// Σ s v of each output, s its sensitivities.
     pub fn gradients(&self, sensitivities: &PathSensitivities) -> [Row; OUTPUTS] {
+        Arch::new().dispatch(Gradients {
+            rows: &sensitivities.rows,
+            residuals: &self.sums,
+        })
+    }
+}
+
+/// Sums of the sensitivities of each output times its residuals.
+struct Gradients<'a> {
+    rows: &'a [[Row; OUTPUTS]],
+    residuals: &'a [Vec<f64>; OUTPUTS],
+}
+
+impl WithSimd for Gradients<'_> {
+    type Output = [Row; OUTPUTS];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> [Row; OUTPUTS] {
         let mut gradients = [[0.0; WIDE]; OUTPUTS];
-        Arch::new().dispatch(|| {
-            for (node, rows) in sensitivities.rows.iter().enumerate() {
-                for (output, row) in rows.iter().enumerate() {
-                    let residual = self.sums[output][node];
-                    for (sum, slope) in gradients[output].iter_mut().zip(row) {
-                        *sum += residual * slope;
-                    }
+        for (node, rows) in self.rows.iter().enumerate() {
+            for (output, row) in rows.iter().enumerate() {
+                let residual = simd.splat_f64s(self.residuals[output][node]);
+                let sum = &mut gradients[output];
+                for lane in (0..WIDE).step_by(S::F64_LANES) {
+                    let so_far = load::<S>(sum, lane);
+                    let sum_now = simd.mul_add_f64s(residual, load::<S>(row, lane), so_far);
+                    store::<S>(sum, lane, sum_now);
                 }
             }
-        });
+        }
         gradients
     }
 }
@@ -178,14 +225,14 @@ pub struct LinearisedWindow {
 impl LinearisedWindow {
     pub fn of(sensitivities: PathSensitivities, comparison: &Comparison) -> LinearisedWindow {
         let mut rows = AlignedBuffer::zeros(sensitivities.rows.len() * WIDE);
+        let counts: [_; OUTPUTS] = std::array::from_fn(|output| comparison.counts(output));
         let products = |output: usize| {
             let mut filled = 0;
-            let counts = comparison.counts[output].iter();
             // Beyond the first and the last sample the weights are negative and next to nothing.
             for (own, count) in sensitivities
                 .rows
                 .iter()
-                .zip(counts)
+                .zip(&counts[output])
                 .filter(|(_, c)| **c > 0.0)
             {
                 let root = count.sqrt();
@@ -204,7 +251,7 @@ impl LinearisedWindow {
         };
         LinearisedWindow {
             products: (0..OUTPUTS).map(products).collect(),
-            counts: comparison.counts.clone(),
+            counts,
             sensitivities,
         }
     }
@@ -265,13 +312,12 @@ impl ReducedInformation {
         })
     }
 
-    /// Scores on the shared parameters, from scores on all, one a column.
-    pub fn eliminated(&self, scores: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut shared = scores.rows(LOCAL, PARAMETERS).into_owned();
+    /// Eliminates the own parameters from scores on all, one a column: changes the rows of the shared ones.
+    pub fn eliminate(&self, scores: &mut DMatrix<f64>) {
+        let (own, mut shared) = scores.rows_range_pair_mut(0..LOCAL, LOCAL..ALL);
         // Products with a transposed matrix are dots, element by element.
         let followed = self.following.transpose();
-        shared.gemm(-1.0, &followed, &scores.rows(0, LOCAL), 1.0);
-        shared
+        shared.gemm(-1.0, &followed, &own, 1.0);
     }
 
     /// Gradient on the shared parameters, from that on all.

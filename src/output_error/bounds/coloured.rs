@@ -115,15 +115,15 @@ pub fn residual_noise(inverse: &DMatrix<f64>, outputs: &[BlockSeries]) -> Residu
 /// the mean square of the values. Values that are NaN do not count.
 #[must_use]
 pub fn slow_noise_level(values: &[f64], step_s: f64) -> f64 {
-    let counted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
-    let square = counted.iter().map(|v| v * v).sum::<f64>();
+    let counted = || values.iter().filter(|v| v.is_finite());
+    let square = counted().map(|v| v * v).sum::<f64>();
     let sums_of = |samples: Range<usize>, _: &mut [f64]| finite_sums(&values[samples]);
     let no_parameter = DMatrix::zeros(1, 1);
     let series = BlockSeries::new(step_s, 1.0, values.len(), square, &no_parameter, sums_of);
     let pairs = series.pairs();
     let slow = Autoregression::fitted(&series.autocovariances(&pairs), pairs[0]);
     let level = slow.long_run_variance() * series.block_length;
-    level.max(square / (counted.len() as f64).max(1.0))
+    level.max(square / (counted().count() as f64).max(1.0))
 }
 
 /// Gain in log-likelihood, in nats, of an autoregressive process over white noise as the description

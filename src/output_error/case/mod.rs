@@ -101,8 +101,8 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         )
     }
 
-    /// Prepares the same maneuver as another recorder would have recorded it. `windows` are the
-    /// window of this case and the window of the other recorder.
+    /// Prepares the same maneuver as another recorder would have recorded it, for passes alone. `windows`
+    /// are the window of this case and the window of the other recorder.
     #[must_use]
     pub fn as_recorded(
         &self,
@@ -112,12 +112,12 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         model: &Model,
     ) -> Self {
         let [own, window] = windows;
-        if window.shares_motion_with(own) {
-            let motion = Arc::clone(&self.motion);
-            Case::of_motion(motion, aircraft, window, measurements, model)
+        let motion = if window.shares_motion_with(own) {
+            Arc::clone(&self.motion)
         } else {
-            Case::new(aircraft, window, measurements, model)
-        }
+            Arc::new(PreparedMotion::for_passes(aircraft, window))
+        };
+        Case::of_motion(motion, aircraft, window, measurements, model)
     }
 
     fn of_motion(

@@ -26,7 +26,7 @@ pub(crate) struct PreparedMotion<const NX: usize, E: Equations<NX>> {
     pub sensor_inputs: Vec<E::SensorInputs>,
     /// Measured states at every sample.
     pub states: Vec<SVector<f64, NX>>,
-    /// Coefficients that the motion implies at every sample.
+    /// Coefficients that the motion implies at every sample; none in a motion for passes alone.
     pub implied: Vec<[f64; COEFFICIENTS]>,
     /// The implied coefficients without their part that is proportional to the angular
     /// accelerations.
@@ -35,18 +35,30 @@ pub(crate) struct PreparedMotion<const NX: usize, E: Equations<NX>> {
 
 impl<const NX: usize, E: Equations<NX>> PreparedMotion<NX, E> {
     pub fn new(aircraft: &Aircraft, window: &Window) -> Self {
+        Self::prepare(aircraft, window, true)
+    }
+
+    /// Motion for passes alone. Only equation error reads the implied coefficients, which take as long as
+    /// the rest.
+    pub fn for_passes(aircraft: &Aircraft, window: &Window) -> Self {
+        Self::prepare(aircraft, window, false)
+    }
+
+    fn prepare(aircraft: &Aircraft, window: &Window, with_implied: bool) -> Self {
         let (points, samples) = (window.len(), window.samples);
+        let implied = if with_implied { samples } else { 0 };
         let mut prepared = PreparedMotion {
             rate_inputs: Vec::with_capacity(points + 2 * WIDEST_STRIDE),
             flow: Vec::with_capacity(points),
             sensor_inputs: Vec::with_capacity(samples),
             states: Vec::with_capacity(samples),
-            implied: Vec::with_capacity(samples),
-            implied_without_accelerations: Vec::with_capacity(samples),
+            implied: Vec::with_capacity(implied),
+            implied_without_accelerations: Vec::with_capacity(implied),
         };
         Arch::new().dispatch(Preparation {
             aircraft,
             window,
+            with_implied,
             prepared: &mut prepared,
         });
         // A step reads three points, also the one that begins at the last sample.
@@ -61,6 +73,7 @@ impl<const NX: usize, E: Equations<NX>> PreparedMotion<NX, E> {
 struct Preparation<'a, const NX: usize, E: Equations<NX>> {
     aircraft: &'a Aircraft,
     window: &'a Window,
+    with_implied: bool,
     prepared: &'a mut PreparedMotion<NX, E>,
 }
 
@@ -72,6 +85,7 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Preparation<'_, NX, E> {
         let Preparation {
             aircraft,
             window,
+            with_implied,
             prepared,
         } = self;
         let measured = window.motion(aircraft);
@@ -83,6 +97,8 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Preparation<'_, NX, E> {
                 let sensors = E::sensor_inputs(aircraft, &motion);
                 prepared.sensor_inputs.push(sensors);
                 prepared.states.push(E::measured_state(&motion));
+            }
+            if with_implied && point % 2 == 0 {
                 let implied = E::implied_coefficients(aircraft, &motion, &inputs);
                 prepared.implied.push(implied);
                 let rest = measured.without_angular_accelerations(point);
