@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::conditioner::{ChannelStatistics, LARGEST};
 use crate::error::Problem;
-use crate::flight::{Channel, signal};
+use crate::flight::{Channel, Mark, signal};
 use crate::ingest::clock::Clock;
 use crate::ingest::column_source::ColumnSource;
 use crate::ingest::context::Context;
@@ -219,6 +219,24 @@ pub fn sparse_channel(name: &str, channel: &Channel, share: f64) -> Refusal {
         "channel `{name}` (signal `{}`) has a value in {:.1} % of the samples only, and is left out",
         channel.signal,
         100.0 * share
+    );
+    Refusal::of_channel(name, reason)
+}
+
+/// Report of a channel whose gaps a stand-in fills.
+pub fn channel_with_gaps(
+    name: &str,
+    channel: &Channel,
+    statistics: &ChannelStatistics,
+    clock: &Clock,
+) -> Refusal {
+    let seconds = |samples: usize| samples as f64 * clock.step_s;
+    let reason = format!(
+        "channel `{name}` (signal `{}`) has no value in {:.1} of {:.1} s. A stand-in takes its place in every maneuver \
+         that such a gap touches",
+        channel.signal,
+        seconds(statistics.count(Mark::Missing)),
+        seconds(clock.samples),
     );
     Refusal::of_channel(name, reason)
 }
