@@ -10,7 +10,7 @@ use super::channel::{
     sparse_channel, stuck_channel, values_beyond,
 };
 use super::checks::{BlockAverager, FaultReport, Gusts, LiftPoint, lift_curve};
-use super::clock::Stretch;
+use super::clock::{Clock, Stretch};
 use super::compatibility::{ErrorEvidence, Findings, OnFault};
 use super::context::Context;
 use super::examination::{Examination, Outcome, PART_SAMPLES, RecordReader, RelationResult};
@@ -218,14 +218,19 @@ impl<'a> Recording<'a> {
         let left_out = left_out.into_iter();
         problems.extend(left_out.map(|one| one.into_problem(&stand_ins, flight_id)));
         let mean = |signal: &str| mean_value(signal, clock.samples, read);
-        let gaps = gap_stand_ins_of(&channels, &recorded, context, mean);
-        let filled = channels.iter().filter(|(_, channel, statistics)| {
-            let is_missing = statistics.count(Mark::Missing) > 0;
-            is_missing && gaps.iter().any(|(signal, _)| *signal == channel.signal)
-        });
+        let with_gaps: Vec<&ReadChannel> = channels
+            .iter()
+            .filter(|(_, channel, statistics)| {
+                gap_samples(statistics, clock) > 0 && is_recorded(&channel.signal)
+            })
+            .collect();
+        let gaps = gap_stand_ins_of(&with_gaps, &recorded, context, mean);
+        let filled = with_gaps
+            .iter()
+            .filter(|(_, channel, _)| gaps.iter().any(|(signal, _)| *signal == channel.signal));
         let named = filled.map(|(name, channel, statistics)| UnreadChannel {
             signal: channel.signal.as_str(),
-            refusal: channel_with_gaps(name, channel, statistics, clock),
+            refusal: channel_with_gaps(name, channel, gap_samples(statistics, clock), clock),
             is_absent: true,
         });
         problems.extend(named.map(|one| one.into_problem(&gaps, flight_id)));
@@ -240,26 +245,26 @@ impl<'a> Recording<'a> {
     }
 }
 
-/// Stand-ins in the gaps of recorded channels. A channel that is stuck has no value there.
+/// Number of samples in gaps of a channel, without those of lost frames, which all channels lack.
+fn gap_samples(statistics: &ChannelStatistics, clock: &Clock) -> usize {
+    let lost = clock.samples - clock.rows;
+    statistics.absent.saturating_sub(lost)
+}
+
+/// Stand-ins in the gaps of recorded channels.
 fn gap_stand_ins_of(
-    channels: &[ReadChannel],
+    with_gaps: &[&ReadChannel],
     recorded: &[String],
     context: &Context,
     mean: impl Fn(&str) -> Option<f64>,
 ) -> Vec<(String, StandIn)> {
-    let is_recorded = |signal: &str| recorded.iter().any(|name| name == signal);
-    let read = channels
+    let with_gaps = with_gaps
         .iter()
-        .filter(|(_, channel, _)| is_recorded(&channel.signal));
-    let with_gaps = read.filter(|(_, _, statistics)| {
-        statistics.count(Mark::Missing) + statistics.count(Mark::Stuck) > 0
-    });
-    let with_gaps: Vec<&str> = with_gaps
-        .map(|(_, channel, _)| channel.signal.as_str())
-        .collect();
+        .map(|(_, channel, _)| channel.signal.as_str());
+    let with_gaps: Vec<&str> = with_gaps.collect();
     let is_complete = |signal: &str| {
-        let is_whole = is_recorded(signal) && !with_gaps.contains(&signal);
-        is_whole || context.constants.contains_key(signal)
+        let is_recorded = recorded.iter().any(|name| name == signal);
+        is_recorded && !with_gaps.contains(&signal) || context.constants.contains_key(signal)
     };
     gap_stand_ins(&with_gaps, is_complete, mean)
 }

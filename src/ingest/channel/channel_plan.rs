@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::conditioner::{ChannelStatistics, LARGEST};
 use crate::error::Problem;
-use crate::flight::{Channel, Mark, signal};
+use crate::flight::{Channel, signal};
 use crate::ingest::clock::Clock;
 use crate::ingest::column_source::ColumnSource;
 use crate::ingest::context::Context;
@@ -227,7 +227,7 @@ pub fn sparse_channel(name: &str, channel: &Channel, share: f64) -> Refusal {
 pub fn channel_with_gaps(
     name: &str,
     channel: &Channel,
-    statistics: &ChannelStatistics,
+    gap_samples: usize,
     clock: &Clock,
 ) -> Refusal {
     let seconds = |samples: usize| samples as f64 * clock.step_s;
@@ -235,7 +235,7 @@ pub fn channel_with_gaps(
         "channel `{name}` (signal `{}`) has no value in {:.1} of {:.1} s. A stand-in takes its place in every maneuver \
          that such a gap touches",
         channel.signal,
-        seconds(statistics.count(Mark::Missing)),
+        seconds(gap_samples),
         seconds(clock.samples),
     );
     Refusal::of_channel(name, reason)
