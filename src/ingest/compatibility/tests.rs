@@ -1022,7 +1022,9 @@ fn an_error_of_one_output_moves_the_estimates_as_its_share_of_the_bounds_states(
     let error = 0.02;
     let mut scaled = record.clone();
     let beta = &mut scaled.signals.get_mut(s::BETA_VANE).unwrap().values;
-    beta.iter_mut().for_each(|value| *value *= 1.0 + error);
+    for value in beta.iter_mut() {
+        *value *= 1.0 + error;
+    }
     let [before, after] = [&record, &scaled].map(windows);
     let (before, after) = (fitted(&before), fitted(&after));
     let values = [&before, &after].map(|state| state.posterior().unwrap().values);
@@ -1033,7 +1035,6 @@ fn an_error_of_one_output_moves_the_estimates_as_its_share_of_the_bounds_states(
         let bound = inverse[(j, j)].sqrt();
         let moved = (values[1][j] - values[0][j]) / bound;
         let stated = error * moves[(j, source)] / bound;
-        println!("{j} {} {moved} {stated}", SIGNALS[j / 3]);
         assert!(
             (moved - stated).abs() < 0.1 + 0.1 * stated.abs(),
             "{} {}: {moved} of {stated}",
