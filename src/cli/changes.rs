@@ -12,6 +12,11 @@ pub const MOST_LISTED: usize = 10;
 pub fn print(night: &str, changes: &Changes) {
     let Some(since) = &changes.since else {
         out!("night {night} is the first complete one: there is none to compare it with");
+        print_list(
+            "instruments that changed over its flights",
+            &changes.instruments,
+            instrument,
+        );
         return;
     };
     if let Some(why) = &changes.not_compared {

@@ -1394,7 +1394,7 @@ fn numbers_that_no_campaign_has_are_refused_at_their_line() {
         ("alpha_step_deg: 5", "alpha_step_deg", "0.00001"),
         ("marked_share: 0.2", "marked_share", "20"),
         ("stick_lat_in: 1", "stick_lat_in", "0"),
-        ("standard_errors: 1", "standard_errors", "-1"),
+        ("standard_errors: 2", "standard_errors", "-2"),
         (
             "histories_at_alpha_deg: 30",
             "histories_at_alpha_deg",

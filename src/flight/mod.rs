@@ -15,7 +15,7 @@ pub use correction::Correction;
 pub use formula::Formula;
 pub use linear_table::LinearTable;
 pub use record::{Mark, Record};
-pub use stand_in::StandIn;
+pub use stand_in::{Completion, StandIn};
 
 /// `true` if an id is a flight's own or that of one of its stretches.
 #[must_use]

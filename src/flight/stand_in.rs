@@ -5,16 +5,19 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::record::{Record, Series};
+use super::record::{Mark, Record, Series};
 use super::signal as s;
 use crate::earth::air;
 use crate::numerics::bisection::last_that_holds;
+use crate::numerics::digits::rounded;
 
 /// Source of the values of a signal that is not recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum StandIn {
     /// One value throughout, in the signal's unit.
     Value(f64),
+    /// Mean of the recorded samples, in the signal's unit: for gaps of a signal that changes little.
+    Mean(f64),
     /// V over the speed of sound. The air is that of the standard atmosphere, with the recorded
     /// temperature where there is one, here and in the following.
     MachOfVelocity,
@@ -73,6 +76,12 @@ impl StandIn {
     pub fn in_words(self) -> String {
         match self {
             StandIn::Value(value) => format!("is taken as {value}"),
+            StandIn::Mean(value) => {
+                format!(
+                    "is taken as {}, its mean where it is recorded",
+                    rounded(value)
+                )
+            }
             StandIn::MachOfVelocity => "is computed from V in the standard atmosphere".to_owned(),
             StandIn::VelocityOfMach => "is computed from Mach and altitude".to_owned(),
             StandIn::VelocityOfPressure | StandIn::PressureOfVelocity => {
@@ -88,7 +97,7 @@ impl StandIn {
     #[must_use]
     pub fn sources(self) -> &'static [&'static str] {
         match self {
-            StandIn::Value(_) | StandIn::Absent => &[],
+            StandIn::Value(_) | StandIn::Mean(_) | StandIn::Absent => &[],
             StandIn::MachOfVelocity | StandIn::PressureOfVelocity => &[s::VELOCITY, s::ALTITUDE],
             StandIn::VelocityOfMach => &[s::MACH, s::ALTITUDE],
             StandIn::VelocityOfPressure => &[s::QBAR, s::ALTITUDE],
@@ -103,7 +112,7 @@ impl StandIn {
         let [a, b] = [0, 1].map(|i| sources.get(i).copied().unwrap_or(f64::NAN));
         let air = |altitude_ft: f64| air(altitude_ft).at_temperature(kelvin);
         match self {
-            StandIn::Value(value) => value,
+            StandIn::Value(value) | StandIn::Mean(value) => value,
             StandIn::MachOfVelocity => a / air(b).sound_ft_s,
             StandIn::VelocityOfMach => a * air(b).sound_ft_s,
             StandIn::VelocityOfPressure => (2.0 * a / air(b).density_slug_ft3).sqrt(),
@@ -120,24 +129,99 @@ impl StandIn {
             record.signals.remove(signal);
             return;
         }
-        let sources: Option<Vec<&[f64]>> = self
-            .sources()
-            .iter()
-            .map(|name| record.values(name))
-            .collect();
-        let Some(sources) = sources else {
+        if let Some(values) = self.values(record) {
+            record
+                .signals
+                .insert(signal.to_owned(), Series::assumed(values));
+        }
+    }
+
+    /// Puts the stand-in in the place of the samples of the signal without a value.
+    fn fill_gaps(self, signal: &str, record: &mut Record) {
+        if !has_gap(signal, record) {
+            return;
+        }
+        let Some(stand_in) = self.values(record) else {
             return;
         };
+        if let Some(series) = record.signals.get_mut(signal) {
+            let own = series.values.iter_mut().zip(&mut series.marks);
+            for ((value, mark), assumed) in own.zip(stand_in) {
+                if value.is_nan() && assumed.is_finite() {
+                    (*value, *mark) = (assumed, Mark::Assumed);
+                }
+            }
+        }
+    }
+
+    /// Values at all samples of a record; `None` if the record lacks a source.
+    fn values(self, record: &Record) -> Option<Vec<f64>> {
+        let sources = self.sources().iter().map(|name| record.values(name));
+        let sources: Vec<&[f64]> = sources.collect::<Option<_>>()?;
         let temperatures = record.values(s::AIR_TEMPERATURE);
         let value = |k: usize| {
             let at_sample: Vec<f64> = sources.iter().map(|values| values[k]).collect();
             let kelvin = temperatures.map_or(f64::NAN, |values| values[k]);
             self.value(&at_sample, kelvin)
         };
-        let values: Vec<f64> = (0..record.samples).map(value).collect();
-        record
-            .signals
-            .insert(signal.to_owned(), Series::assumed(values));
+        Some((0..record.samples).map(value).collect())
+    }
+}
+
+/// `true` for a signal of a record without a value at some sample.
+fn has_gap(signal: &str, record: &Record) -> bool {
+    let mut values = record.values(signal).into_iter().flatten();
+    values.any(|value| value.is_nan())
+}
+
+/// Part of a record in which a stand-in takes the place of a signal with gaps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GapExtent {
+    /// The samples without a value.
+    Samples,
+    /// The whole record that is read, as for a signal that is not recorded. A maneuver then has one
+    /// source of the signal throughout.
+    WholePart,
+}
+
+/// Stand-ins that complete the record of a flight.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Completion {
+    /// Stand-ins of the signals that the flight lacks, in the order in which they are computed.
+    pub stand_ins: Vec<(String, StandIn)>,
+    /// Stand-ins in the gaps of recorded signals, in the order in which they are computed.
+    pub gaps: Vec<(String, StandIn)>,
+}
+
+impl Completion {
+    /// Completes a record.
+    pub fn apply(&self, record: &mut Record, extent: GapExtent) {
+        let is_first = |signal: &str| FIRST.contains(&signal);
+        let fill_gaps = |record: &mut Record, first: bool| {
+            for (signal, stand_in) in self.gaps.iter().filter(|(s, _)| is_first(s) == first) {
+                match extent {
+                    GapExtent::Samples => stand_in.fill_gaps(signal, record),
+                    GapExtent::WholePart if has_gap(signal, record) => {
+                        stand_in.fill(signal, record);
+                    }
+                    GapExtent::WholePart => {}
+                }
+            }
+        };
+        fill_gaps(record, true);
+        for (signal, stand_in) in &self.stand_ins {
+            stand_in.fill(signal, record);
+        }
+        fill_gaps(record, false);
+    }
+
+    /// Signals from which the stand-ins are computed.
+    pub fn sources(&self) -> impl Iterator<Item = &'static str> {
+        let all = self.stand_ins.iter().chain(&self.gaps);
+        let sources = all.flat_map(|(_, stand_in)| stand_in.sources());
+        let is_any = !self.stand_ins.is_empty() || !self.gaps.is_empty();
+        let temperature = is_any.then_some(s::AIR_TEMPERATURE);
+        sources.copied().chain(temperature)
     }
 }
 
@@ -163,6 +247,44 @@ fn altitude_ft(density_slug_ft3: f64, kelvin: f64) -> f64 {
 
 /// Order in which stand-ins are computed: each after those that it may be computed from.
 const FIRST: [&str; 2] = [s::VELOCITY, s::ALTITUDE];
+
+/// Signals whose gaps a stand-in fills. The states and outputs of the equations of motion are not among
+/// them: a maneuver needs their measurements. Neither is the thrust: without it the constant of CA is
+/// another one than that of the flight's other maneuvers.
+const WITH_FILLED_GAPS: [&str; 7] = [
+    s::VELOCITY,
+    s::ALTITUDE,
+    s::MACH,
+    s::QBAR,
+    s::RPM_LEFT,
+    s::RPM_RIGHT,
+    s::IXZ,
+];
+
+/// Signals of [`WITH_FILLED_GAPS`] that change little within a flight, so that their mean is closer to them
+/// than the stand-in of a signal that is never recorded.
+const NEARLY_CONSTANT: [&str; 3] = [s::RPM_LEFT, s::RPM_RIGHT, s::IXZ];
+
+/// Stand-ins in the gaps of recorded signals, in the order in which they are computed. `is_complete` is
+/// `true` for a signal that is given as a constant or recorded without a gap; `mean` is that of the samples
+/// with a value.
+#[must_use]
+pub fn gap_stand_ins(
+    with_gaps: &[&str],
+    is_complete: impl Fn(&str) -> bool,
+    mean: impl Fn(&str) -> Option<f64>,
+) -> Vec<(String, StandIn)> {
+    let filled = WITH_FILLED_GAPS.iter().filter(|s| with_gaps.contains(s));
+    let stand_in = |signal: &&str| {
+        let stand_in = if NEARLY_CONSTANT.contains(signal) {
+            StandIn::Mean(mean(signal)?)
+        } else {
+            StandIn::of(signal, &is_complete)?
+        };
+        Some(((*signal).to_owned(), stand_in))
+    };
+    filled.filter_map(stand_in).collect()
+}
 
 /// Stand-ins of the required signals that a flight lacks, in the order in which they are computed.
 /// `has` is `true` for a signal that is recorded or given as a constant.
@@ -227,7 +349,6 @@ pub fn cost(signal: &str, has: impl Fn(&str) -> bool) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flight::Mark;
     use approx::assert_relative_eq;
 
     /// Test for the signals of a recorder that has all required ones except some.
@@ -330,6 +451,71 @@ mod tests {
             let value = record.values(lacking).unwrap()[1];
             assert_relative_eq!(value, truth, max_relative = 1e-3);
         }
+    }
+
+    /// Record of three samples whose last value of a signal is missing, and the completion for it.
+    fn with_gap(signal: &str) -> (Record, Completion) {
+        let mut record = record(&[(s::ALTITUDE, 25_000.0), (s::VELOCITY, 500.0), (signal, 0.5)]);
+        let series = record.signals.get_mut(signal).unwrap();
+        (series.values[2], series.marks[2]) = (f64::NAN, Mark::Missing);
+        let completion = Completion {
+            stand_ins: vec![],
+            gaps: gap_stand_ins(&[signal], all_but(&[signal]), |_| Some(0.75)),
+        };
+        (record, completion)
+    }
+
+    #[test]
+    fn a_gap_is_filled_sample_by_sample_and_in_a_maneuver_throughout() {
+        for (signal, assumed) in [(s::MACH, 500.0 / air(25_000.0).sound_ft_s), (s::IXZ, 0.75)] {
+            let (record, completion) = with_gap(signal);
+            let completed = |extent: GapExtent| {
+                let mut record = record.clone();
+                completion.apply(&mut record, extent);
+                record.signals[signal].clone()
+            };
+            let by_sample = completed(GapExtent::Samples);
+            assert_eq!(by_sample.values, [0.5, 0.5, assumed], "{signal}");
+            assert_eq!(
+                by_sample.marks,
+                [Mark::Measured, Mark::Measured, Mark::Assumed]
+            );
+            assert_eq!(
+                completed(GapExtent::WholePart),
+                Series::assumed(vec![assumed; 3])
+            );
+        }
+    }
+
+    #[test]
+    fn a_part_without_a_gap_keeps_what_was_recorded() {
+        let (mut record, completion) = with_gap(s::MACH);
+        record = record.cut(None, 0..2);
+        let before = record.clone();
+        completion.apply(&mut record, GapExtent::WholePart);
+        assert_eq!(record, before);
+    }
+
+    #[test]
+    fn gaps_of_states_and_of_signals_without_a_complete_source_stay() {
+        let stand_ins = |with_gaps: &[&str], incomplete: &[&str]| {
+            let stand_ins = gap_stand_ins(with_gaps, all_but(incomplete), |_| Some(-2000.0));
+            stand_ins.into_iter()
+        };
+        let needed = [s::THETA, s::AN, s::MASS, s::THRUST];
+        assert_eq!(stand_ins(&needed, &needed).count(), 0);
+        // Mach and V give each other.
+        let neither = [s::MACH, s::VELOCITY, s::QBAR];
+        assert_eq!(stand_ins(&[s::MACH, s::VELOCITY], &neither).count(), 0);
+        let both = [s::MACH, s::ALTITUDE];
+        let names: Vec<String> = stand_ins(&both, &both).map(|(name, _)| name).collect();
+        assert_eq!(names, [s::ALTITUDE, s::MACH]);
+        let inertia = stand_ins(&[s::IXZ], &[s::IXZ]).next().unwrap();
+        assert_eq!(inertia.1, StandIn::Mean(-2000.0));
+        assert_eq!(
+            inertia.1.in_words(),
+            "is taken as -2000, its mean where it is recorded"
+        );
     }
 
     #[test]

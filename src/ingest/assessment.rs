@@ -1,24 +1,25 @@
 //! Assessment of a stretch after all of its channels are read: counts, kinematic relations, gusts
 //! and instrument errors.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
 use super::channel::{
-    ChannelStatistics, ConditionedChannel, Signature, empty_channel, sparse_channel, stuck_channel,
-    values_beyond,
+    ChannelStatistics, ConditionedChannel, Signature, channel_with_gaps, empty_channel,
+    sparse_channel, stuck_channel, values_beyond,
 };
 use super::checks::{BlockAverager, FaultReport, Gusts, LiftPoint, lift_curve};
-use super::clock::Stretch;
+use super::clock::{Clock, Stretch};
 use super::compatibility::{ErrorEvidence, Findings, OnFault};
 use super::context::Context;
-use super::examination::{Examination, Outcome, RecordReader, RelationResult};
+use super::examination::{Examination, Outcome, PART_SAMPLES, RecordReader, RelationResult};
 use super::refusal::{Refusal, UnreadChannel};
 use super::settings::OnFailedCheck;
 use super::table_ends::held_throughout;
 use crate::error::Problem;
-use crate::flight::{Channel, Correction, Mark, StandIn, signal};
+use crate::flight::stand_in::gap_stand_ins;
+use crate::flight::{Channel, Completion, Correction, Mark, StandIn, signal};
 use crate::tables::{ChannelRow, ChannelVerdict, CheckRow, FlightRow, InstrumentRow};
 
 /// Results of ingest for one stretch, besides its record.
@@ -33,8 +34,8 @@ pub struct Assessment {
     pub error_evidence: Vec<ErrorEvidence>,
     /// Corrections that are applied to signals when the record is read.
     pub corrections: Vec<Correction>,
-    /// Stand-ins of the signals that the stretch lacks, in the order in which they are computed.
-    pub stand_ins: Vec<(String, StandIn)>,
+    /// Stand-ins of the signals that the stretch lacks, and in gaps of others.
+    pub completion: Completion,
     pub problems: Vec<Problem>,
     /// Normal force over angle of attack, for the comparison with the tunnel.
     pub lift: Vec<LiftPoint>,
@@ -55,13 +56,14 @@ pub fn assess(
     read: &RecordReader,
 ) -> Result<Assessment, Problem> {
     let flight_id = stretch.flight_id.as_str();
-    let mut recording = Recording::of(stretch, channels, context)?;
+    let mut recording = Recording::of(stretch, channels, context, read)?;
     let mut problems = std::mem::take(&mut recording.problems);
     let examination = Examination {
         clock: &stretch.clock,
         context,
         recorded: std::mem::take(&mut recording.recorded),
-        stand_ins: std::mem::take(&mut recording.stand_ins),
+        stand_ins: std::mem::take(&mut recording.completion.stand_ins),
+        gaps: std::mem::take(&mut recording.completion.gaps),
         read,
     };
     let blocks = examination.blocks(std::mem::take(&mut recording.block_means));
@@ -95,7 +97,7 @@ pub fn assess(
         corrections: findings.corrections(),
         problems,
         lift: lift_curve(&outcome.blocks, context.aircraft, &context.settings.checks),
-        stand_ins: outcome.stand_ins,
+        completion: outcome.completion,
         signature: recording.signature,
     })
 }
@@ -148,7 +150,7 @@ struct Recording<'a> {
     /// Signals with values.
     recorded: Vec<String>,
     problems: Vec<Problem>,
-    stand_ins: Vec<(String, StandIn)>,
+    completion: Completion,
     signature: Signature,
 }
 
@@ -157,6 +159,7 @@ impl<'a> Recording<'a> {
         stretch: &Stretch,
         conditioned: Vec<ConditionedChannel<'a>>,
         context: &Context,
+        read: &RecordReader,
     ) -> Result<Recording<'a>, Problem> {
         let (flight_id, clock) = (stretch.flight_id.as_str(), &stretch.clock);
         let (mut channels, mut problems, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
@@ -217,15 +220,70 @@ impl<'a> Recording<'a> {
         };
         let left_out = left_out.into_iter();
         problems.extend(left_out.map(|one| one.into_problem(&stand_ins, flight_id)));
+        let mean = |signal: &str| mean_value(signal, clock.samples, read);
+        let with_gaps: Vec<&ReadChannel> = channels
+            .iter()
+            .filter(|(_, channel, statistics)| {
+                gap_samples(statistics, clock) > 0 && is_recorded(&channel.signal)
+            })
+            .collect();
+        let gaps = gap_stand_ins_of(&with_gaps, &recorded, context, mean);
+        let filled = with_gaps
+            .iter()
+            .filter(|(_, channel, _)| gaps.iter().any(|(signal, _)| *signal == channel.signal));
+        let named = filled.map(|(name, channel, statistics)| UnreadChannel {
+            signal: channel.signal.as_str(),
+            refusal: channel_with_gaps(name, channel, gap_samples(statistics, clock), clock),
+            is_absent: true,
+        });
+        problems.extend(named.map(|one| one.into_problem(&gaps, flight_id)));
         Ok(Recording {
             channels,
             block_means,
             recorded,
             problems,
-            stand_ins,
+            completion: Completion { stand_ins, gaps },
             signature: Signature::of(signature_samples.into_iter()),
         })
     }
+}
+
+/// Number of samples in gaps of a channel, without those of lost frames, which all channels lack.
+fn gap_samples(statistics: &ChannelStatistics, clock: &Clock) -> usize {
+    let lost = clock.samples - clock.rows;
+    statistics.absent.saturating_sub(lost)
+}
+
+/// Stand-ins in the gaps of recorded channels.
+fn gap_stand_ins_of(
+    with_gaps: &[&ReadChannel],
+    recorded: &[String],
+    context: &Context,
+    mean: impl Fn(&str) -> Option<f64>,
+) -> Vec<(String, StandIn)> {
+    let with_gaps = with_gaps
+        .iter()
+        .map(|(_, channel, _)| channel.signal.as_str());
+    let with_gaps: Vec<&str> = with_gaps.collect();
+    let is_complete = |signal: &str| {
+        let is_recorded = recorded.iter().any(|name| name == signal);
+        is_recorded && !with_gaps.contains(&signal) || context.constants.contains_key(signal)
+    };
+    gap_stand_ins(&with_gaps, is_complete, mean)
+}
+
+/// Mean of the samples of a signal with a value; `None` without any.
+fn mean_value(signal: &str, samples: usize, read: &RecordReader) -> Option<f64> {
+    let signals = BTreeSet::from([signal.to_owned()]);
+    let (mut sum, mut count) = (0.0, 0_usize);
+    for first in (0..samples).step_by(PART_SAMPLES) {
+        let part = read(&signals, first..(first + PART_SAMPLES).min(samples))?;
+        for value in part.values(signal)?.iter().filter(|v| v.is_finite()) {
+            sum += value;
+            count += 1;
+        }
+    }
+    (count > 0).then(|| sum / count as f64)
 }
 
 /// Number of samples of a channel that have a value.

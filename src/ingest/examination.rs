@@ -14,12 +14,13 @@ use super::clock::Clock;
 use super::compatibility::{self, Findings};
 use super::context::Context;
 use super::refusal::Refusal;
-use crate::flight::{Record, StandIn, signal};
+use crate::flight::stand_in::GapExtent;
+use crate::flight::{Completion, Record, StandIn, signal};
 use crate::tables::{ChannelVerdict, CheckRow};
 
-/// Samples of a long record that are reconstructed at once: under an hour of a usual recorder, so
+/// Samples of a long record that are read at once: under an hour of a usual recorder, so
 /// that memory does not grow with the record.
-const PART_SAMPLES: usize = 1 << 17;
+pub const PART_SAMPLES: usize = 1 << 17;
 
 /// Reads signals of a record over a range of its samples; `None` if they cannot be read.
 pub type RecordReader<'a> = dyn Fn(&BTreeSet<String>, Range<usize>) -> Option<Record> + 'a;
@@ -32,6 +33,8 @@ pub struct Examination<'a> {
     /// Signals that come from channels.
     pub recorded: Vec<String>,
     pub stand_ins: Vec<(String, StandIn)>,
+    /// Stand-ins in the gaps of recorded signals.
+    pub gaps: Vec<(String, StandIn)>,
     pub read: &'a RecordReader<'a>,
 }
 
@@ -41,8 +44,9 @@ pub struct Outcome {
     pub findings: Findings,
     /// Channels that the stretch does without.
     pub left_out: Vec<LeftOut>,
-    /// Stand-ins of the signals that the stretch lacks, with those of the channels that are left out.
-    pub stand_ins: Vec<(String, StandIn)>,
+    /// Stand-ins of the signals that the stretch lacks, with those of the channels that are left out, and
+    /// in gaps of others.
+    pub completion: Completion,
     /// Block means of the channels that are not left out.
     pub blocks: BlockMeans,
 }
@@ -155,7 +159,7 @@ impl Examination<'_> {
             relations,
             findings,
             left_out: Vec::new(),
-            stand_ins: self.stand_ins.clone(),
+            completion: self.completion(),
             blocks,
         }
     }
@@ -390,18 +394,29 @@ impl Examination<'_> {
         }
     }
 
+    /// Stand-ins of the stretch. A signal that is left out has one throughout.
+    fn completion(&self) -> Completion {
+        let gaps = self
+            .gaps
+            .iter()
+            .filter(|(signal, _)| self.is_recorded(signal));
+        Completion {
+            stand_ins: self.stand_ins.clone(),
+            gaps: gaps.cloned().collect(),
+        }
+    }
+
     /// Estimates the instruments' errors by flight-path reconstruction, part by part of the
     /// record, each part after `correct`.
     fn reconstruct(&self, correct: impl Fn(&mut Record)) -> Findings {
         let samples = self.clock.samples;
         let count = samples.div_ceil(PART_SAMPLES);
         let signals = compatibility::signals();
+        let completion = self.completion();
         let parts = (0..count).filter_map(|i| {
             let range = i * PART_SAMPLES..((i + 1) * PART_SAMPLES).min(samples);
             let mut record = (self.read)(&signals, range)?;
-            for (signal, stand_in) in &self.stand_ins {
-                stand_in.fill(signal, &mut record);
-            }
+            completion.apply(&mut record, GapExtent::Samples);
             correct(&mut record);
             Some(record)
         });

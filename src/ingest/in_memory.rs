@@ -13,6 +13,7 @@ use super::settings::Settings;
 use crate::aircraft::Aircraft;
 use crate::error::Problem;
 use crate::flight::record::Series;
+use crate::flight::stand_in::GapExtent;
 use crate::flight::{Channel, RawFlight, Record};
 use crate::tables::{ChannelRow, CheckRow, FlightRow, InstrumentRow};
 
@@ -119,9 +120,7 @@ fn ingest_stretch(
     for correction in &assessment.corrections {
         correction.apply(&mut record);
     }
-    for (signal, stand_in) in &assessment.stand_ins {
-        stand_in.fill(signal, &mut record);
-    }
+    assessment.completion.apply(&mut record, GapExtent::Samples);
     let Assessment {
         flight,
         channels,

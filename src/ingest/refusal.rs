@@ -32,6 +32,12 @@ impl Refusal {
         };
         let cost = cost(signal, |other| stand_in_of(other).is_none());
         let consequence = match stand_in_of(signal) {
+            Some((name, stand_in @ StandIn::Mean(_))) => {
+                format!(
+                    "; `{name}` {}: its changes are left out",
+                    stand_in.in_words()
+                )
+            }
             Some((name, stand_in)) => format!("; `{name}` {}: {cost}", stand_in.in_words()),
             None if signal::OPTIONAL.contains(&signal) => format!("; {cost}"),
             None => String::new(),

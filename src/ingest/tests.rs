@@ -341,6 +341,71 @@ fn a_recorder_that_was_off_most_of_the_time_costs_no_channel() {
     assert!(ingested.record.is_recorded(signal::MACH));
 }
 
+/// A flight in which some channels end after most of the time.
+fn with_channels_that_end(names: &[&str]) -> Flight {
+    let mut flight = Flight::noisy();
+    for name in names {
+        flight.values(name)[CHANNEL_END..].fill(f64::NAN);
+    }
+    flight
+}
+
+/// First sample without a value of a channel that ends.
+const CHANNEL_END: usize = ROWS * 3 / 5;
+
+#[test]
+fn a_channel_that_ends_has_its_stand_in_from_there_on_and_one_problem() {
+    for name in ["mach", "altitude", "Ixz"] {
+        let whole = Flight::noisy().ingest().unwrap();
+        let flight = with_channels_that_end(&[name]);
+        let signal = flight.channels[name].signal.clone();
+        let ingested = flight.ingest().unwrap();
+        let [problem] = &ingested.problems[..] else {
+            panic!("{name}: {:?}", ingested.problems)
+        };
+        assert_eq!(problem.place, format!("channel `{name}`"));
+        assert_eq!(problem.stage, ProblemStage::Recording);
+        assert!(
+            problem.reason.contains("no value in 20.0 of 50.0 s"),
+            "{problem:?}"
+        );
+        let own = &ingested.record.signals[&signal];
+        let before = whole.record.values(&signal).unwrap();
+        assert_eq!(
+            own.values[..CHANNEL_END - 10],
+            before[..CHANNEL_END - 10],
+            "{name}"
+        );
+        for k in [CHANNEL_END, ROWS - 1] {
+            assert_eq!(own.marks[k], Mark::Assumed, "{name} at {k}");
+            assert_relative_eq!(own.values[k], before[k], max_relative = 0.05);
+        }
+    }
+}
+
+#[test]
+fn channels_that_end_together_are_computed_from_those_that_go_on() {
+    let ingested = with_channels_that_end(&["mach", "altitude"])
+        .ingest()
+        .unwrap();
+    let places: Vec<&str> = ingested.problems.iter().map(|p| p.place.as_str()).collect();
+    assert_eq!(places, ["channel `altitude`", "channel `mach`"]);
+    for signal in [signal::MACH, signal::ALTITUDE] {
+        let values = ingested.record.values(signal).unwrap();
+        assert!(values.iter().all(|v| v.is_finite()), "{signal}");
+    }
+    // Nothing stands for the angle of attack, and a state is not assumed in a gap.
+    let ingested = with_channels_that_end(&["alpha", "theta"])
+        .ingest()
+        .unwrap();
+    for signal in [signal::ALPHA_VANE, signal::THETA] {
+        assert!(
+            ingested.record.values(signal).unwrap()[ROWS - 1].is_nan(),
+            "{signal}"
+        );
+    }
+}
+
 /// A flight whose inertia about x is a table over fuel that burns from 300 kg to 100 kg.
 fn with_inertia_over(at: [f64; 2]) -> Flight {
     let mut flight = Flight::steady();
@@ -605,10 +670,9 @@ fn dropouts_spikes_and_lost_frames_are_repaired_marked_and_counted() {
         (velocity.marks[51], velocity.values[51]),
         (Mark::Bridged, 600.0)
     );
-    assert_eq!(
-        (velocity.marks[250], velocity.values[250].is_nan()),
-        (Mark::Missing, true)
-    );
+    // Computed from Mach and altitude.
+    assert_eq!(velocity.marks[250], Mark::Assumed);
+    assert_relative_eq!(velocity.values[250], 600.0, max_relative = 1e-3);
     assert_eq!(
         (velocity.marks[1000], velocity.values[1000]),
         (Mark::Despiked, 600.0)

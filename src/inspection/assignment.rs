@@ -48,6 +48,12 @@ const KINDS: [&[&str]; 6] = [
     &["deg", "deg/s"],
     &["rad", "rad/s"],
 ];
+/// Attitudes with their rates.
+const AXES: [(Quantity, Quantity); 3] = [
+    (Quantity::Theta, Quantity::Q),
+    (Quantity::Phi, Quantity::P),
+    (Quantity::Psi, Quantity::R),
+];
 /// Largest number of rounds of descent.
 const ROUNDS: usize = 60;
 
@@ -156,7 +162,7 @@ impl Search<'_> {
             for quantity in &missing {
                 trials = self.extended(&trials, *quantity);
             }
-            if missing.is_empty() || trials.is_empty() {
+            if missing.is_empty() || trials.is_empty() || lacks_axis(&missing, assignment) {
                 continue;
             }
             let fit = |trial: Assignment| Some((self.misfit(equation, &trial)?.ratio, trial));
@@ -200,11 +206,7 @@ impl Search<'_> {
     /// of the other, in the order in which the equations of all three attitudes hold best. Returns them if
     /// another order or other columns fit nearly as well.
     fn seed_rotation(&self, assignment: &mut Assignment) -> BTreeSet<Quantity> {
-        let pairs = [
-            (Quantity::Theta, Quantity::Q),
-            (Quantity::Phi, Quantity::P),
-            (Quantity::Psi, Quantity::R),
-        ];
+        let pairs = AXES;
         let rotation = pairs.iter().flat_map(|(a, b)| [a, b]);
         if rotation.clone().any(|q| assignment.contains_key(q)) {
             return BTreeSet::new();
@@ -220,9 +222,7 @@ impl Search<'_> {
                     trial.insert(*attitude, with_sign(angle, sign));
                     trial.insert(*rate, with_sign(velocity, sign));
                 }
-                let distinct: std::collections::BTreeSet<&String> =
-                    trial.values().map(|c| &c.column).collect();
-                if distinct.len() == trial.len() {
+                if columns(&trial).len() == trial.len() {
                     let changed = [Quantity::Theta, Quantity::Phi, Quantity::Psi];
                     ranked.push((self.physical_cost(&trial, &changed), trial));
                 }
@@ -230,6 +230,7 @@ impl Search<'_> {
         }
         ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
         let Some((cost, best)) = ranked.first() else {
+            self.seed_without_heading(&integrals, assignment);
             return BTreeSet::new();
         };
         let differs =
@@ -237,11 +238,52 @@ impl Search<'_> {
         let next = ranked.iter().find(|(_, trial)| differs(trial));
         let leads = next.is_none_or(|(next, _)| next - cost > ROTATION_LEAD);
         let is_plausible = self.all_hold(best);
-        if leads || is_plausible {
-            assignment.clone_from(best);
+        if !leads && !is_plausible {
+            self.seed_without_heading(&integrals, assignment);
+            return BTreeSet::new();
         }
+        assignment.clone_from(best);
         let proposed = rotation.filter(|_| is_plausible && !leads);
         proposed.copied().collect()
+    }
+
+    /// Adds pitch and bank with all rates, whose names tell nothing, where no heading is recorded and no other
+    /// columns fit nearly as well. Pitch and bank differ only by the terms of the yaw rate.
+    fn seed_without_heading(&self, integrals: &[(Choice, Choice)], assignment: &mut Assignment) {
+        use Quantity::{P, Phi, Q, R, Theta};
+        let orders = (0..integrals.len())
+            .flat_map(|a| (0..integrals.len()).map(move |b| [a, b]))
+            .filter(|[a, b]| a != b);
+        let mut ranked: Vec<(f64, Assignment)> = Vec::new();
+        for [first, second] in orders {
+            for signs in [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]] {
+                let (pitch, bank) = (&integrals[first], &integrals[second]);
+                let both = [
+                    (Theta, with_sign(&pitch.0, signs[0])),
+                    (Q, with_sign(&pitch.1, signs[0])),
+                    (Phi, with_sign(&bank.0, signs[1])),
+                    (P, with_sign(&bank.1, signs[1])),
+                ];
+                let attitudes = with(assignment, both);
+                for yaw in self.choices(R, &attitudes) {
+                    let trial = with(&attitudes, [(R, yaw)]);
+                    if columns(&trial).len() == trial.len() {
+                        ranked.push((self.physical_cost(&trial, &[Theta, Phi]), trial));
+                    }
+                }
+            }
+        }
+        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let rotation = [Theta, Q, Phi, P, R];
+        let Some((cost, best)) = ranked.first().filter(|(_, best)| self.all_hold(best)) else {
+            return;
+        };
+        let differs =
+            |trial: &Assignment| rotation.iter().any(|q| trial[q].column != best[q].column);
+        let next = ranked.iter().find(|(_, trial)| differs(trial));
+        if next.is_none_or(|(next, _)| next - cost > ROTATION_LEAD) {
+            assignment.clone_from(best);
+        }
     }
 
     /// Pairs of columns of which the first is the integral of the second, the best first.
@@ -604,6 +646,23 @@ impl Search<'_> {
     }
 }
 
+/// `true` if an attitude and its rate are missing while those of another axis have no column. A column and
+/// its integral may then belong to either axis.
+fn lacks_axis(missing: &[Quantity], assignment: &Assignment) -> bool {
+    let is_missing = |(attitude, rate): &(Quantity, Quantity)| {
+        missing.contains(attitude) && missing.contains(rate)
+    };
+    let is_open = |(attitude, rate): &(Quantity, Quantity)| {
+        !assignment.contains_key(attitude) && !assignment.contains_key(rate)
+    };
+    AXES.iter().any(is_missing) && AXES.iter().filter(|axis| is_open(axis)).count() > 1
+}
+
+/// Columns that an assignment uses.
+fn columns(assignment: &Assignment) -> BTreeSet<&String> {
+    assignment.values().map(|choice| &choice.column).collect()
+}
+
 /// Orders of three members of a list.
 fn orders(members: usize) -> Vec<[usize; 3]> {
     let all = (0..members)
@@ -716,5 +775,40 @@ mod tests {
             ["x1", "x3", "x4", "x5", "x6"]
         );
         assert!(["x2", "x7"].contains(&choice(&Q)));
+    }
+
+    /// Columns that a search gives to quantities, from a flight with columns of opaque names.
+    fn found(columns: &[(&'static str, Quantity, &'static str)]) -> Found {
+        let (grid, candidates) = searched(&TestFlight::default().recording(columns));
+        let search = Search {
+            grid: &grid,
+            candidates: &candidates,
+        };
+        search.best()
+    }
+
+    #[test]
+    fn one_attitude_and_its_rate_without_names_are_of_no_axis() {
+        use Quantity::{P, Phi, Q, Theta};
+        for (attitude, rate) in [(Phi, P), (Theta, Q)] {
+            let found = found(&[("x1", attitude, "rad"), ("x2", rate, "rad/s")]);
+            assert_eq!(found.assignment, Assignment::new(), "{attitude:?}");
+        }
+    }
+
+    #[test]
+    fn without_a_heading_pitch_is_not_confused_with_bank() {
+        use Quantity::{P, Phi, Q, R, Theta};
+        let columns = [
+            ("x1", Phi, "rad"),
+            ("x2", P, "rad/s"),
+            ("x3", R, "rad/s"),
+            ("x4", Theta, "rad"),
+            ("x5", Q, "rad/s"),
+        ];
+        let found = found(&columns);
+        for (name, quantity, _) in columns {
+            assert_eq!(found.assignment[&quantity].column, name, "{found:?}");
+        }
     }
 }

@@ -118,7 +118,7 @@ pub struct Changes {
     /// Information of flight about the derivatives, the most first.
     pub learnt: Vec<Learnt>,
     pub contradictions: Vec<Contradiction>,
-    /// Instruments whose errors changed.
+    /// Instruments whose errors changed since the earlier night, or over the flights of a first night.
     #[serde(default)]
     pub instruments: Vec<InstrumentChange>,
 }

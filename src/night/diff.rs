@@ -25,13 +25,11 @@ pub fn diff(config: &Config, since: Option<&str>, to: Option<&str>) -> Result<Di
         Some(name) => complete_night(config, &nights, name)?,
         None => last_night(config, &nights)?,
     };
+    let now = PublishedNight::read(&nights, &night)?;
+    let now = now.tables();
     let changes = match since.or(night.since.as_deref()) {
-        Some(name) => {
-            let before = complete_night(config, &nights, name)?;
-            let now = PublishedNight::read(&nights, &night)?;
-            changes::since(&nights, &before, &now.tables())
-        }
-        None => Changes::default(),
+        Some(name) => changes::since(&nights, &complete_night(config, &nights, name)?, &now),
+        None => changes::of_first_night(now.instrument_trends),
     };
     Ok(Diff {
         night: night.name,

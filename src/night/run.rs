@@ -169,10 +169,10 @@ impl NightRun<'_> {
         Ok(changes)
     }
 
-    /// Changes since the last complete night; empty without such a night.
+    /// Changes since the last complete night, or those that a first night shows by itself.
     fn changes(&self, campaign: &Campaign) -> Changes {
         let Some(before) = self.night_before() else {
-            return Changes::default();
+            return changes::of_first_night(&campaign.instrument_trends);
         };
         let maneuvers: Vec<ManeuverWindow> = campaign.maneuvers.iter().map(window).collect();
         let trends: Vec<PublishedTrend> =

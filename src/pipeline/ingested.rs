@@ -95,7 +95,7 @@ impl Flight {
             record.ok_or_else(|| Error::store(self.id().as_ref(), &"the flight has no record"))?;
         store.fetch(&record.name, &record.digest)?;
         Ok(record_file::open(&store.path(&record.name))?
-            .completed(self.ingested.assessment.stand_ins.clone())
+            .completed(self.ingested.assessment.completion.clone())
             .corrected(corrections.clone()))
     }
 

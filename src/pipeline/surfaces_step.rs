@@ -17,7 +17,7 @@ use crate::flight::Record;
 use crate::ingest::ErrorEvidence;
 use crate::lineage::Stage;
 use crate::maneuver::Maneuver;
-use crate::recorder::{self, ErrorSeries};
+use crate::recorder::{self, ErrorSeries, ExaminedSeries};
 use crate::store::{ArtefactName, Kind, Store};
 use crate::surfaces::{self, AircraftModel, FlightEvidence};
 
@@ -126,14 +126,19 @@ fn combine(config: &Config, campaign: &mut Campaign, flights: &[FlightEvidence])
     campaign.delays = surfaces::corrections(&delays, &config.estimate.surfaces);
     let found = surfaces::findings(flights, &delays, &campaign.delays, &config.channels);
     let of_surfaces = surfaces::delay_series(flights, &campaign.delays, &config.channels);
-    compare_flights(config, campaign, of_surfaces);
+    let examined = compare_flights(config, campaign, of_surfaces);
     campaign.instruments.extend(found.rows);
+    recorder::apply_common_verdicts(&mut campaign.instruments, &examined);
     campaign.problems.extend(found.problems);
 }
 
 /// Compares the errors of the instruments over the flights. A flight that hardly determines an
-/// error is corrected by the errors of the other flights.
-fn compare_flights(config: &Config, campaign: &mut Campaign, of_surfaces: Vec<ErrorSeries>) {
+/// error is corrected by the errors of the other flights. Returns the series that were compared.
+fn compare_flights(
+    config: &Config,
+    campaign: &mut Campaign,
+    of_surfaces: Vec<ErrorSeries>,
+) -> Vec<ExaminedSeries> {
     let evidence = |flight: &Flight| flight.ingested.assessment.error_evidence.clone();
     let flights: Vec<(String, Vec<ErrorEvidence>)> = campaign
         .flights
@@ -149,4 +154,5 @@ fn compare_flights(config: &Config, campaign: &mut Campaign, of_surfaces: Vec<Er
     campaign.flight_corrections = corrections;
     campaign.instrument_trends = found.rows;
     campaign.problems.extend(found.problems);
+    found.examined
 }

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use super::findings::RecorderFindings;
+use super::findings::{ExaminedSeries, RecorderFindings};
 use crate::flight::Correction;
 use crate::ingest::Compatibility;
 use crate::tables::{InstrumentError, InstrumentRow, InstrumentVerdict};
@@ -85,6 +85,21 @@ impl RecorderFindings {
                 }
                 trend.completed_flights += 1;
             }
+        }
+    }
+}
+
+/// Changes the verdicts of instruments without a fault of their own flight whose common error is certainly
+/// larger than ordinary. A flight far from the others does not have that error.
+pub fn apply_common_verdicts(rows: &mut [InstrumentRow], examined: &[ExaminedSeries]) {
+    for row in rows.iter_mut().filter(|row| row.verdict.passed()) {
+        let is_wrong = |one: &ExaminedSeries| {
+            one.series.channel == row.channel
+                && one.is_wrong_in_every_flight()
+                && !one.far().contains(&row.flight_id)
+        };
+        if examined.iter().any(is_wrong) {
+            row.verdict = InstrumentVerdict::WrongInEveryFlight;
         }
     }
 }
@@ -167,6 +182,31 @@ mod tests {
             ("bias", "bias scale")
         );
         assert_eq!(rows[0], row(0, Some(0.019), "bias scale"));
+    }
+
+    #[test]
+    fn no_flight_has_an_ok_instrument_whose_common_error_is_wrong() {
+        let (mut rows, findings) = campaign();
+        let fault = InstrumentVerdict::Fault("off by 2 deg/s".to_owned());
+        rows[1].verdict = fault.clone();
+        apply_common_verdicts(&mut rows, &findings.examined);
+        // Flight f8 is far from the others: its error is not the common one.
+        for (i, row) in rows.iter().enumerate() {
+            let expected = match i {
+                1 => &fault,
+                8 => &InstrumentVerdict::Ok,
+                _ => &InstrumentVerdict::WrongInEveryFlight,
+            };
+            assert_eq!(row.verdict, *expected, "{}", row.flight_id);
+        }
+    }
+
+    #[test]
+    fn an_ordinary_common_error_changes_no_verdict() {
+        let series = fixture::scales([0.001, -0.001, 0.0, 0.001].map(|v| (v, 0.001)), 0.0);
+        let mut rows = vec![row(0, Some(0.001), "")];
+        apply_common_verdicts(&mut rows, &examine(vec![series]).examined);
+        assert_eq!(rows[0].verdict, InstrumentVerdict::Ok);
     }
 
     #[test]

@@ -69,7 +69,7 @@ impl ExaminedSeries {
     }
 
     /// `true` if the mean error that remains after corrections is certainly larger than ordinary.
-    fn is_wrong_in_every_flight(&self) -> bool {
+    pub fn is_wrong_in_every_flight(&self) -> bool {
         self.common.as_ref().is_some_and(|common| {
             let size = (common.mean - self.series.corrected).abs();
             size > SURELY * common.bound.hypot(common.scatter)

@@ -18,6 +18,6 @@ mod correction;
 #[cfg(test)]
 mod fixture;
 
-pub use correction::{FlightCorrections, correct_flights};
+pub use correction::{FlightCorrections, apply_common_verdicts, correct_flights};
 pub use error_series::{ErrorSample, ErrorSeries, instrument_series};
-pub use findings::examine;
+pub use findings::{ExaminedSeries, examine};

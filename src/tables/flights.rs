@@ -304,6 +304,9 @@ words! {
         NoDelay = "ok; delay not excited",
         /// The flight moves it too little; its errors are those of the other flights.
         FromOthers = "ok; taken from the other flights",
+        /// No error beyond its limit in this flight; an error that all flights have in common is certainly larger than
+        /// ordinary, and has a row in `problems`.
+        WrongInEveryFlight = "wrong in every flight",
         /// The flight moves it too little to determine any error.
         NotExcited = "not excited",
         /// No part of the flight is long enough for a reconstruction.
@@ -316,10 +319,11 @@ words! {
 }
 
 impl InstrumentVerdict {
-    /// True unless the instrument has a fault.
+    /// True unless the instrument has a fault, in this flight or in every flight.
     #[must_use]
     pub fn passed(&self) -> bool {
-        !matches!(self, InstrumentVerdict::Fault(_))
+        use InstrumentVerdict::{Fault, WrongInEveryFlight};
+        !matches!(self, Fault(_) | WrongInEveryFlight)
     }
 
     /// True where nothing is known of the instrument.

@@ -106,6 +106,46 @@ fn an_acceleration_that_is_not_recorded_costs_its_derivatives_only() {
 }
 
 #[test]
+fn a_channel_that_ends_within_a_flight_costs_no_maneuver() {
+    let whole = Campaign::of_pitch_steps();
+    whole.ends("estimate", 0);
+    let whole = whole.table("estimates");
+    let record = pitch_steps();
+    let campaign = Campaign::new();
+    let channels = ["mach", "altitude", "rpm_l", "Ixz"];
+    let ending = channels.iter().fold(record, |record, channel| {
+        let mut own = values(&record, channel);
+        // From within the flight's only maneuver on.
+        let last = 5 * own.len() / 6;
+        own[last..].fill(f64::NAN);
+        replaced(&record, channel, |field, _| {
+            let field = field.clone().with_data_type(DataType::Float64);
+            (field, Arc::new(Float64Array::from(own)) as ArrayRef)
+        })
+    });
+    campaign.add("flight_001", &ending);
+    campaign.ends("estimate", 0);
+    let problems = campaign.table("problems");
+    let places: Vec<&str> = problems.iter().map(|p| p["place"].as_str()).collect();
+    assert_eq!(places.len(), channels.len(), "{problems:?}");
+    for channel in channels {
+        assert!(
+            places.contains(&&*format!("channel `{channel}`")),
+            "{problems:?}"
+        );
+    }
+    let fits = campaign.table("fits");
+    assert!(
+        fits.len() == 1 && fits[0]["outcome"] == "converged",
+        "{fits:?}"
+    );
+    let estimates = campaign.table("estimates");
+    for derivative in ["Cm_de", "Cm_alpha", "CN_alpha"] {
+        agree(&estimates, &whole, derivative, 2.0);
+    }
+}
+
+#[test]
 fn check_lists_what_the_files_lack_and_which_flights_a_run_refuses() {
     let campaign = Campaign::of_pitch_steps();
     let channels = ["psi", "obes"];

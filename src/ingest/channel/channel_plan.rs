@@ -224,6 +224,24 @@ pub fn sparse_channel(name: &str, channel: &Channel, share: f64) -> Refusal {
     Refusal::of_channel(name, reason)
 }
 
+/// Report of a channel whose gaps a stand-in fills.
+pub fn channel_with_gaps(
+    name: &str,
+    channel: &Channel,
+    gap_samples: usize,
+    clock: &Clock,
+) -> Refusal {
+    let seconds = |samples: usize| samples as f64 * clock.step_s;
+    let reason = format!(
+        "channel `{name}` (signal `{}`) has no value in {:.1} of {:.1} s. A stand-in takes its place in every maneuver \
+         that such a gap touches",
+        channel.signal,
+        seconds(gap_samples),
+        seconds(clock.samples),
+    );
+    Refusal::of_channel(name, reason)
+}
+
 /// Report of the intervals in which a channel is stuck; `None` if it never is.
 pub fn stuck_channel(name: &str, statistics: &ChannelStatistics, clock: &Clock) -> Option<Refusal> {
     if statistics.stuck.is_empty() {

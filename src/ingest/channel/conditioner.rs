@@ -51,6 +51,9 @@ pub struct ChannelStatistics {
     pub period: usize,
     /// Intervals of samples in which the channel is stuck.
     pub stuck: Vec<(usize, usize)>,
+    /// Number of missing samples for which the recording has no number. Repeated values that count as no
+    /// measurement are not among them.
+    pub absent: usize,
     /// Number of samples beyond [`LARGEST`], which count as missing, and the first of these
     /// samples.
     pub beyond: usize,
@@ -307,6 +310,7 @@ impl Conditioner {
         let from = self.settled.saturating_sub(MARGIN).max(self.first);
         let to = (until + MARGIN).min(self.pushed());
         let mut values = self.values[from - self.first..to - self.first].to_vec();
+        let is_absent: Vec<bool> = values.iter().map(|value| value.is_nan()).collect();
         self.blank_repeats(&mut values, from);
         let stuck = self.blank_stuck(&mut values, from);
         let despiked = if self.is_flag {
@@ -324,6 +328,8 @@ impl Conditioner {
         }
         let core = self.settled - from..until - from;
         self.statistics.add(self.settled, &marks[core.clone()]);
+        let missing = core.clone().filter(|k| marks[*k] == Mark::Missing);
+        self.statistics.absent += missing.filter(|k| is_absent[*k]).count();
         self.settled = until;
         self.forget();
         Series {

@@ -15,7 +15,7 @@ mod update_rate;
 
 pub use channel_plan::{ChannelPlan, plan_channels};
 pub(in crate::ingest) use channel_plan::{
-    empty_channel, sparse_channel, stuck_channel, values_beyond,
+    channel_with_gaps, empty_channel, sparse_channel, stuck_channel, values_beyond,
 };
 pub use channel_reader::{ChannelReader, ConditionedChannel};
 pub(in crate::ingest) use conditioner::ChannelStatistics;

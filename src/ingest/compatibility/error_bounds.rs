@@ -44,7 +44,7 @@ impl JointState<'_> {
             let j = place(input::FORWARD + i, Kind::Scale);
             systematic[j] += (MODEL_SCALE * ratio).powi(2);
         }
-        self.add_gust_errors(&inverse, &mut systematic);
+        self.add_gust_errors(&self.moves_by_errors(&inverse), &mut systematic);
         let variance = |j: usize| inverse[(j, j)].max(jackknife[j]) + systematic[j];
         let total: Parameters = std::array::from_fn(variance);
         Some(ErrorBounds {
@@ -54,17 +54,19 @@ impl JointState<'_> {
         })
     }
 
-    /// Adds the variances that [`Self::gust_errors`] cause. An error of one parameter moves the
-    /// others by their regression on it.
-    fn add_gust_errors(&self, inverse: &DMatrix<f64>, variances: &mut Parameters) {
-        for (source, error) in self.gust_errors().into_iter().enumerate() {
-            let own = inverse[(source, source)];
-            if error > 0.0 && own > 0.0 {
-                // The prior holds the rest of the error back.
-                let data_share = 1.0 - own / self.prior[source].powi(2);
-                for (j, variance) in variances.iter_mut().enumerate() {
-                    *variance += (data_share * error * inverse[(j, source)] / own).powi(2);
-                }
+    /// Moves of the estimates by a unit error of each parameter, a column for each: C H, with the information H
+    /// of the data and the covariance C = (H + P⁻¹)⁻¹, `inverse`. The parameter absorbs its own error but for
+    /// the part that its prior holds back, and only this part moves the others.
+    pub fn moves_by_errors(&self, inverse: &DMatrix<f64>) -> DMatrix<f64> {
+        inverse * self.evidence_information()
+    }
+
+    /// Adds the variances that [`Self::gust_errors`] cause.
+    fn add_gust_errors(&self, moves: &DMatrix<f64>, variances: &mut Parameters) {
+        let errors = self.gust_errors().into_iter().enumerate();
+        for (source, error) in errors.filter(|(source, _)| self.estimated[*source]) {
+            for (j, variance) in variances.iter_mut().enumerate() {
+                *variance += (error * moves[(j, source)]).powi(2);
             }
         }
     }

@@ -20,10 +20,10 @@ settings! {
         /// Instruments with a fault: `apply` names the fault and corrects the channel, `report` names
         /// it, `refuse` names it and refuses the flight.
         pub fault: OnFault = OnFault::Apply,
-        /// Size from which an error is corrected, standard errors. A correction by a posterior mean
-        /// lessens the expected error, whatever its size; below 1 the gain is within the bound. Larger:
-        /// fewer corrections, and the errors that stay in the record are in no bound.
-        pub standard_errors: f64 = 1.0,
+        /// Size from which an error is corrected, standard errors: chance exceeds the default once in
+        /// twenty errors. Larger: fewer corrections, and the errors that stay in the record are in no
+        /// bound.
+        pub standard_errors: f64 = 2.0,
     }
     split expert {
         /// Flight-path reconstruction. `false` leaves all instruments unexamined.

@@ -7,8 +7,9 @@ use nalgebra::{Matrix3, Vector3};
 use super::equations::{
     self, Inputs, MeasuredTerms, STATES, State, rate_slopes, rates, reading_slopes, readings,
 };
+use super::joint_state::JointState;
 use super::parameters::{
-    INPUTS, INSTRUMENTS, Kind, OUTPUTS, PARAMETERS, SIGNALS, is_observable, place,
+    INPUTS, INSTRUMENTS, Kind, OUTPUTS, PARAMETERS, SIGNALS, is_observable, output, place,
 };
 use super::reconstruction::{
     DRIVING, LOCAL, LocalParameters, ROW, reconstruct, sensitivities, shared_place,
@@ -988,6 +989,65 @@ fn bounds_grow_without_a_redundant_channel() {
     // The heading determines the yaw rate's bias more closely than anything else.
     let [with, without] = [&record, &without_heading].map(|record| bound(record, s::R, Kind::Bias));
     assert!(without > 1.2 * with, "{without} with {with}");
+}
+
+/// Joint fit with ordinary priors.
+fn fitted(windows: &[Window]) -> JointState<'_> {
+    let settings = Box::leak(Box::new(settings()));
+    let context = FitContext {
+        aircraft: Box::leak(Box::new(aircraft())),
+        settings,
+        margin: window::margin(settings, windows[0].step_s),
+    };
+    let none = [0.0; PARAMETERS];
+    let begin = |window| WindowFit::begin(window, &context, &none).unwrap();
+    let estimated = |j: usize| is_observable(j / 3, parameters::ALL_KINDS[j % 3]);
+    let mut state = JointState {
+        windows: windows.iter().map(begin).collect(),
+        estimated: std::array::from_fn(estimated),
+        shared: none,
+        prior: std::array::from_fn(|j| settings.ordinary.of_parameter(j)),
+        context,
+    };
+    for _ in 0..5 {
+        state.settle().unwrap();
+    }
+    state
+}
+
+#[test]
+fn an_error_of_one_output_moves_the_estimates_as_its_share_of_the_bounds_states() {
+    let exact = flight(65.0);
+    let record = recorded(&exact, &[0.0; PARAMETERS], 1);
+    let error = 0.02;
+    let mut scaled = record.clone();
+    let beta = &mut scaled.signals.get_mut(s::BETA_VANE).unwrap().values;
+    for value in beta.iter_mut() {
+        *value *= 1.0 + error;
+    }
+    let [before, after] = [&record, &scaled].map(windows);
+    let [before, after] = [&before, &after].map(|windows| {
+        let mut state = fitted(windows);
+        state.count_input_noise();
+        state
+    });
+    let values = [&before, &after].map(|state| state.posterior().unwrap().values);
+    let inverse = before.inverse(&before.evidence_information()).unwrap();
+    let moves = before.moves_by_errors(&inverse);
+    let source = place(INPUTS + output::BETA, Kind::Scale);
+    for j in (0..PARAMETERS).filter(|j| before.estimated[*j]) {
+        let bound = inverse[(j, j)].sqrt();
+        let moved = (values[1][j] - values[0][j]) / bound;
+        let stated = error * moves[(j, source)] / bound;
+        assert!(
+            (moved - stated).abs() < 0.1 + 0.1 * stated.abs(),
+            "{} {}: {moved} of {stated}",
+            SIGNALS[j / 3],
+            j % 3
+        );
+    }
+    let own = error * moves[(source, source)] / inverse[(source, source)].sqrt();
+    assert!(own > 3.0, "{own}");
 }
 
 #[test]

@@ -3,18 +3,18 @@
 use std::collections::BTreeSet;
 
 use crate::lineage::InstrumentChange;
-use crate::night::published_night::NightTables;
 use crate::tables::{InstrumentError, InstrumentTrend, InstrumentTrendRow};
 
 /// Errors that step or drift now, but did not in the earlier night. A step that is found a flight
 /// earlier or later than before is not reported again.
-pub fn instruments(before: &NightTables, now: &NightTables) -> Vec<InstrumentChange> {
-    let known = before.instrument_trends.iter();
-    let known: BTreeSet<_> = known.filter_map(kind_of_change).collect();
-    let now = now.instrument_trends.iter();
+pub fn instruments(
+    before: &[InstrumentTrendRow],
+    now: &[InstrumentTrendRow],
+) -> Vec<InstrumentChange> {
+    let known: BTreeSet<_> = before.iter().filter_map(kind_of_change).collect();
     let is_new =
         |row: &&InstrumentTrendRow| kind_of_change(row).is_some_and(|at| !known.contains(&at));
-    now.filter(is_new).filter_map(change).collect()
+    now.iter().filter(is_new).filter_map(change).collect()
 }
 
 /// Error and the kind of its change; `None` for a steady error, and for a change that is only possible.

@@ -24,7 +24,8 @@ use crate::lineage::{Changes, ManeuverChange, ManeuverDifference, Moved, Stage, 
 use crate::maneuver::Status;
 use crate::store::{Night, Nights};
 use crate::tables::{
-    EstimateRow, FitRow, Outcome, PublishedTrend, PublishedVerdict, TunnelVerdict,
+    EstimateRow, FitRow, InstrumentTrendRow, Outcome, PublishedTrend, PublishedVerdict,
+    TunnelVerdict,
 };
 
 /// Changes since a published night. Tables that cannot be read are an alert; an older program may
@@ -60,13 +61,24 @@ pub fn between(since: &str, before: &NightTables, now: &NightTables) -> Changes 
         verdicts: changed_verdicts(before, now, &causes),
         learnt: learnt(before, now),
         contradictions: contradictions(before, now),
-        instruments: instruments(before, now),
+        instruments: instruments(before.instrument_trends, now.instrument_trends),
         causes: causes.all,
         maneuvers,
         estimates,
     };
     changes.alert = needs_attention(&changes);
     changes
+}
+
+/// Changes that a first night shows by itself: steps and drifts of instruments over its flights.
+#[must_use]
+pub fn of_first_night(instrument_trends: &[InstrumentTrendRow]) -> Changes {
+    let instruments = instruments(&[], instrument_trends);
+    Changes {
+        alert: !instruments.is_empty(),
+        instruments,
+        ..Changes::default()
+    }
 }
 
 /// `true` if anything changed besides new maneuvers, new trends and information from flight.

@@ -260,6 +260,22 @@ fn an_instrument_that_steps_is_an_alert_with_its_channel_and_flight_once() {
 }
 
 #[test]
+fn a_first_night_names_the_channel_that_steps_and_its_flight() {
+    let first = of_first_night(&[
+        trend(InstrumentTrend::Steady, None),
+        trend(InstrumentTrend::Step, Some("f2")),
+    ]);
+    assert!(first.alert && first.since.is_none());
+    let changes = first.instruments.iter();
+    let named: Vec<(&str, &str)> = changes
+        .map(|i| (i.channel.as_str(), i.since.as_str()))
+        .collect();
+    assert_eq!(named, [("alpha", "f2")]);
+    let possible = of_first_night(&[trend(InstrumentTrend::PossibleStep, Some("f2"))]);
+    assert!(!possible.alert && possible.is_empty());
+}
+
+#[test]
 fn a_night_before_without_readable_tables_is_an_alert_with_the_reason() {
     let folder = tempfile::tempdir().unwrap();
     let nights = Nights::read_only(folder.path());

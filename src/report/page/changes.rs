@@ -15,9 +15,7 @@ const LEARNT_NOTE: &str = "Learnt: divergence of the posterior over all angles o
 /// The changes and their causes in a sentence.
 pub fn headline(changes: &Changes) -> String {
     let Some(since) = &changes.since else {
-        return "No complete night was published here before: there is nothing to compare this \
-                one with."
-            .to_owned();
+        return first_night(changes);
     };
     if let Some(why) = &changes.not_compared {
         return format!("Night {since} cannot be compared with this one: {why}.");
@@ -32,6 +30,17 @@ pub fn headline(changes: &Changes) -> String {
         counts(changes).join(", "),
         causes(changes)
     )
+}
+
+/// Headline of a night without a predecessor.
+fn first_night(changes: &Changes) -> String {
+    let nothing_before =
+        "No complete night was published here before: there is nothing to compare this one with.";
+    if changes.is_empty() {
+        return nothing_before.to_owned();
+    }
+    let over_flights = counts(changes).join(", ");
+    format!("{nothing_before} Over its own flights: {over_flights}.")
 }
 
 /// Number of changes of each kind that occurs.

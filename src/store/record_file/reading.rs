@@ -18,7 +18,8 @@ use super::header::RecordHeader;
 use super::layout::{MARK, PAGE};
 use crate::error::Error;
 use crate::flight::record::{Series, with_margin};
-use crate::flight::{Correction, Mark, Record, StandIn, signal};
+use crate::flight::stand_in::GapExtent;
+use crate::flight::{Completion, Correction, Mark, Record};
 use crate::store::regular;
 
 /// A record on the disk, read by signals and windows of time.
@@ -29,8 +30,8 @@ pub struct RecordFile {
     pub header: RecordHeader,
     /// Corrections applied as samples are read.
     corrections: Vec<Correction>,
-    /// Stand-ins of signals, in the order in which they are computed.
-    stand_ins: Vec<(String, StandIn)>,
+    /// Stand-ins of signals.
+    completion: Completion,
 }
 
 /// Opens a record.
@@ -48,7 +49,7 @@ pub fn open(path: &Path) -> Result<RecordFile, Error> {
         metadata,
         header,
         corrections: vec![],
-        stand_ins: vec![],
+        completion: Completion::default(),
     })
 }
 
@@ -71,8 +72,8 @@ impl RecordFile {
 
     /// Puts stand-ins in the place of signals, computed from the corrected others.
     #[must_use]
-    pub fn completed(self, stand_ins: Vec<(String, StandIn)>) -> RecordFile {
-        RecordFile { stand_ins, ..self }
+    pub fn completed(self, completion: Completion) -> RecordFile {
+        RecordFile { completion, ..self }
     }
 
     /// Applies further corrections.
@@ -91,7 +92,7 @@ impl RecordFile {
     }
 
     /// Reads from one time to another with some samples more on each side, as [`Record::part`]
-    /// does.
+    /// does. A stand-in for a gap extends over the whole part.
     ///
     /// # Errors
     /// As [`RecordFile::window`].
@@ -103,7 +104,8 @@ impl RecordFile {
     ) -> Result<Record, Error> {
         let (first, last) = (self.sample_at(start_s), self.sample_at(end_s));
         let (samples, step_s) = (self.header.samples, self.header.step_s);
-        self.window(signals, with_margin(first, last, samples, step_s))
+        let range = with_margin(first, last, samples, step_s);
+        self.read(signals, range, GapExtent::WholePart)
     }
 
     /// Reads a range of samples of some signals, or of all. Signals that the record lacks are left
@@ -115,6 +117,15 @@ impl RecordFile {
         &self,
         signals: Option<&BTreeSet<String>>,
         samples: Range<usize>,
+    ) -> Result<Record, Error> {
+        self.read(signals, samples, GapExtent::Samples)
+    }
+
+    fn read(
+        &self,
+        signals: Option<&BTreeSet<String>>,
+        samples: Range<usize>,
+        extent: GapExtent,
     ) -> Result<Record, Error> {
         let samples = samples.start.min(self.header.samples)..samples.end.min(self.header.samples);
         let reach = self
@@ -130,9 +141,7 @@ impl RecordFile {
         self.corrections
             .iter()
             .for_each(|correction| correction.apply(&mut record));
-        for (signal, stand_in) in &self.stand_ins {
-            stand_in.fill(signal, &mut record);
-        }
+        self.completion.apply(&mut record, extent);
         if let Some(signals) = signals {
             record.signals.retain(|name, _| signals.contains(name));
         }
@@ -148,9 +157,7 @@ impl RecordFile {
 
     /// Some signals, and those from which the stand-ins of the record are computed.
     fn with_sources(&self, signals: &BTreeSet<String>) -> BTreeSet<String> {
-        let sources = self.stand_ins.iter().flat_map(|(_, s)| s.sources());
-        let optional = (!self.stand_ins.is_empty()).then_some(&signal::AIR_TEMPERATURE);
-        let sources = sources.chain(optional).map(|name| (*name).to_owned());
+        let sources = self.completion.sources().map(str::to_owned);
         signals.iter().cloned().chain(sources).collect()
     }
 
