@@ -4,13 +4,17 @@ use super::recording::{Recording, column_names};
 use super::vocabulary::meanings;
 use super::words::Spelling;
 use crate::flight::signal;
-use crate::numerics::order_statistics::median;
+use crate::numerics::mean::finite_mean;
+use crate::numerics::order_statistics::{median, quantile};
 use crate::units::{Quantity, Unit};
 
 /// Least share of steps that go forwards in a column that counts time.
 const FORWARDS: f64 = 0.99;
 /// Share of its mean by which the median step of a clock differs at most.
 const UNEVEN: f64 = 0.5;
+/// Share of the steps, the longest, that are not in the mean: a recorder may be off between test points, of which
+/// each has hundreds of rows.
+const OFF: f64 = 0.01;
 /// Steps between samples that recorders have, s: 1 kHz to 2 Hz.
 const STEPS_S: (f64, f64) = (0.000_9, 0.55);
 
@@ -46,10 +50,8 @@ fn clock(recordings: &[Recording], name: &str) -> Option<(f64, ClockColumn)> {
         stated = stated.or_else(|| Unit::parse(column.stated.as_deref()?).ok());
     }
     steps.retain(|step| step.is_finite());
-    let forwards = steps.iter().filter(|step| **step > 0.0).count() as f64;
     let step = median(steps.iter().copied())?;
-    let mean = steps.iter().filter(|s| **s > 0.0).sum::<f64>() / forwards;
-    let is_even = forwards >= FORWARDS * steps.len() as f64 && (step / mean - 1.0).abs() < UNEVEN;
+    let is_even = is_even(&steps, step);
     let spelling = Spelling::of(name);
     let meaning = meanings(&spelling)
         .into_iter()
@@ -80,6 +82,15 @@ fn clock(recordings: &[Recording], name: &str) -> Option<(f64, ClockColumn)> {
     ))
 }
 
+/// `true` if nearly all steps go forwards, and their mean is near the median.
+fn is_even(steps: &[f64], median: f64) -> bool {
+    let forwards = || steps.iter().copied().filter(|step| *step > 0.0);
+    let longest = quantile(forwards(), 1.0 - OFF);
+    let mean = longest.and_then(|longest| finite_mean(forwards().filter(|step| *step <= longest)));
+    forwards().count() as f64 >= FORWARDS * steps.len() as f64
+        && mean.is_some_and(|mean| (median / mean - 1.0).abs() < UNEVEN)
+}
+
 /// Unit in which a step is that of a recorder.
 fn of_step(step: f64) -> Option<Unit> {
     let units = ["s", "ms", "us", "ns"].into_iter();
@@ -90,4 +101,47 @@ fn of_step(step: f64) -> Option<Unit> {
             .map(|f| f * step);
         step_s.is_some_and(|s| (STEPS_S.0..=STEPS_S.1).contains(&s))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::recording::Column;
+    use super::*;
+
+    /// Step of the clock that is found in rows of 40 Hz with a gap after every 800 rows, s.
+    fn step_s(gap_s: f64) -> Option<f64> {
+        let time = |k: usize| 0.025 * k as f64 + gap_s * (k / 800) as f64;
+        let column = Column {
+            name: "t".to_owned(),
+            stated: None,
+            values: (0..8_000).map(time).collect(),
+        };
+        let recording = Recording {
+            name: "f".to_owned(),
+            columns: vec![column],
+        };
+        find_clock(&[recording]).map(|clock| clock.step_s)
+    }
+
+    #[test]
+    fn a_recorder_that_is_off_between_test_points_has_a_clock() {
+        for gap_s in [0.0, 100.0, 10_000.0] {
+            let found = step_s(gap_s).unwrap();
+            assert!((found - 0.025).abs() < 1e-9, "{gap_s} s: {found}");
+        }
+    }
+
+    #[test]
+    fn a_column_that_rises_unevenly_is_no_clock() {
+        let values: Vec<f64> = (0..1000).map(|k| f64::from(k * k * k)).collect();
+        let recording = Recording {
+            name: "f".to_owned(),
+            columns: vec![Column {
+                name: "t".to_owned(),
+                stated: None,
+                values,
+            }],
+        };
+        assert_eq!(find_clock(&[recording]), None);
+    }
 }
