@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::assignment::{Assignment, Found, HOLDS, Search, with};
+use super::assignment::{Assignment, HOLDS, Search, with};
+use super::descent::Found;
 use super::equations::Equation;
 use super::quantity::Quantity;
 use super::rescaling::rescalings;

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use super::assignment::{Assignment, Candidates, Found, Search};
+use super::assignment::{Assignment, Candidates, Search};
 use super::certainty::verdicts;
 use super::clock::{ClockColumn, find_clock};
+use super::descent::Found;
 use super::grid::Grid;
 use super::inputs::{InputColumn, inputs, kind_of, rate};
 use super::mirror_images::MirrorImages;

@@ -7,13 +7,14 @@
 //! controls. A finding that no equation confirms is marked as unsure.
 //!
 //! In the order of use: `recording` (the input), `words` and `vocabulary` (names), `mirror_images`, `quantity`,
-//! `clock`, `grid` (one step for all columns), `plausible` (candidates), `equations`, `assignment`
-//! (the search, over `signs`), `rescaling`, `certainty`, `effects` and `inputs` (surfaces and controls), `steps`
-//! (which of them step), `findings`, and `draft` (YAML).
+//! `clock`, `grid` (one step for all columns), `plausible` (candidates), `equations`, `signs`, `assignment`
+//! (and its cost), `rotation` and `descent` (the search), `rescaling`, `certainty`, `effects` and `inputs` (surfaces and
+//! controls), `steps` (which of them step), `findings`, and `draft` (YAML).
 
 mod assignment;
 mod certainty;
 mod clock;
+mod descent;
 pub mod draft;
 mod effects;
 mod equations;
@@ -25,6 +26,7 @@ mod plausible;
 mod quantity;
 mod recording;
 mod rescaling;
+mod rotation;
 mod signs;
 mod steps;
 #[cfg(test)]

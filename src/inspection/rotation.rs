@@ -1,0 +1,166 @@
+//! Attitudes and rates whose names tell nothing: an attitude is nearly the integral of its rate.
+
+use std::collections::BTreeSet;
+
+use super::assignment::{Assignment, Choice, Search, with};
+use super::equations::Equation;
+use super::quantity::Quantity;
+
+/// Largest misfit at which a column counts as the integral of another; it is large because bank
+/// couples the attitudes.
+const INTEGRAL_FIT: f64 = 0.3;
+/// Largest number of such pairs.
+const MOST_INTEGRALS: usize = 5;
+/// Cost by which every other order of attitudes and rates must be worse than the best.
+const ROTATION_LEAD: f64 = 2.0;
+/// Attitudes with their rates.
+const AXES: [(Quantity, Quantity); 3] = [
+    (Quantity::Theta, Quantity::Q),
+    (Quantity::Phi, Quantity::P),
+    (Quantity::Psi, Quantity::R),
+];
+
+impl Search<'_> {
+    /// Adds attitudes and rates whose names tell nothing: pairs in which one column is the integral
+    /// of the other, in the order in which the equations of all three attitudes hold best. Returns them if
+    /// another order or other columns fit nearly as well.
+    pub fn seed_rotation(&self, assignment: &mut Assignment) -> BTreeSet<Quantity> {
+        let rotation: Vec<Quantity> = AXES.iter().flat_map(|(a, b)| [*a, *b]).collect();
+        if rotation.iter().any(|q| assignment.contains_key(q)) {
+            return BTreeSet::new();
+        }
+        let integrals = self.integrals();
+        let mut ranked: Vec<(f64, Assignment)> = Vec::new();
+        for order in orders(integrals.len()) {
+            for signs in 0..8_u32 {
+                let mut trial = assignment.clone();
+                for (n, ((attitude, rate), member)) in AXES.iter().zip(&order).enumerate() {
+                    let sign = if signs >> n & 1 == 1 { -1.0 } else { 1.0 };
+                    let (angle, velocity) = &integrals[*member];
+                    trial.insert(*attitude, with_sign(angle, sign));
+                    trial.insert(*rate, with_sign(velocity, sign));
+                }
+                if columns(&trial).len() == trial.len() {
+                    let changed = [Quantity::Theta, Quantity::Phi, Quantity::Psi];
+                    ranked.push((self.physical_cost(&trial, &changed), trial));
+                }
+            }
+        }
+        let best = best_of(ranked, &rotation);
+        let Some((best, leads)) = best.filter(|(best, leads)| *leads || self.all_hold(best)) else {
+            self.seed_without_heading(&integrals, assignment);
+            return BTreeSet::new();
+        };
+        *assignment = best;
+        let proposed = rotation.into_iter().filter(|_| !leads);
+        proposed.collect()
+    }
+
+    /// Adds pitch and bank with all rates, whose names tell nothing, where no heading is recorded and no other
+    /// columns fit nearly as well. Pitch and bank differ only by the terms of the yaw rate.
+    fn seed_without_heading(&self, integrals: &[(Choice, Choice)], assignment: &mut Assignment) {
+        use Quantity::{P, Phi, Q, R, Theta};
+        let orders = (0..integrals.len())
+            .flat_map(|a| (0..integrals.len()).map(move |b| [a, b]))
+            .filter(|[a, b]| a != b);
+        let mut ranked: Vec<(f64, Assignment)> = Vec::new();
+        for [first, second] in orders {
+            for signs in [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]] {
+                let (pitch, bank) = (&integrals[first], &integrals[second]);
+                let both = [
+                    (Theta, with_sign(&pitch.0, signs[0])),
+                    (Q, with_sign(&pitch.1, signs[0])),
+                    (Phi, with_sign(&bank.0, signs[1])),
+                    (P, with_sign(&bank.1, signs[1])),
+                ];
+                let attitudes = with(assignment, both);
+                for yaw in self.choices(R, &attitudes) {
+                    let trial = with(&attitudes, [(R, yaw)]);
+                    if columns(&trial).len() == trial.len() {
+                        ranked.push((self.physical_cost(&trial, &[Theta, Phi]), trial));
+                    }
+                }
+            }
+        }
+        let best = best_of(ranked, &[Theta, Q, Phi, P, R]);
+        if let Some((best, _)) = best.filter(|(best, leads)| *leads && self.all_hold(best)) {
+            *assignment = best;
+        }
+    }
+
+    /// Pairs of columns of which the first is the integral of the second, the best first.
+    fn integrals(&self) -> Vec<(Choice, Choice)> {
+        let none = Assignment::new();
+        let mut found: Vec<(f64, Choice, Choice)> = Vec::new();
+        for rate in self
+            .choices(Quantity::Q, &none)
+            .into_iter()
+            .filter(|c| c.sign > 0.0)
+        {
+            let trials = self
+                .choices(Quantity::Theta, &none)
+                .into_iter()
+                .chain(self.choices(Quantity::Psi, &none));
+            let fits = trials
+                .filter(|angle| angle.column != rate.column)
+                .filter_map(|angle| {
+                    let trial = with(
+                        &none,
+                        [(Quantity::Psi, angle.clone()), (Quantity::R, rate.clone())],
+                    );
+                    let ratio = self.misfit(Equation::Heading, &trial)?.ratio;
+                    (ratio < INTEGRAL_FIT).then_some((ratio, angle, rate.clone()))
+                });
+            found.extend(fits.min_by(|a, b| a.0.total_cmp(&b.0)));
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found.truncate(MOST_INTEGRALS);
+        found
+            .into_iter()
+            .map(|(_, angle, rate)| (angle, rate))
+            .collect()
+    }
+}
+
+/// Assignment of the least cost, and `true` if all that have other columns for a rotation are worse by
+/// [`ROTATION_LEAD`]. `None` without any.
+fn best_of(mut costs: Vec<(f64, Assignment)>, rotation: &[Quantity]) -> Option<(Assignment, bool)> {
+    costs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (cost, best) = costs.first()?;
+    let differs = |trial: &Assignment| rotation.iter().any(|q| trial[q].column != best[q].column);
+    let next = costs.iter().find(|(_, trial)| differs(trial));
+    let leads = next.is_none_or(|(next, _)| next - cost > ROTATION_LEAD);
+    Some((best.clone(), leads))
+}
+
+/// `true` if an attitude and its rate are missing while those of another axis have no column. A column and
+/// its integral may then belong to either axis.
+pub fn lacks_axis(missing: &[Quantity], assignment: &Assignment) -> bool {
+    let is_missing = |(attitude, rate): &(Quantity, Quantity)| {
+        missing.contains(attitude) && missing.contains(rate)
+    };
+    let is_open = |(attitude, rate): &(Quantity, Quantity)| {
+        !assignment.contains_key(attitude) && !assignment.contains_key(rate)
+    };
+    AXES.iter().any(is_missing) && AXES.iter().filter(|axis| is_open(axis)).count() > 1
+}
+
+/// Columns that an assignment uses.
+fn columns(assignment: &Assignment) -> BTreeSet<&String> {
+    assignment.values().map(|choice| &choice.column).collect()
+}
+
+/// Orders of three members of a list.
+fn orders(members: usize) -> Vec<[usize; 3]> {
+    let all = (0..members)
+        .flat_map(|a| (0..members).flat_map(move |b| (0..members).map(move |c| [a, b, c])));
+    all.filter(|[a, b, c]| a != b && b != c && a != c).collect()
+}
+
+/// A choice with its sign multiplied.
+fn with_sign(choice: &Choice, sign: f64) -> Choice {
+    Choice {
+        sign: choice.sign * sign,
+        ..choice.clone()
+    }
+}
