@@ -6,9 +6,10 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 
 use super::calendar_time::{CalendarTime, is_ambiguous, is_time_of_day};
+use super::csv_header::{HeadLine, names_and_units};
+use super::csv_times::{Origin, date_beside_time};
 use super::delimited::{
-    Delimiter, Failures, HEAD_ROWS, fields, is_missing, is_number, name_and_unit, next_line,
-    number, plain_unit,
+    Delimiter, Failures, HEAD_ROWS, fields, is_missing, name_and_unit, next_line, number,
 };
 use super::flight_file::{FlightWriter, batch_rows};
 use super::imported_contents::{ImportedColumn, ImportedContents, refused};
@@ -39,28 +40,6 @@ struct NumberColumn {
     head: ImportedColumn,
     /// Origin of its values, if these are calendar times.
     origin: Option<Origin>,
-}
-
-/// Origin of calendar times.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Origin {
-    /// First of the values.
-    First(CalendarTime),
-    /// Beginning of the first date, which stands in the column `date`.
-    Midnight { first: CalendarTime, date: usize },
-}
-
-impl Origin {
-    /// Seconds from the origin to the time in the column `at` of a row.
-    fn seconds(self, fields: &[String], at: usize) -> Option<f64> {
-        let time = fields.get(at)?;
-        match self {
-            Origin::First(first) => CalendarTime::parse(time).map(|time| time.since(first)),
-            Origin::Midnight { first, date } => {
-                CalendarTime::of(fields.get(date)?, time).map(|time| time.since(first))
-            }
-        }
-    }
 }
 
 /// Imports a delimited text.
@@ -326,40 +305,6 @@ impl Layout {
     }
 }
 
-/// A column of dates and the column of times of day that belongs to it.
-#[derive(Clone, Copy, Debug)]
-struct DateBesideTime {
-    date: usize,
-    time: usize,
-    origin: Origin,
-}
-
-/// The only column of dates, with the times of day beside it, or with the only ones.
-fn date_beside_time(rows: &[Vec<String>], width: usize) -> Option<DateBesideTime> {
-    let all = |at: usize, is_own: &dyn Fn(&str) -> bool| {
-        let given = rows.iter().filter_map(|row| row.get(at));
-        let mut given = given.filter(|field| !is_missing(field)).peekable();
-        given.peek().is_some() && given.all(|field| is_own(field))
-    };
-    let is_date = |field: &str| CalendarTime::midnight(field).is_some();
-    let columns = |is_own: &dyn Fn(&str) -> bool| -> Vec<usize> {
-        (0..width).filter(|at| all(*at, is_own)).collect()
-    };
-    let [date] = columns(&is_date)[..] else {
-        return None;
-    };
-    let times = columns(&is_time_of_day);
-    let beside = times.iter().find(|at| **at == date + 1);
-    let before = times.iter().find(|at| **at + 1 == date);
-    let only = times.first().filter(|_| times.len() == 1);
-    let time = *beside.or(before).or(only)?;
-    let first = rows
-        .iter()
-        .find_map(|row| CalendarTime::midnight(row.get(date)?))?;
-    let origin = Origin::Midnight { first, date };
-    Some(DateBesideTime { date, time, origin })
-}
-
 /// Message for dates that may be others, in a text without another clock.
 fn ambiguous_dates(lines: &[&str], layout: Option<&Layout>) -> Option<String> {
     let has_clock = |layout: &Layout| layout.columns.iter().any(|c| Role::Time.has(&c.head.name));
@@ -379,80 +324,6 @@ fn ambiguous_dates(lines: &[&str], layout: Option<&Layout>) -> Option<String> {
          the year",
         first.trim()
     ))
-}
-
-/// A line above the numbers.
-#[derive(Clone, Debug)]
-struct HeadLine {
-    /// Its place in the text.
-    at: usize,
-    is_comment: bool,
-    fields: Vec<String>,
-}
-
-impl HeadLine {
-    fn of(at: usize, line: &str, delimiter: Delimiter) -> HeadLine {
-        let signs = ['#', '%', '!'];
-        let text = line.trim_start_matches(signs).trim_start();
-        HeadLine {
-            at,
-            is_comment: line.starts_with(signs),
-            fields: fields(text, delimiter),
-        }
-    }
-
-    /// `true` if the line names every column that the line below has a field for, each by another
-    /// word.
-    fn names_columns_of(&self, below: &HeadLine) -> bool {
-        let is_word = |name: &&String| !is_number(name);
-        let names = || self.fields.iter().filter(|name| !name.is_empty());
-        let distinct: BTreeSet<&String> = names().filter(is_word).collect();
-        let mut pairs = self.fields.iter().zip(&below.fields);
-        distinct.len() >= 2
-            && distinct.len() == names().count()
-            && !below.fields.iter().any(|field| is_number(field))
-            && pairs.all(|(name, below)| !name.is_empty() || below.is_empty())
-    }
-}
-
-/// Names and units from the lines above the numbers. Of two lines the upper one is the header if the
-/// lower one holds units that harvest has, or if it names every column by another word. A line alone
-/// is the header.
-fn names_and_units(
-    headers: &[HeadLine],
-    width: usize,
-    delimiter: Delimiter,
-) -> (Vec<String>, Vec<String>) {
-    let numbered = || (1..=width).map(|n| format!("column_{n}")).collect();
-    match headers {
-        [] => (numbered(), Vec::new()),
-        [.., names, units] if is_above_units(names, units, delimiter) => {
-            let units = units.fields.iter().map(|unit| plain_unit(unit));
-            (names.fields.clone(), units.collect())
-        }
-        [.., names] => (names.fields.clone(), Vec::new()),
-    }
-}
-
-/// `true` if a line is the header above a line of units.
-fn is_above_units(names: &HeadLine, units: &HeadLine, delimiter: Delimiter) -> bool {
-    if units.at - names.at != 1 {
-        return false;
-    }
-    // Between spaces, prose has fields as well, and a comment may be above the header.
-    let is_prose = delimiter == Delimiter::Space || names.is_comment && !units.is_comment;
-    are_units(&units.fields) || !is_prose && names.names_columns_of(units)
-}
-
-/// `true` for a row of units: most fields are units that harvest has, or in brackets, or empty.
-fn are_units(fields: &[String]) -> bool {
-    let is_unit = |field: &&String| {
-        let field = field.trim();
-        field.is_empty()
-            || field.starts_with(['[', '('])
-            || crate::units::Unit::parse(field).is_ok()
-    };
-    2 * fields.iter().filter(is_unit).count() > fields.len()
 }
 
 /// Gives columns without a name, or with the name of another, a number.

@@ -5,7 +5,9 @@
 //! whole, since its columns follow one another.
 
 mod calendar_time;
+mod csv_header;
 mod csv_text;
+mod csv_times;
 mod delimited;
 mod flight_file;
 mod gzip;
