@@ -250,7 +250,7 @@ impl<'a> Recording<'a> {
 
 /// Number of samples in gaps of a channel, without those of lost frames, which all channels lack.
 fn gap_samples(statistics: &ChannelStatistics, clock: &Clock) -> usize {
-    let lost = clock.samples - clock.rows;
+    let lost = clock.samples.saturating_sub(clock.rows);
     statistics.absent.saturating_sub(lost)
 }
 
