@@ -138,9 +138,6 @@ impl StandIn {
 
     /// Puts the stand-in in the place of the samples of the signal without a value.
     fn fill_gaps(self, signal: &str, record: &mut Record) {
-        if !has_gap(signal, record) {
-            return;
-        }
         let Some(stand_in) = self.values(record) else {
             return;
         };
@@ -199,12 +196,11 @@ impl Completion {
         let is_first = |signal: &str| FIRST.contains(&signal);
         let fill_gaps = |record: &mut Record, first: bool| {
             for (signal, stand_in) in self.gaps.iter().filter(|(s, _)| is_first(s) == first) {
-                match extent {
-                    GapExtent::Samples => stand_in.fill_gaps(signal, record),
-                    GapExtent::WholePart if has_gap(signal, record) => {
-                        stand_in.fill(signal, record);
+                if has_gap(signal, record) {
+                    match extent {
+                        GapExtent::Samples => stand_in.fill_gaps(signal, record),
+                        GapExtent::WholePart => stand_in.fill(signal, record),
                     }
-                    GapExtent::WholePart => {}
                 }
             }
         };

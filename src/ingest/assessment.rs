@@ -62,8 +62,7 @@ pub fn assess(
         clock: &stretch.clock,
         context,
         recorded: std::mem::take(&mut recording.recorded),
-        stand_ins: std::mem::take(&mut recording.completion.stand_ins),
-        gaps: std::mem::take(&mut recording.completion.gaps),
+        completion: std::mem::take(&mut recording.completion),
         read,
     };
     let blocks = examination.blocks(std::mem::take(&mut recording.block_means));
@@ -220,23 +219,9 @@ impl<'a> Recording<'a> {
         };
         let left_out = left_out.into_iter();
         problems.extend(left_out.map(|one| one.into_problem(&stand_ins, flight_id)));
-        let mean = |signal: &str| mean_value(signal, clock.samples, read);
-        let with_gaps: Vec<&ReadChannel> = channels
-            .iter()
-            .filter(|(_, channel, statistics)| {
-                gap_samples(statistics, clock) > 0 && is_recorded(&channel.signal)
-            })
-            .collect();
-        let gaps = gap_stand_ins_of(&with_gaps, &recorded, context, mean);
-        let filled = with_gaps
-            .iter()
-            .filter(|(_, channel, _)| gaps.iter().any(|(signal, _)| *signal == channel.signal));
-        let named = filled.map(|(name, channel, statistics)| UnreadChannel {
-            signal: channel.signal.as_str(),
-            refusal: channel_with_gaps(name, channel, gap_samples(statistics, clock), clock),
-            is_absent: true,
-        });
-        problems.extend(named.map(|one| one.into_problem(&gaps, flight_id)));
+        let (gaps, filled) = fill_gaps(&channels, &recorded, clock, (context, read));
+        let filled = filled.into_iter();
+        problems.extend(filled.map(|one| one.into_problem(&gaps, flight_id)));
         Ok(Recording {
             channels,
             block_means,
@@ -254,22 +239,33 @@ fn gap_samples(statistics: &ChannelStatistics, clock: &Clock) -> usize {
     statistics.absent.saturating_sub(lost)
 }
 
-/// Stand-ins in the gaps of recorded channels.
-fn gap_stand_ins_of(
-    with_gaps: &[&ReadChannel],
+/// Stand-ins in the gaps of recorded channels, and the report of each channel that has one.
+fn fill_gaps<'r>(
+    channels: &'r [ReadChannel],
     recorded: &[String],
-    context: &Context,
-    mean: impl Fn(&str) -> Option<f64>,
-) -> Vec<(String, StandIn)> {
-    let with_gaps = with_gaps
+    clock: &Clock,
+    (context, read): (&Context, &RecordReader),
+) -> (Vec<(String, StandIn)>, Vec<UnreadChannel<'r>>) {
+    let is_recorded = |signal: &str| recorded.iter().any(|name| name == signal);
+    let with_gaps: Vec<UnreadChannel> = channels
         .iter()
-        .map(|(_, channel, _)| channel.signal.as_str());
-    let with_gaps: Vec<&str> = with_gaps.collect();
+        .map(|(name, channel, statistics)| (name, channel, gap_samples(statistics, clock)))
+        .filter(|(_, channel, gap)| *gap > 0 && is_recorded(&channel.signal))
+        .map(|(name, channel, gap)| UnreadChannel {
+            signal: &channel.signal,
+            refusal: channel_with_gaps(name, channel, gap, clock),
+            is_absent: true,
+        })
+        .collect();
+    let signals: Vec<&str> = with_gaps.iter().map(|one| one.signal).collect();
     let is_complete = |signal: &str| {
-        let is_recorded = recorded.iter().any(|name| name == signal);
-        is_recorded && !with_gaps.contains(&signal) || context.constants.contains_key(signal)
+        is_recorded(signal) && !signals.contains(&signal) || context.constants.contains_key(signal)
     };
-    gap_stand_ins(&with_gaps, is_complete, mean)
+    let mean = |signal: &str| mean_value(signal, clock.samples, read);
+    let gaps = gap_stand_ins(&signals, is_complete, mean);
+    let mut filled = with_gaps;
+    filled.retain(|one| gaps.iter().any(|(signal, _)| signal == one.signal));
+    (gaps, filled)
 }
 
 /// Mean of the samples of a signal with a value; `None` without any.

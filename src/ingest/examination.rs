@@ -32,9 +32,7 @@ pub struct Examination<'a> {
     pub context: &'a Context<'a>,
     /// Signals that come from channels.
     pub recorded: Vec<String>,
-    pub stand_ins: Vec<(String, StandIn)>,
-    /// Stand-ins in the gaps of recorded signals.
-    pub gaps: Vec<(String, StandIn)>,
+    pub completion: Completion,
     pub read: &'a RecordReader<'a>,
 }
 
@@ -159,7 +157,7 @@ impl Examination<'_> {
             relations,
             findings,
             left_out: Vec::new(),
-            completion: self.completion(),
+            completion: self.completion.clone(),
             blocks,
         }
     }
@@ -188,12 +186,17 @@ impl Examination<'_> {
         let is_recorded = |signal: &str| recorded.iter().any(|name| name == signal);
         // The signals that are left out have a stand-in, or none reads them.
         let stand_ins = self.context.stand_ins(is_recorded).unwrap_or_default();
-        let before = self.stand_ins.iter().cloned();
+        let before = self.completion.stand_ins.iter().cloned();
         let mut absent: Vec<(String, StandIn)> =
             before.filter(|(_, s)| *s == StandIn::Absent).collect();
         absent.extend(removed);
+        let mut gaps = self.completion.gaps.clone();
+        gaps.retain(|(signal, _)| !left_out(signal));
         Examination {
-            stand_ins: absent.into_iter().chain(stand_ins).collect(),
+            completion: Completion {
+                stand_ins: absent.into_iter().chain(stand_ins).collect(),
+                gaps,
+            },
             recorded,
             ..self.clone()
         }
@@ -273,7 +276,7 @@ impl Examination<'_> {
 
     /// A channel that is left out, with its stand-in and the cost.
     fn leave_out(&self, name: &str, verdict: String, refusal: Refusal) -> LeftOut {
-        let stand_ins = self.without(&|other| other == name).stand_ins;
+        let stand_ins = self.without(&|other| other == name).completion.stand_ins;
         let refusal = Refusal {
             reason: format!("{}. The channel is left out", refusal.reason),
             ..refusal
@@ -394,29 +397,16 @@ impl Examination<'_> {
         }
     }
 
-    /// Stand-ins of the stretch. A signal that is left out has one throughout.
-    fn completion(&self) -> Completion {
-        let gaps = self
-            .gaps
-            .iter()
-            .filter(|(signal, _)| self.is_recorded(signal));
-        Completion {
-            stand_ins: self.stand_ins.clone(),
-            gaps: gaps.cloned().collect(),
-        }
-    }
-
     /// Estimates the instruments' errors by flight-path reconstruction, part by part of the
     /// record, each part after `correct`.
     fn reconstruct(&self, correct: impl Fn(&mut Record)) -> Findings {
         let samples = self.clock.samples;
         let count = samples.div_ceil(PART_SAMPLES);
         let signals = compatibility::signals();
-        let completion = self.completion();
         let parts = (0..count).filter_map(|i| {
             let range = i * PART_SAMPLES..((i + 1) * PART_SAMPLES).min(samples);
             let mut record = (self.read)(&signals, range)?;
-            completion.apply(&mut record, GapExtent::Samples);
+            self.completion.apply(&mut record, GapExtent::Samples);
             correct(&mut record);
             Some(record)
         });

@@ -322,10 +322,21 @@ impl Search<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::inspection::Recording;
     use crate::inspection::test_flight::{TestFlight, searched, test_column, times};
 
     /// A column and its values over time.
     type Motion = (&'static str, fn(f64) -> f64);
+
+    /// Result of a search over one recording.
+    fn search(recording: &Recording) -> Found {
+        let (grid, candidates) = searched(recording);
+        let search = Search {
+            grid: &grid,
+            candidates: &candidates,
+        };
+        search.best()
+    }
 
     fn best(values: &[Motion]) -> Assignment {
         let altitude = ("altitude [ft]", Quantity::Altitude, "ft");
@@ -333,12 +344,7 @@ mod tests {
         let column =
             |(name, value): &Motion| test_column(name, times().into_iter().map(value).collect());
         recording.columns.extend(values.iter().map(column));
-        let (grid, candidates) = searched(&recording);
-        let search = Search {
-            grid: &grid,
-            candidates: &candidates,
-        };
-        search.best().assignment
+        search(&recording).assignment
     }
 
     #[test]
@@ -361,12 +367,7 @@ mod tests {
             ("x6", R, "rad/s"),
             ("x7", Q, "rad/s"),
         ];
-        let (grid, candidates) = searched(&TestFlight::default().recording(&columns));
-        let search = Search {
-            grid: &grid,
-            candidates: &candidates,
-        };
-        let found = search.best();
+        let found = found(&columns);
         assert_eq!(found.proposed, BTreeSet::from([P, Q, R, Theta, Phi, Psi]));
         let choice = |quantity: &Quantity| found.assignment[quantity].column.as_str();
         assert_eq!(
@@ -378,12 +379,7 @@ mod tests {
 
     /// Columns that a search gives to quantities, from a flight with columns of opaque names.
     fn found(columns: &[(&'static str, Quantity, &'static str)]) -> Found {
-        let (grid, candidates) = searched(&TestFlight::default().recording(columns));
-        let search = Search {
-            grid: &grid,
-            candidates: &candidates,
-        };
-        search.best()
+        search(&TestFlight::default().recording(columns))
     }
 
     #[test]
