@@ -1,0 +1,72 @@
+//! Signals at samples and halfway between them.
+
+use pulp::Arch;
+
+/// Interleaves samples with the values half-way between them, of the cubic through the two samples on
+/// either side. A straight line would cut the corners of a sine of angular frequency ω by (ω step)²/12,
+/// and so the effect of a surface; at 10 Hz and 1 Hz that is 3 %. At the ends, and beside a gap, the
+/// value is the mean of its neighbours.
+pub fn with_half_samples(values: &[f64]) -> Vec<f64> {
+    let mut points = vec![0.0; (2 * values.len()).saturating_sub(1)];
+    Arch::new().dispatch(|| {
+        for (points, pair) in points.chunks_exact_mut(2).zip(values.windows(2)) {
+            points[0] = pair[0];
+            points[1] = 0.5 * (pair[0] + pair[1]);
+        }
+        let inner = points.get_mut(2..).unwrap_or_default();
+        for (points, four) in inner.chunks_exact_mut(2).zip(values.windows(4)) {
+            let middle = points[1] + ((four[1] - four[0]) - (four[3] - four[2])) / 16.0;
+            points[1] = if middle.is_finite() {
+                middle
+            } else {
+                points[1]
+            };
+        }
+    });
+    if let (Some(point), Some(value)) = (points.last_mut(), values.last()) {
+        *point = *value;
+    }
+    points
+}
+
+/// Mean of the samples at every sample and half-sample.
+pub fn constant_mean(values: &[f64]) -> Vec<f64> {
+    // Several independent sums hide the latency of one.
+    let (whole, rest) = values.as_chunks::<8>();
+    let sums = whole
+        .iter()
+        .fold([0.0; 8], |sums, v| std::array::from_fn(|i| sums[i] + v[i]));
+    let mean = sums.iter().chain(rest).sum::<f64>() / values.len().max(1) as f64;
+    vec![mean; (2 * values.len()).saturating_sub(1)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_abs_diff_eq;
+
+    #[test]
+    fn points_between_samples_lie_on_cubics_and_at_the_ends_on_lines() {
+        let cubic = |t: f64| 1.0 - 2.0 * t + 0.5 * t * t + 0.25 * t * t * t;
+        let samples: Vec<f64> = (0..8).map(|k| cubic(f64::from(k))).collect();
+        let points = with_half_samples(&samples);
+        assert_eq!(points.len(), 15);
+        for (i, point) in points.iter().enumerate() {
+            let expected = match i {
+                1 | 13 => 0.5 * (samples[i / 2] + samples[i / 2 + 1]),
+                _ => cubic(0.5 * i as f64),
+            };
+            assert_abs_diff_eq!(*point, expected, epsilon = 1e-12);
+        }
+        assert_eq!(with_half_samples(&[1.0, 3.0]), [1.0, 2.0, 3.0]);
+        assert!(with_half_samples(&[]).is_empty());
+    }
+
+    #[test]
+    fn points_beside_a_gap_are_the_means_of_their_neighbours() {
+        let points = with_half_samples(&[0.0, 1.0, 4.0, 9.0, f64::NAN, 25.0]);
+        assert_abs_diff_eq!(points[3], 2.25);
+        assert_abs_diff_eq!(points[5], 6.5);
+        assert!(points[7].is_nan() && points[9].is_nan());
+    }
+}

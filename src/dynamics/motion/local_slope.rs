@@ -1,0 +1,93 @@
+//! Slopes of recorded signals in time: local straight lines by least squares.
+
+use std::ops::Range;
+
+use crate::numerics::sample_count::nearest;
+
+/// Half the length of the local straight line whose slope is the derivative: short against the
+/// airframe's modes, and long enough to keep the gyros' noise, at the accelerometers' arms, below that
+/// of the accelerometers.
+const SLOPE_REACH_S: f64 = 0.1;
+
+/// Samples on each side of the local straight line whose slope is the derivative, at least one.
+#[must_use]
+pub fn slope_reach(step_s: f64) -> usize {
+    nearest(SLOPE_REACH_S / step_s).max(1)
+}
+
+/// Slope per second of a signal over a range of the record, by local least squares.
+pub fn slope(values: &[f64], range: &Range<usize>, step_s: f64) -> Vec<f64> {
+    let reach = slope_reach(step_s);
+    let at = |k: usize| {
+        let first = k.checked_sub(reach);
+        let Some(line) = first.and_then(|first| values.get(first..=k + reach)) else {
+            return slope_at_gap(values, k, step_s);
+        };
+        let (mut up, mut norm) = (0.0, 0.0);
+        for d in 1..=reach {
+            let weight = d as f64;
+            up += weight * (line[reach + d] - line[reach - d]);
+            norm += 2.0 * weight * weight;
+        }
+        if up.is_finite() {
+            up / (norm * step_s)
+        } else {
+            slope_at_gap(values, k, step_s)
+        }
+    };
+    range.clone().map(at).collect()
+}
+
+/// Slope where samples are missing or the record ends: least squares on the pairs that are there.
+fn slope_at_gap(values: &[f64], k: usize, step_s: f64) -> f64 {
+    let reach = slope_reach(step_s)
+        .min(k)
+        .min(values.len().saturating_sub(k + 1));
+    let (mut up, mut norm) = (0.0, 0.0);
+    for d in 1..=reach {
+        let (weight, change) = (d as f64, values[k + d] - values[k - d]);
+        if change.is_finite() {
+            up += weight * change;
+            norm += 2.0 * weight * weight;
+        }
+    }
+    if norm > 0.0 {
+        up / (norm * step_s)
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flight::record::with_margin;
+    use approx::assert_abs_diff_eq;
+
+    #[test]
+    fn a_slope_spans_the_same_time_at_any_rate() {
+        let reaches = [10.0, 20.0, 40.0, 50.0, 2.0].map(|rate_hz| slope_reach(1.0 / rate_hz));
+        assert_eq!(reaches, [1, 2, 4, 5, 1]);
+    }
+
+    #[test]
+    fn a_part_of_a_record_has_the_samples_of_its_slopes_at_any_rate() {
+        for rate_hz in [2.0, 40.0, 100.0, 1000.0] {
+            let step_s = 1.0 / rate_hz;
+            let part = with_margin(5000, 5000, 9000, step_s);
+            let reach = slope_reach(step_s);
+            assert!(
+                part.start <= 5000 - reach && part.end > 5000 + reach,
+                "{rate_hz}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_slope_of_a_straight_line_is_exact_up_to_the_ends() {
+        let line: Vec<f64> = (0..20).map(|k| 3.0 + 0.5 * f64::from(k)).collect();
+        for s in slope(&line, &(1..19), 0.025) {
+            assert_abs_diff_eq!(s, 20.0, epsilon = 1e-12);
+        }
+    }
+}

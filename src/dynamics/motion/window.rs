@@ -1,0 +1,279 @@
+//! Window of a record: its signals at the samples and halfway between them.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+use pulp::Arch;
+
+use super::half_samples::{constant_mean, with_half_samples};
+use super::local_slope::slope;
+use super::measured_motion::{MeasuredMotion, Signals};
+use super::vane_inversion::{FLOW_SIGNALS, VaneInversion};
+use crate::aircraft::{Aircraft, Sensors};
+use crate::earth::gravity_at;
+use crate::flight::{Record, signal};
+
+/// Mass, c.g. and inertias: sample by sample, or their means over the maneuver (the paper's
+/// choice).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MassProperties {
+    #[default]
+    Recorded,
+    Mean,
+}
+
+const MASS_PROPERTIES: &[&str] = &[
+    signal::MASS,
+    signal::X_CG,
+    signal::Y_CG,
+    signal::Z_CG,
+    signal::IX,
+    signal::IY,
+    signal::IZ,
+    signal::IXZ,
+];
+
+/// Angular rates, whose slopes are the angular accelerations.
+const RATES: [&str; 3] = [signal::P, signal::Q, signal::R];
+
+/// Signals of a window of a record at samples and half-samples.
+#[derive(Clone, Debug)]
+pub struct Window {
+    /// Values at the points by signal. Windows that differ in few signals share the others.
+    points: BTreeMap<String, Arc<Vec<f64>>>,
+    sensors: Sensors,
+    /// α and β at the c.g. at every point, rad. Inverting the vanes is the most expensive part of a
+    /// motion.
+    flow: Arc<Vec<[f64; 2]>>,
+    pub step_s: f64,
+    pub samples: usize,
+}
+
+impl Window {
+    /// Cuts `range` out of the record: the named signals besides those the equations need.
+    ///
+    /// # Errors
+    /// A sentence that names the signal and time where a value is missing, or a size is not positive.
+    pub fn cut<'a>(
+        aircraft: &Aircraft,
+        record: &Record,
+        range: Range<usize>,
+        surfaces: impl IntoIterator<Item = &'a str>,
+        mass_properties: MassProperties,
+    ) -> Result<Window, String> {
+        let mut points = BTreeMap::new();
+        for name in signal::REQUIRED.iter().copied().chain(surfaces) {
+            let values = checked_values(record, name, &range)?;
+            let is_mean =
+                mass_properties == MassProperties::Mean && MASS_PROPERTIES.contains(&name);
+            let at_points = if is_mean {
+                constant_mean(values)
+            } else {
+                with_half_samples(values)
+            };
+            points.insert(name.to_owned(), Arc::new(at_points));
+        }
+        for name in RATES {
+            let values = record.values(name).unwrap_or_default();
+            let slope = slope(values, &range, record.step_s);
+            points.insert(slope_name(name), Arc::new(with_half_samples(&slope)));
+        }
+        let mut window = Window {
+            points,
+            sensors: aircraft.sensors.clone(),
+            flow: Arc::default(),
+            step_s: record.step_s,
+            samples: range.len(),
+        };
+        window.flow = Arc::new(window.flow_at_cg());
+        Ok(window)
+    }
+
+    /// α and β at the c.g. at every point, from the vanes.
+    fn flow_at_cg(&self) -> Vec<[f64; 2]> {
+        Arch::new().dispatch(VaneInversion {
+            sensors: &self.sensors,
+            signals: FLOW_SIGNALS.map(|name| self.signal(name)),
+            points: self.len(),
+        })
+    }
+
+    /// Replaces the points of a signal, or adds one.
+    fn set(&mut self, name: &str, points: Vec<f64>) {
+        self.points.insert(name.to_owned(), Arc::new(points));
+        if FLOW_SIGNALS.contains(&name) {
+            self.flow = Arc::new(self.flow_at_cg());
+        }
+    }
+
+    /// Number of points: samples and the halves between them.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        (2 * self.samples).saturating_sub(1)
+    }
+
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.samples == 0
+    }
+
+    /// Returns true if all signals of the motion are those of another window: only surfaces differ.
+    #[must_use]
+    pub fn shares_motion_with(&self, other: &Window) -> bool {
+        let slopes = RATES.map(slope_name);
+        let slopes = slopes.iter().map(String::as_str);
+        let is_same = |name: &str| match (self.points.get(name), other.points.get(name)) {
+            (Some(own), Some(other)) => Arc::ptr_eq(own, other),
+            _ => false,
+        };
+        signal::REQUIRED.iter().copied().chain(slopes).all(is_same)
+    }
+
+    /// Values of a signal at the points; empty for a signal that was not cut out.
+    #[must_use]
+    pub fn signal(&self, name: &str) -> &[f64] {
+        self.points
+            .get(name)
+            .map_or(&[], |points| points.as_slice())
+    }
+
+    /// Window as a sensor in error would have recorded it: a signal's values times `1 + scale`,
+    /// plus `bias`.
+    #[must_use]
+    pub fn misread(&self, name: &str, scale: f64, bias: f64) -> Window {
+        let mut window = self.clone();
+        for (name, bias) in [(name, bias), (slope_name(name).as_str(), 0.0)] {
+            if let Some(points) = self.points.get(name) {
+                let misread = points.iter().map(|value| value + (scale * value + bias));
+                window.set(name, misread.collect());
+            }
+        }
+        window
+    }
+
+    /// Window as a recorder would have recorded it with a signal late by `delay_s`, to first order in
+    /// the delay.
+    #[must_use]
+    pub fn late(&self, name: &str, delay_s: f64) -> Window {
+        let mut window = self.clone();
+        if let Some(points) = self.points.get(name) {
+            // Points lie half a step apart.
+            let per_difference = delay_s / self.step_s;
+            let last = points.len().saturating_sub(1);
+            let value = |(i, value): (usize, &f64)| {
+                let difference = points[(i + 1).min(last)] - points[i.saturating_sub(1)];
+                value - per_difference * difference
+            };
+            window.set(name, points.iter().enumerate().map(value).collect());
+        }
+        window
+    }
+
+    /// Window with a further signal, given at the samples.
+    #[must_use]
+    pub fn with_samples(&self, name: &str, values: &[f64]) -> Window {
+        let mut window = self.clone();
+        window.set(name, with_half_samples(values));
+        window
+    }
+
+    /// Window with all signals linear between samples, as other estimators take them.
+    #[must_use]
+    pub fn linear_between_samples(&self) -> Window {
+        let mut window = self.clone();
+        for points in window.points.values_mut() {
+            let points = Arc::make_mut(points);
+            for middle in (1..points.len()).step_by(2) {
+                points[middle] = 0.5 * (points[middle - 1] + points[middle + 1]);
+            }
+        }
+        window.flow = Arc::new(window.flow_at_cg());
+        window
+    }
+
+    /// Window with a further, constant signal.
+    #[must_use]
+    pub fn with_constant(&self, name: &str, value: f64) -> Window {
+        let mut window = self.clone();
+        window.set(name, vec![value; self.len()]);
+        window
+    }
+
+    /// Measured motion along the window.
+    #[must_use]
+    pub fn motion<'a>(
+        &'a self,
+        aircraft: &'a Aircraft,
+    ) -> MeasuredMotion<'a, impl Fn(f64) -> f64 + use<>> {
+        MeasuredMotion {
+            aircraft,
+            signals: self.signals(),
+            gravity: gravity_at(aircraft.latitude_deg),
+            points: self.len(),
+        }
+    }
+
+    fn signals(&self) -> Signals<'_> {
+        Signals {
+            flow: &self.flow,
+            velocity: self.signal(signal::VELOCITY),
+            rates: RATES.map(|name| self.signal(name)),
+            slopes: RATES.map(|name| self.signal(&slope_name(name))),
+            attitude: [signal::THETA, signal::PHI].map(|name| self.signal(name)),
+            forces: [signal::AX, signal::AY, signal::AN].map(|name| self.signal(name)),
+            air: [signal::ALTITUDE, signal::QBAR].map(|name| self.signal(name)),
+            engines: [signal::THRUST, signal::RPM_LEFT, signal::RPM_RIGHT]
+                .map(|name| self.signal(name)),
+            mass: self.signal(signal::MASS),
+            cg: [signal::X_CG, signal::Y_CG, signal::Z_CG].map(|name| self.signal(name)),
+            inertia: [signal::IX, signal::IY, signal::IZ, signal::IXZ]
+                .map(|name| self.signal(name)),
+        }
+    }
+}
+
+/// Values of a signal over a range of the record.
+///
+/// # Errors
+/// A sentence that names the signal and time where a value is missing, or a size is not positive.
+fn checked_values<'r>(
+    record: &'r Record,
+    name: &str,
+    range: &Range<usize>,
+) -> Result<&'r [f64], String> {
+    let values = record
+        .values(name)
+        .and_then(|values| values.get(range.clone()))
+        .ok_or_else(|| format!("the record has no signal `{name}` over the maneuver"))?;
+    if has_missing(values) {
+        let gap = values.iter().position(|v| !v.is_finite()).unwrap_or(0);
+        let time_s = record.time_s(range.start + gap);
+        return Err(format!(
+            "signal `{name}` is missing at {time_s:.3} s, inside the maneuver"
+        ));
+    }
+    let must_be_positive = signal::POSITIVE.contains(&name);
+    if let Some(wrong) = values.iter().position(|v| must_be_positive && *v <= 0.0) {
+        let (value, time_s) = (values[wrong], record.time_s(range.start + wrong));
+        return Err(format!(
+            "signal `{name}` is {value} at {time_s:.3} s, inside the maneuver; it must be greater \
+             than zero"
+        ));
+    }
+    Ok(values)
+}
+
+fn slope_name(name: &str) -> String {
+    format!("slope of {name}")
+}
+
+/// Returns true if a value is missing. One pass over all values vectorises; a search does not.
+fn has_missing(values: &[f64]) -> bool {
+    Arch::new().dispatch(|| {
+        values
+            .iter()
+            .fold(false, |missing, v| missing | !v.is_finite())
+    })
+}
