@@ -4,8 +4,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::joint_state::JointState;
-use super::parameters::{INPUTS, Kind, OUTPUTS, PARAMETERS, Parameters, SIGNALS, input, place};
-use super::window::{Window, input_factor};
+use super::parameters::{
+    INPUTS, Kind, OUTPUTS, PARAMETERS, Parameters, SIGNALS, input, input_factor, place,
+};
+use super::window::Window;
 use super::window_fit::{Squares, squares_about_mean};
 use crate::flight::signal;
 use crate::numerics::student;

@@ -45,9 +45,11 @@ use nalgebra::{DMatrix, DMatrixViewMut, DVector, Dyn, U1};
 use pulp::Arch;
 
 use super::equations::STATES;
-use super::parameters::{INPUTS, KINDS, Kind, OUTPUTS, PARAMETERS, Parameters, place};
+use super::parameters::{
+    INPUTS, KINDS, Kind, OUTPUTS, PARAMETERS, Parameters, input_factor, place,
+};
 use super::reconstruction::{DRIVING, LOCAL, ROW, Row};
-use super::window::{Window, input_factor};
+use super::window::Window;
 use super::window_sums::{ALL, LinearisedWindow, ReducedInformation, place_among_all};
 use crate::numerics::symmetric;
 

@@ -7,17 +7,22 @@
 //! delays of all instruments. Surfaces, thrust and mass are in no kinematic equation, so this check
 //! cannot find their faults.
 
+mod decimation;
 mod equations;
 mod error_bounds;
+mod error_estimates;
 mod error_sizes;
 mod findings;
 mod input_noise;
+mod instrument_finding;
 mod joint_fit;
 mod joint_state;
+mod measured_terms;
 mod parameters;
 mod reconstruction;
 mod settings;
 mod window;
+mod window_choice;
 mod window_fit;
 mod window_sums;
 
@@ -26,13 +31,16 @@ mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+pub use error_estimates::{ErrorEstimate, ErrorEvidence};
 pub use error_sizes::{ErrorSize, ErrorSizes};
-pub use findings::{ErrorEstimate, ErrorEvidence, Findings, InstrumentFinding};
+pub use findings::Findings;
+pub use instrument_finding::InstrumentFinding;
 pub use settings::{Action, Compatibility, OnFault};
 
 use crate::aircraft::Aircraft;
 use crate::flight::{Channel, Record, signal};
-use window::{Window, choose_windows};
+use window::Window;
+use window_choice::choose_windows;
 
 /// Signals that the reconstruction reads from a record.
 #[must_use]

@@ -4,6 +4,7 @@
 //! attitudes, altitude and the pressures are compared with the reconstructed ones (outputs).
 
 use crate::flight::signal as s;
+use crate::units::{DEG, G0_FT_S2};
 
 /// Places of the inputs: body rates, then specific forces forward, right, down.
 pub mod input {
@@ -109,4 +110,13 @@ pub fn is_observable(instrument: usize, kind: Kind) -> bool {
         (SIGNALS[instrument], kind),
         (s::PSI, Kind::Bias | Kind::Scale) | (s::ALTITUDE, Kind::Bias)
     )
+}
+
+/// Factor from an input's unit to rad/s or ft/s², in the sense of the equations (down positive).
+pub fn input_factor(input: usize) -> f64 {
+    match SIGNALS[input] {
+        s::AX | s::AY => G0_FT_S2,
+        s::AN => -G0_FT_S2,
+        _ => 1.0 / DEG,
+    }
 }

@@ -29,8 +29,8 @@ use nalgebra::{Matrix3, SMatrix};
 use pulp::{Arch, Simd, WithSimd};
 
 use super::equations::{self, Inputs, RateSlopes, STATES, State};
-use super::parameters::{INPUTS, KINDS, Kind, OUTPUTS, Parameters, place};
-use super::window::{Window, input_factor};
+use super::parameters::{INPUTS, KINDS, Kind, OUTPUTS, Parameters, input_factor, place};
+use super::window::Window;
 use crate::aircraft::Aircraft;
 use crate::flight::interpolation_kernel::InterpolationKernel;
 use crate::numerics::runge_kutta::{POINT, STAGES, reaches_s, weights_s};

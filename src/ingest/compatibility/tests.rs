@@ -8,13 +8,16 @@ use super::equations::{
     self, Inputs, MeasuredTerms, STATES, State, rate_slopes, rates, reading_slopes, readings,
 };
 use super::joint_state::JointState;
+use super::measured_terms::rotation_terms;
 use super::parameters::{
-    INPUTS, INSTRUMENTS, Kind, OUTPUTS, PARAMETERS, SIGNALS, is_observable, output, place,
+    INPUTS, INSTRUMENTS, Kind, OUTPUTS, PARAMETERS, SIGNALS, input_factor, is_observable, output,
+    place,
 };
 use super::reconstruction::{
     DRIVING, LOCAL, LocalParameters, ROW, reconstruct, sensitivities, shared_place,
 };
-use super::window::{self, Window, choose_windows, input_factor};
+use super::window::{Window, margin};
+use super::window_choice::choose_windows;
 use super::window_fit::{FitContext, WindowFit};
 use super::window_sums::{Comparison, LinearisedWindow};
 use super::*;
@@ -315,7 +318,7 @@ fn terms_at(aircraft: &Aircraft, x: &State, arms: [[f64; 3]; 3]) -> MeasuredTerm
         gravity: crate::earth::gravity_ft_s2(aircraft.latitude_deg, x[6]),
         arms,
         cg: CG,
-        ..window::rotation_terms(aircraft, [x[3], x[4], x[5]], along, true)
+        ..rotation_terms(aircraft, [x[3], x[4], x[5]], along, true)
     }
 }
 
@@ -997,7 +1000,7 @@ fn fitted(windows: &[Window]) -> JointState<'_> {
     let context = FitContext {
         aircraft: Box::leak(Box::new(aircraft())),
         settings,
-        margin: window::margin(settings, windows[0].step_s),
+        margin: margin(settings, windows[0].step_s),
     };
     let none = [0.0; PARAMETERS];
     let begin = |window| WindowFit::begin(window, &context, &none).unwrap();
@@ -1103,7 +1106,7 @@ fn the_score_scatters_with_the_noise_of_the_inputs() {
     let context = FitContext {
         aircraft: &aircraft,
         settings: &settings,
-        margin: window::margin(&settings, exact.step_s),
+        margin: margin(&settings, exact.step_s),
     };
     let score = |window: &Window| {
         WindowFit::begin(window, &context, &shared)
