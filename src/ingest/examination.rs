@@ -8,7 +8,7 @@ use super::checks::{
     BlockAverager, BlockMeans, Check, ENGINE_SIGNALS, FaultReport, FaultyChannel, Gusts,
     ImpossibleSignal, check_relations, confirmed_signals, find_faulty_channels, impossible_centre,
     impossible_gyration, impossible_mass, impossible_signals, impossible_temperature,
-    impossible_velocity, report, useless_engine_signal, useless_temperature, wrong_time,
+    impossible_velocity, report, unusable_engine_signal, unusable_temperature, wrong_time,
 };
 use super::clock::Clock;
 use super::compatibility::{self, Findings};
@@ -127,7 +127,7 @@ impl Examination<'_> {
     /// Examines the stretch. Wrong channels that it can do without are left out one after another,
     /// and the others are examined as if these were not recorded.
     pub fn examine(&self, blocks: BlockMeans) -> Outcome {
-        let outside_relations = self.useless_outside_relations(&blocks);
+        let outside_relations = self.unusable_outside_relations(&blocks);
         if !outside_relations.is_empty() {
             return self.examine_without(outside_relations, &blocks, Vec::new());
         }
@@ -137,13 +137,15 @@ impl Examination<'_> {
             .faulty
             .iter()
             .any(|f| f.signal == signal::ALTITUDE);
-        if !may_be_late && self.has_useless_alone(&relations) {
-            let left_out = self.useless(&relations);
+        if !may_be_late && self.has_only_dispensable_faults(&relations) {
+            let left_out = self.dispensable_faults(&relations);
             return self.examine_without(left_out, &blocks, relations.checks);
         }
         let (mut relations, findings) = self.reconcile(&blocks, relations);
-        if self.has_useless_alone(&relations) || self.holds_without_useless(&relations, &blocks) {
-            let left_out = self.useless(&relations);
+        if self.has_only_dispensable_faults(&relations)
+            || self.holds_without_dispensable(&relations, &blocks)
+        {
+            let left_out = self.dispensable_faults(&relations);
             return self.examine_without(left_out, &blocks, relations.checks);
         }
         let inexplicable = self.inexplicable(&findings);
@@ -202,12 +204,13 @@ impl Examination<'_> {
         }
     }
 
-    /// Channels that no relation contains and whose values are of no use.
-    fn useless_outside_relations(&self, blocks: &BlockMeans) -> Vec<LeftOut> {
-        let temperature = useless_temperature(blocks).map(|why| (signal::AIR_TEMPERATURE, why));
+    /// Channels in no relation whose values cannot be used, to be left out.
+    fn unusable_outside_relations(&self, blocks: &BlockMeans) -> Vec<LeftOut> {
+        let temperature =
+            unusable_temperature(blocks).map(|reason| (signal::AIR_TEMPERATURE, reason));
         let engines = ENGINE_SIGNALS.iter();
         let engines =
-            engines.filter_map(|name| Some((*name, useless_engine_signal(blocks, name)?)));
+            engines.filter_map(|name| Some((*name, unusable_engine_signal(blocks, name)?)));
         let found = temperature.into_iter().chain(engines);
         let recorded = found.filter(|(name, _)| self.is_recorded(name));
         let left_out = recorded.map(|(name, reason)| self.leave_out_for(name, reason));
@@ -221,25 +224,26 @@ impl Examination<'_> {
     }
 
     /// `true` for a faulty channel that the stretch can do without.
-    fn is_useless(&self, fault: &FaultyChannel) -> bool {
+    fn is_dispensable(&self, fault: &FaultyChannel) -> bool {
         self.can_do_without(&fault.signal)
     }
 
     /// `true` if channels are faulty, and the stretch can do without all of them.
-    fn has_useless_alone(&self, relations: &RelationResult) -> bool {
+    fn has_only_dispensable_faults(&self, relations: &RelationResult) -> bool {
         let faulty = &relations.faulty;
-        !faulty.is_empty() && faulty.iter().all(|fault| self.is_useless(fault))
+        !faulty.is_empty() && faulty.iter().all(|fault| self.is_dispensable(fault))
     }
 
     /// `true` if no sign or unit of a suspect explains the failed relations, and without the suspects that
     /// the stretch can do without all others hold and confirm the remaining suspects.
-    fn holds_without_useless(&self, relations: &RelationResult, blocks: &BlockMeans) -> bool {
+    fn holds_without_dispensable(&self, relations: &RelationResult, blocks: &BlockMeans) -> bool {
         let faulty = &relations.faulty;
-        let useless: Vec<&FaultyChannel> = faulty.iter().filter(|f| self.is_useless(f)).collect();
-        if useless.is_empty() || faulty.iter().any(|f| f.cause.is_some()) {
+        let dispensable: Vec<&FaultyChannel> =
+            faulty.iter().filter(|f| self.is_dispensable(f)).collect();
+        if dispensable.is_empty() || faulty.iter().any(|f| f.cause.is_some()) {
             return false;
         }
-        let is_left_out = |name: &str| useless.iter().any(|fault| fault.signal == name);
+        let is_left_out = |name: &str| dispensable.iter().any(|fault| fault.signal == name);
         let others = self.without(&is_left_out);
         let checked = others.check(&blocks.without(is_left_out));
         let is_cleared = |fault: &FaultyChannel| {
@@ -249,22 +253,22 @@ impl Examination<'_> {
     }
 
     /// Faulty channels that the stretch can do without, to be left out.
-    fn useless(&self, relations: &RelationResult) -> Vec<LeftOut> {
+    fn dispensable_faults(&self, relations: &RelationResult) -> Vec<LeftOut> {
         let report = relations.report.as_ref();
         let reason = report.map_or_else(String::new, |report| report.reason.clone());
         let leave_out = |fault: &FaultyChannel| {
             let refusal = Refusal::of_channel(&fault.channel, reason.clone());
             self.leave_out(&fault.signal, fault.verdict(), refusal)
         };
-        let useless = relations.faulty.iter().filter(|f| self.is_useless(f));
-        useless.map(leave_out).collect()
+        let dispensable = relations.faulty.iter().filter(|f| self.is_dispensable(f));
+        dispensable.map(leave_out).collect()
     }
 
     /// Channels whose values no error of an instrument explains and that the stretch can do without.
     fn inexplicable(&self, findings: &Findings) -> Vec<LeftOut> {
         let inexplicable = findings.inexplicable();
-        let useless = inexplicable.filter(|(name, _)| self.can_do_without(name));
-        let left_out = useless.map(|(name, fault)| self.leave_out_for(name, fault));
+        let dispensable = inexplicable.filter(|(name, _)| self.can_do_without(name));
+        let left_out = dispensable.map(|(name, fault)| self.leave_out_for(name, fault));
         left_out.collect()
     }
 

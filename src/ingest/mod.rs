@@ -7,19 +7,28 @@
 //! piece ([`ChannelReader`]). Memory does not grow with the length of a flight, except for the
 //! clock's list of runs and the block means that the kinematic relations compare ([`assess`]).
 
-mod assessment;
-mod channel;
-mod checks;
-mod clock;
-pub mod compatibility;
-mod context;
-mod examination;
-mod in_memory;
-mod refusal;
+// Inputs: configuration, columns of the files, reasons for a refusal.
 mod settings;
+mod refusal;
+mod context;
 mod column_source;
 mod computed_columns;
+
+// The two passes: the clock, then each channel.
+mod clock;
+mod channel;
+
+// A stretch whose channels are read: checks, instruments' errors, results.
+mod checks;
+pub mod compatibility;
 mod table_ends;
+mod examination;
+mod conditioned_stretch;
+mod assessment_rows;
+mod assessment;
+
+// All of it for a flight in memory.
+mod in_memory;
 
 #[cfg(test)]
 mod tests;

@@ -3,10 +3,9 @@
 
 use std::collections::BTreeMap;
 
-use super::conditioner::{ChannelStatistics, LARGEST};
+use super::channel_refusals::duplicate_signal;
 use crate::error::Problem;
 use crate::flight::{Channel, signal};
-use crate::ingest::clock::Clock;
 use crate::ingest::column_source::ColumnSource;
 use crate::ingest::context::Context;
 use crate::ingest::refusal::{Refusal, UnreadChannel};
@@ -14,9 +13,6 @@ use crate::units::{Conversion, Unit};
 
 /// Relative difference below which two factors are the same unit: rounding of the factors.
 const SAME_FACTOR: f64 = 1e-12;
-
-/// Largest number of stuck intervals of a channel that a message names by their times.
-const NAMED_INTERVALS: usize = 3;
 
 /// A channel that the files have, with the conversion of its values into the signal's unit.
 #[derive(Clone, Copy, Debug)]
@@ -48,30 +44,23 @@ fn plan<'a>(
     let mut plans: BTreeMap<&str, ChannelPlan> = BTreeMap::new();
     let mut left_out: Vec<UnreadChannel> = Vec::new();
     let is_mapped = |signal: &str| context.channels.values().any(|c| c.signal == signal);
-    let is_useless =
+    let is_dispensable =
         |signal: &str| context.can_do_without(signal, |other| other != signal && is_mapped(other));
-    let time = context
-        .channels
-        .iter()
-        .find(|(_, c)| c.signal == signal::TIME);
-    time.map_or(Ok(()), |(name, channel)| {
-        stated_units(source, name, channel)
-    })?;
-    let mapped = context.channels.iter();
-    for (name, channel) in mapped.filter(|(_, c)| c.signal != signal::TIME) {
-        let conversion = match stated_units(source, name, channel)
-            .and_then(|()| unit_conversion(source, name, channel))
-        {
+    let is_time = |channel: &Channel| channel.signal == signal::TIME;
+    if let Some((name, time)) = context.channels.iter().find(|(_, c)| is_time(c)) {
+        stated_units(source, name, time)?;
+    }
+    for (name, channel) in context.channels.iter().filter(|(_, c)| !is_time(c)) {
+        let conversion = match checked_conversion(source, name, channel) {
             Ok(conversion) => conversion,
-            Err(refusal) if is_in_files(source, name) && !is_useless(&channel.signal) => {
+            Err(refusal) if is_in_files(source, name) && !is_dispensable(&channel.signal) => {
                 return Err(refusal);
             }
             Err(refusal) => {
-                let is_absent = is_lacking(source, name, channel);
                 left_out.push(UnreadChannel {
                     signal: &channel.signal,
                     refusal,
-                    is_absent,
+                    is_absent: is_lacking(source, name, channel),
                 });
                 continue;
             }
@@ -89,9 +78,10 @@ fn plan<'a>(
         Ok(stand_ins) => stand_ins,
         Err(signals) => return Err(Refusal::of_signals(&signals, left_out)),
     };
-    let problems = left_out.into_iter();
-    let problems = problems.map(|one| one.into_problem(&stand_ins, flight_id));
-    let problems = problems.collect();
+    let problems = left_out
+        .into_iter()
+        .map(|one| one.into_problem(&stand_ins, flight_id))
+        .collect();
     Ok((plans.into_values().collect(), problems))
 }
 
@@ -184,6 +174,17 @@ fn not_in_files(source: &(impl ColumnSource + ?Sized), name: &str, channel: &Cha
     Refusal::of_channel(name, reason)
 }
 
+/// Conversion of a channel's unit into its signal's, if the units that the files state are those of the
+/// channel map.
+fn checked_conversion(
+    source: &(impl ColumnSource + ?Sized),
+    name: &str,
+    channel: &Channel,
+) -> Result<Conversion, Refusal> {
+    stated_units(source, name, channel)?;
+    unit_conversion(source, name, channel)
+}
+
 /// Conversion of a channel's unit into its signal's.
 fn unit_conversion(
     source: &(impl ColumnSource + ?Sized),
@@ -202,96 +203,6 @@ fn unit_conversion(
         );
         Refusal::of_channel(name, reason)
     })
-}
-
-/// Refusal of a channel that is in the files and never has a value.
-pub fn empty_channel(name: &str, channel: &Channel, rows: usize) -> Refusal {
-    let reason = format!(
-        "channel `{name}` (signal `{}`) holds no number in {rows} rows",
-        channel.signal
-    );
-    Refusal::of_channel(name, reason)
-}
-
-/// Refusal of a channel that has no value in most of the samples in which the recorder was on; `share` of
-/// them have one.
-pub fn sparse_channel(name: &str, channel: &Channel, share: f64) -> Refusal {
-    let reason = format!(
-        "channel `{name}` (signal `{}`) has a value in {:.1} % of the recorded samples only, and is left out",
-        channel.signal,
-        100.0 * share
-    );
-    Refusal::of_channel(name, reason)
-}
-
-/// Report of a channel whose gaps a stand-in fills.
-pub fn channel_with_gaps(
-    name: &str,
-    channel: &Channel,
-    gap_samples: usize,
-    clock: &Clock,
-) -> Refusal {
-    let seconds = |samples: usize| samples as f64 * clock.step_s;
-    let reason = format!(
-        "channel `{name}` (signal `{}`) has no value in {:.1} of {:.1} s. A stand-in takes its place in every maneuver \
-         that such a gap touches",
-        channel.signal,
-        seconds(gap_samples),
-        seconds(clock.samples),
-    );
-    Refusal::of_channel(name, reason)
-}
-
-/// Report of the intervals in which a channel is stuck; `None` if it never is.
-pub fn stuck_channel(name: &str, statistics: &ChannelStatistics, clock: &Clock) -> Option<Refusal> {
-    if statistics.stuck.is_empty() {
-        return None;
-    }
-    let from_to = |&(from, to): &(usize, usize)| {
-        format!(
-            "from {:.1} s to {:.1} s",
-            clock.time_s(from),
-            clock.time_s(to.saturating_sub(1))
-        )
-    };
-    let stuck = &statistics.stuck;
-    let named: Vec<String> = stuck.iter().take(NAMED_INTERVALS).map(from_to).collect();
-    let more = match stuck.len().saturating_sub(NAMED_INTERVALS) {
-        0 => String::new(),
-        more => format!(" and {more} times more"),
-    };
-    let reason = format!(
-        "its value is stuck {}{more}: noise changed it before, and then nothing; it is left out \
-         there",
-        named.join(", ")
-    );
-    Some(Refusal::of_channel(name, reason))
-}
-
-/// Refusal of the samples of a channel whose size exceeds any measurement; `None` without any.
-#[must_use]
-pub fn values_beyond(
-    name: &str,
-    channel: &Channel,
-    statistics: &ChannelStatistics,
-    clock: &Clock,
-) -> Option<Refusal> {
-    let first_s = clock.time_s(statistics.first_beyond?);
-    let unit = Unit::of_signal(&channel.signal).name;
-    let reason = format!(
-        "{} samples are beyond {LARGEST:e} {unit}, which no aircraft has, the first at {first_s:.3} s; \
-         they count as missing",
-        statistics.beyond
-    );
-    Some(Refusal::of_channel(name, reason))
-}
-
-fn duplicate_signal(name: &str, channel: &Channel) -> Refusal {
-    let reason = format!(
-        "channel `{name}` and another one are both mapped to signal `{}`",
-        channel.signal
-    );
-    Refusal::of_channel(name, reason)
 }
 
 #[cfg(test)]

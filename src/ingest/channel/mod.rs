@@ -2,6 +2,7 @@
 
 mod channel_plan;
 mod channel_reader;
+mod channel_refusals;
 mod character;
 mod column_samples;
 mod conditioner;
@@ -14,9 +15,9 @@ mod unwrap;
 mod update_rate;
 
 pub use channel_plan::{ChannelPlan, plan_channels};
-pub(in crate::ingest) use channel_plan::{
+pub use channel_reader::{ChannelReader, ConditionedChannel};
+pub(in crate::ingest) use channel_refusals::{
     channel_with_gaps, empty_channel, sparse_channel, stuck_channel, values_beyond,
 };
-pub use channel_reader::{ChannelReader, ConditionedChannel};
 pub(in crate::ingest) use conditioner::ChannelStatistics;
 pub use signature::{Overlap, Signature};

@@ -19,7 +19,7 @@ const SMALL_SHARE_OF_WEIGHT: f64 = 0.01;
 const SMALL_RPM: f64 = 100.0;
 
 /// Finds a signal of an engine that is nothing but noise, and not by small changes about zero.
-pub fn useless_engine_signal(blocks: &BlockMeans, name: &str) -> Option<String> {
+pub fn unusable_engine_signal(blocks: &BlockMeans, name: &str) -> Option<String> {
     let size = blocks.median(name)?.abs();
     let small = if name == signal::THRUST {
         SMALL_SHARE_OF_WEIGHT * G0_FT_S2 * blocks.median(signal::MASS)?
@@ -60,7 +60,7 @@ mod tests {
             (signal::MASS.to_owned(), mass),
         ]);
         let blocks = BlockMeans::of(means, samples, step_s, &settings);
-        useless_engine_signal(&blocks, signal::THRUST)
+        unusable_engine_signal(&blocks, signal::THRUST)
     }
 
     #[test]

@@ -14,7 +14,7 @@ mod windows;
 
 pub(in crate::ingest) use agreement::{Check, check_relations, confirmed_signals};
 pub(in crate::ingest) use block_means::{BlockAverager, BlockMeans};
-pub(in crate::ingest) use engine::{ENGINE_SIGNALS, useless_engine_signal};
+pub(in crate::ingest) use engine::{ENGINE_SIGNALS, unusable_engine_signal};
 pub(in crate::ingest) use fault_isolation::{
     FaultReport, FaultyChannel, find_faulty_channels, report,
 };
@@ -24,5 +24,5 @@ pub(in crate::ingest) use mass_properties::{
     ImpossibleSignal, impossible_centre, impossible_gyration, impossible_mass, impossible_signals,
     impossible_velocity, lift_curve,
 };
-pub(in crate::ingest) use thermometer::{impossible_temperature, useless_temperature};
+pub(in crate::ingest) use thermometer::{impossible_temperature, unusable_temperature};
 pub(in crate::ingest) use time_scale::wrong_time;

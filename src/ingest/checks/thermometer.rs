@@ -19,9 +19,9 @@ const CLIMB_FT: f64 = 3_000.0;
 /// Altitude above which the temperature of the standard atmosphere is constant, ft, with a margin.
 const LOWER_STRATOSPHERE_FT: f64 = 30_000.0;
 
-/// Finds a recorded temperature that is of no use: by its size, by its noise, or because it stays in a
+/// Finds a recorded temperature that cannot be used: by its size, by its noise, or because it stays in a
 /// climb.
-pub fn useless_temperature(blocks: &BlockMeans) -> Option<String> {
+pub fn unusable_temperature(blocks: &BlockMeans) -> Option<String> {
     wrong_size(blocks)
         .or_else(|| nothing_but_noise(blocks))
         .or_else(|| unchanged_in_a_climb(blocks))
@@ -98,7 +98,7 @@ mod tests {
             averager(signal::ALTITUDE, &altitude),
         ]);
         let blocks = BlockMeans::of(means, BLOCKS, step_s, &settings);
-        useless_temperature(&blocks)
+        unusable_temperature(&blocks)
     }
 
     #[test]

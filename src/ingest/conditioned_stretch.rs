@@ -1,0 +1,186 @@
+//! Conditioned channels of a stretch, sorted by use: those that are left out, stand-ins of missing
+//! signals and in gaps, and reports of repaired samples.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::channel::{
+    ChannelStatistics, ConditionedChannel, Signature, channel_with_gaps, empty_channel,
+    sparse_channel, stuck_channel, values_beyond,
+};
+use super::checks::BlockAverager;
+use super::clock::{Clock, Stretch};
+use super::context::Context;
+use super::examination::{PART_SAMPLES, RecordReader};
+use super::refusal::{Refusal, UnreadChannel};
+use crate::error::Problem;
+use crate::flight::stand_in::gap_stand_ins;
+use crate::flight::{Channel, Completion, Mark, StandIn, signal};
+
+/// A channel with its name and the statistics of its conditioning.
+pub type ReadChannel<'a> = (&'a str, &'a Channel, ChannelStatistics);
+
+/// Conditioned channels of a stretch, sorted by use.
+pub struct ConditionedStretch<'a> {
+    pub channels: Vec<ReadChannel<'a>>,
+    /// Block means by signal, of channels that a relation uses.
+    pub block_means: BTreeMap<String, BlockAverager>,
+    /// Signals with values.
+    pub recorded: Vec<String>,
+    pub problems: Vec<Problem>,
+    pub completion: Completion,
+    pub signature: Signature,
+}
+
+impl<'a> ConditionedStretch<'a> {
+    /// Sorts the conditioned channels of a stretch.
+    ///
+    /// # Errors
+    /// A problem that refuses the stretch: a required channel without any number.
+    pub fn of(
+        stretch: &Stretch,
+        conditioned: Vec<ConditionedChannel<'a>>,
+        context: &Context,
+        read: &RecordReader,
+    ) -> Result<ConditionedStretch<'a>, Problem> {
+        let (flight_id, clock) = (stretch.flight_id.as_str(), &stretch.clock);
+        let (mut channels, mut problems, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
+        let mut block_means = BTreeMap::new();
+        let mut signature_samples = Vec::new();
+        let mut unread = unread_channels(&conditioned, clock, context).into_iter();
+        for one in conditioned {
+            let (name, channel, statistics) = (one.name, one.channel, one.statistics);
+            if let Some(channel) = unread.next().flatten() {
+                left_out.push(channel);
+            } else {
+                let stuck = stuck_channel(name, &statistics, clock);
+                let beyond = values_beyond(name, channel, &statistics, clock);
+                let named = stuck.into_iter().chain(beyond);
+                problems.extend(named.map(|refusal| refusal.into_problem(flight_id)));
+                block_means.extend(one.block_means.map(|means| (channel.signal.clone(), means)));
+                // The turns of an unwrapped angle depend on where the record begins.
+                if statistics.wraps == 0 && channel.wraps_at.is_none() {
+                    signature_samples.push(one.signature_samples);
+                }
+            }
+            channels.push((name, channel, statistics));
+        }
+        let recorded: Vec<String> = channels
+            .iter()
+            .map(|(_, channel, _)| channel.signal.clone())
+            .filter(|signal| !left_out.iter().any(|one| one.signal == signal))
+            .collect();
+        let is_recorded = |signal: &str| recorded.iter().any(|s| s == signal);
+        let stand_ins = match context.stand_ins(is_recorded) {
+            Ok(stand_ins) => stand_ins,
+            Err(signals) => {
+                let refusal = Refusal::of_signals(&signals, left_out);
+                return Err(refusal.into_problem(flight_id));
+            }
+        };
+        let left_out = left_out.into_iter();
+        problems.extend(left_out.map(|one| one.into_problem(&stand_ins, flight_id)));
+        let (gaps, filled) = fill_gaps(&channels, &recorded, clock, (context, read));
+        let filled = filled.into_iter();
+        problems.extend(filled.map(|one| one.into_problem(&gaps, flight_id)));
+        Ok(ConditionedStretch {
+            channels,
+            block_means,
+            recorded,
+            problems,
+            completion: Completion { stand_ins, gaps },
+            signature: Signature::of(signature_samples.into_iter()),
+        })
+    }
+}
+
+/// For each channel, the reason to leave it out before any check, if there is one: it has no value, or
+/// a stand-in replaces it and most of its values are missing.
+fn unread_channels<'a>(
+    conditioned: &[ConditionedChannel<'a>],
+    clock: &Clock,
+    context: &Context,
+) -> Vec<Option<UnreadChannel<'a>>> {
+    let is_replaceable = |signal: &str| {
+        let is_other = |name: &str| {
+            let mut signals = conditioned.iter().map(|one| one.channel.signal.as_str());
+            name != signal && signals.any(|other| other == name)
+        };
+        signal::REQUIRED.contains(&signal) && context.can_do_without(signal, is_other)
+    };
+    // The clock also runs while the recorder is off.
+    let written = conditioned.iter().map(|one| with_value(&one.statistics));
+    let written = written.max().unwrap_or(0);
+    let unread = |one: &ConditionedChannel<'a>| {
+        let (name, channel) = (one.name, one.channel);
+        let is_absent = one.statistics.count(Mark::Missing) == clock.samples;
+        let values = with_value(&one.statistics);
+        let refusal = if is_absent {
+            empty_channel(name, channel, clock.rows)
+        } else if is_replaceable(&channel.signal) && 2 * values < written {
+            sparse_channel(name, channel, values as f64 / written as f64)
+        } else {
+            return None;
+        };
+        Some(UnreadChannel {
+            signal: &channel.signal,
+            refusal,
+            is_absent,
+        })
+    };
+    conditioned.iter().map(unread).collect()
+}
+
+/// Number of samples in gaps of a channel, without those of lost frames, which all channels lack.
+fn gap_samples(statistics: &ChannelStatistics, clock: &Clock) -> usize {
+    let lost = clock.samples.saturating_sub(clock.rows);
+    statistics.absent.saturating_sub(lost)
+}
+
+/// Stand-ins in the gaps of recorded channels, and the report of each channel that has one.
+fn fill_gaps<'r>(
+    channels: &'r [ReadChannel],
+    recorded: &[String],
+    clock: &Clock,
+    (context, read): (&Context, &RecordReader),
+) -> (Vec<(String, StandIn)>, Vec<UnreadChannel<'r>>) {
+    let is_recorded = |signal: &str| recorded.iter().any(|name| name == signal);
+    let with_gaps: Vec<UnreadChannel> = channels
+        .iter()
+        .map(|(name, channel, statistics)| (name, channel, gap_samples(statistics, clock)))
+        .filter(|(_, channel, gap)| *gap > 0 && is_recorded(&channel.signal))
+        .map(|(name, channel, gap)| UnreadChannel {
+            signal: &channel.signal,
+            refusal: channel_with_gaps(name, channel, gap, clock),
+            is_absent: true,
+        })
+        .collect();
+    let signals: Vec<&str> = with_gaps.iter().map(|one| one.signal).collect();
+    let is_complete = |signal: &str| {
+        is_recorded(signal) && !signals.contains(&signal) || context.constants.contains_key(signal)
+    };
+    let mean = |signal: &str| mean_value(signal, clock.samples, read);
+    let gaps = gap_stand_ins(&signals, is_complete, mean);
+    let mut filled = with_gaps;
+    filled.retain(|one| gaps.iter().any(|(signal, _)| signal == one.signal));
+    (gaps, filled)
+}
+
+/// Mean of the samples of a signal with a value; `None` without any.
+fn mean_value(signal: &str, samples: usize, read: &RecordReader) -> Option<f64> {
+    let signals = BTreeSet::from([signal.to_owned()]);
+    let (mut sum, mut count) = (0.0, 0_usize);
+    for first in (0..samples).step_by(PART_SAMPLES) {
+        let part = read(&signals, first..(first + PART_SAMPLES).min(samples))?;
+        for value in part.values(signal)?.iter().filter(|v| v.is_finite()) {
+            sum += value;
+            count += 1;
+        }
+    }
+    (count > 0).then(|| sum / count as f64)
+}
+
+/// Number of samples of a channel that have a value.
+fn with_value(statistics: &ChannelStatistics) -> usize {
+    let kept = [Mark::Measured, Mark::Bridged, Mark::Despiked, Mark::Between];
+    kept.map(|mark| statistics.count(mark)).iter().sum()
+}
