@@ -1,89 +1,27 @@
 //! Delimited text: any delimiter, a row of units, decimal commas, comments before the header.
 
-use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
-use super::calendar_time::{CalendarTime, is_ambiguous, is_time_of_day};
-use super::csv_header::{HeadLine, names_and_units};
-use super::csv_times::{Origin, date_beside_time};
-use super::delimited::{
-    Delimiter, Failures, HEAD_ROWS, fields, is_missing, name_and_unit, next_line, number,
-};
+use super::csv_layout::{HEAD_BYTES, Layout, whole_lines};
+use super::delimited::{Failures, next_line};
 use super::flight_file::{FlightWriter, batch_rows};
 use super::imported_contents::{ImportedColumn, ImportedContents, refused};
-use super::tall::Role;
 use super::tall_text::TallLayout;
 use crate::error::{Error, Result};
 
-/// Bytes at the beginning from which the layout follows.
-const HEAD_BYTES: u64 = 1 << 18;
-/// Layout of a text.
-#[derive(Clone, Debug, PartialEq)]
-struct Layout {
-    delimiter: Delimiter,
-    decimal_comma: bool,
-    /// Lines before the first row of numbers.
-    skipped: usize,
-    /// Columns of numbers.
-    columns: Vec<NumberColumn>,
-    /// Columns of text.
-    dropped: Vec<String>,
-}
-
-/// Column of numbers.
-#[derive(Clone, Debug, PartialEq)]
-struct NumberColumn {
-    /// Its place in a row.
-    at: usize,
-    head: ImportedColumn,
-    /// Origin of its values, if these are calendar times.
-    origin: Option<Origin>,
-}
-
 /// Imports a delimited text.
 pub fn import(source: &Path, file: &Path) -> Result<ImportedContents> {
-    let unreadable = |e| Error::io(source, "cannot read it")(e);
-    let opened = || File::open(source).map_err(Error::io(source, "cannot open it"));
-    let mut head = Vec::new();
-    opened()?
-        .take(HEAD_BYTES)
-        .read_to_end(&mut head)
-        .map_err(unreadable)?;
-    if let Some(what) = other_text(&head) {
-        return Err(refused(source, what));
-    }
-    let head = String::from_utf8_lossy(&head).into_owned();
+    let head = beginning(source)?;
     if let Some(tall) = TallLayout::of(&whole_lines(&head)) {
         return tall.import(source, file);
     }
-    let layout = Layout::of(&head).map_err(|what| refused(source, &what))?;
-    let columns: Vec<ImportedColumn> = layout
-        .columns
-        .iter()
-        .map(|column| column.head.clone())
-        .collect();
-    let mut reader = BufReader::new(opened()?);
-    let mut failures = Failures::default();
-    let mut writer = FlightWriter::of(file, &columns)?;
-    let mut batch = vec![Vec::new(); columns.len()];
-    let at_once = batch_rows(columns.len());
-    let mut line = Vec::new();
-    let mut number = 0;
-    while next_line(&mut reader, &mut line).map_err(unreadable)? {
-        number += 1;
-        let text = String::from_utf8_lossy(&line);
-        if number > layout.skipped && !text.trim().is_empty() {
-            layout.append(&text, number, &mut batch, &mut failures);
-        }
-        if batch.first().is_some_and(|column| column.len() == at_once) {
-            writer.write(&batch)?;
-            batch.iter_mut().for_each(Vec::clear);
-        }
-    }
-    writer.write(&batch)?;
-    let rows = writer.place()?;
+    let layout = Layout::of(&head).map_err(|message| refused(source, &message))?;
+    let columns = layout.columns.iter().map(|column| column.head.clone());
+    let columns: Vec<ImportedColumn> = columns.collect();
+    let writer = FlightWriter::of(file, &columns)?;
+    let (rows, failures) = write_rows(source, &layout, writer)?;
     let mut notes = failures.notes();
     if !layout.dropped.is_empty() {
         notes.push(format!(
@@ -100,13 +38,47 @@ pub fn import(source: &Path, file: &Path) -> Result<ImportedContents> {
     })
 }
 
-/// Lines of the beginning of a text, without one that may be cut off.
-fn whole_lines(head: &str) -> Vec<&str> {
-    let mut lines: Vec<&str> = head.lines().collect();
-    if head.len() as u64 >= HEAD_BYTES {
-        lines.pop();
+/// Beginning of a text, from which its layout follows.
+fn beginning(source: &Path) -> Result<String> {
+    let mut head = Vec::new();
+    opened(source)?
+        .take(HEAD_BYTES)
+        .read_to_end(&mut head)
+        .map_err(Error::io(source, "cannot read it"))?;
+    if let Some(message) = other_text(&head) {
+        return Err(refused(source, message));
     }
-    lines
+    Ok(String::from_utf8_lossy(&head).into_owned())
+}
+
+fn opened(source: &Path) -> Result<File> {
+    File::open(source).map_err(Error::io(source, "cannot open it"))
+}
+
+/// Writes the rows of a text batch by batch; returns their number and the fields that are no numbers.
+fn write_rows(
+    source: &Path,
+    layout: &Layout,
+    mut writer: FlightWriter,
+) -> Result<(usize, Failures)> {
+    let mut reader = BufReader::new(opened(source)?);
+    let mut failures = Failures::default();
+    let mut batch = vec![Vec::new(); layout.columns.len()];
+    let at_once = batch_rows(layout.columns.len());
+    let (mut line, mut number) = (Vec::new(), 0);
+    while next_line(&mut reader, &mut line).map_err(Error::io(source, "cannot read it"))? {
+        number += 1;
+        let text = String::from_utf8_lossy(&line);
+        if number > layout.skipped && !text.trim().is_empty() {
+            layout.append(&text, number, &mut batch, &mut failures);
+        }
+        if batch.first().is_some_and(|column| column.len() == at_once) {
+            writer.write(&batch)?;
+            batch.iter_mut().for_each(Vec::clear);
+        }
+    }
+    writer.write(&batch)?;
+    Ok((writer.place()?, failures))
 }
 
 /// Kind of a text whose lines cannot be read, in words.
@@ -119,409 +91,15 @@ fn other_text(head: &[u8]) -> Option<&'static str> {
         .then_some("its lines end with carriage returns alone; save it with line feeds")
 }
 
-impl Layout {
-    /// Layout that the beginning of a text has.
-    fn of(head: &str) -> std::result::Result<Layout, String> {
-        let lines = &whole_lines(head)[..];
-        let delimiters = ['\t', ';', ',', '|'].map(Delimiter::Character);
-        let layouts = delimiters
-            .into_iter()
-            .chain([Delimiter::Space])
-            .flat_map(|delimiter| [false, true].map(|comma| (delimiter, comma)));
-        // Between commas only quotes make a decimal comma: `"1,5","2,5"`.
-        let has_quotes = head.contains('"');
-        let sensible = layouts.filter(|(delimiter, comma)| {
-            has_quotes || !(*comma && *delimiter == Delimiter::Character(','))
-        });
-        let best = sensible
-            .filter_map(|(delimiter, comma)| Layout::with(lines, delimiter, comma))
-            // Of layouts that read as many numbers the first counts: a space also separates `1, 2`.
-            .reduce(|best, other| if other.0 > best.0 { other } else { best });
-        let layout = best.map(|(_, layout)| layout);
-        if let Some(what) = ambiguous_dates(lines, layout.as_ref()) {
-            return Err(what);
-        }
-        let layout = layout.ok_or_else(|| {
-            "no table of numbers: harvest imports text with one row a sample and a header, MATLAB, HDF5 and tall Parquet"
-                .to_owned()
-        })?;
-        match layout.decimal_commas_between_commas(lines) {
-            Some(what) => Err(what),
-            None => Ok(layout),
-        }
-    }
-
-    /// Layout with one delimiter, and the count of numbers that it reads; `None` without a row of two or
-    /// more numbers.
-    fn with(lines: &[&str], delimiter: Delimiter, decimal_comma: bool) -> Option<(usize, Layout)> {
-        let fields = |line: &str| fields(line, delimiter);
-        let value = |field: &String| {
-            let calendar = || CalendarTime::parse(field).map(|_| 0.0);
-            number(field, decimal_comma).or_else(calendar)
-        };
-        // A recording may begin with missing values; lines above it have text beside their numbers.
-        let is_data = |line: &&str| {
-            let fields = fields(line);
-            let numbers = fields.iter().filter(|f| value(f).is_some()).count();
-            let is_dated = fields.iter().any(|f| CalendarTime::midnight(f).is_some())
-                && fields.iter().any(|f| is_time_of_day(f));
-            let is_date = |f: &String| is_dated && CalendarTime::midnight(f).is_some();
-            let is_text = |f: &String| value(f).is_none() && !is_missing(f) && !is_date(f);
-            let has_text = || fields.iter().any(is_text);
-            fields.len() >= 2 && (numbers * 2 > fields.len() || numbers > 0 && !has_text())
-        };
-        let first = lines.iter().position(is_data)?;
-        let width = fields(lines[first]).len();
-        let headers: Vec<HeadLine> = lines[..first]
-            .iter()
-            .enumerate()
-            .map(|(at, line)| HeadLine::of(at, line, delimiter))
-            .filter(|line| line.fields.len() == width)
-            .collect();
-        let (names, units) = names_and_units(&headers, width, delimiter);
-        let rows: Vec<Vec<String>> = lines[first..]
-            .iter()
-            .take(HEAD_ROWS)
-            .map(|line| fields(line))
-            .collect();
-        let numbers = |at: usize| {
-            rows.iter()
-                .filter(|row| row.get(at).and_then(value).is_some())
-                .count()
-        };
-        let is_text = |at: &usize| {
-            numbers(*at) == 0
-                && rows
-                    .iter()
-                    .any(|row| row.get(*at).is_some_and(|f| !is_missing(f)))
-        };
-        let (mut dropped, kept): (Vec<usize>, Vec<usize>) = (0..width).partition(is_text);
-        let dated = date_beside_time(&rows, width);
-        dropped.retain(|at| dated.is_none_or(|dated| dated.date != *at));
-        let column = |at: usize| {
-            let (name, own) = name_and_unit(&names[at]);
-            let unit = units
-                .get(at)
-                .cloned()
-                .filter(|unit| !unit.is_empty())
-                .or(own);
-            let calendar = |row: &Vec<String>| CalendarTime::parse(row.get(at)?);
-            let first = rows.iter().find_map(calendar).map(Origin::First);
-            let own_date = dated.filter(|dated| dated.time == at);
-            let origin = own_date.map_or(first, |dated| Some(dated.origin));
-            let unit = if origin.is_some() {
-                Some("s".to_owned())
-            } else {
-                unit
-            };
-            NumberColumn {
-                at,
-                head: ImportedColumn { name, unit },
-                origin,
-            }
-        };
-        let mut columns: Vec<NumberColumn> = kept.iter().map(|at| column(*at)).collect();
-        make_unique(&mut columns);
-        let all = kept.iter().map(|at| numbers(*at)).sum();
-        let dropped = dropped.into_iter().map(|at| names[at].clone()).collect();
-        (columns.len() >= 2).then_some((
-            all,
-            Layout {
-                delimiter,
-                decimal_comma,
-                skipped: first,
-                columns,
-                dropped,
-            },
-        ))
-    }
-
-    /// Message for rows that have twice as many fields as the line of names above them: their
-    /// decimal commas look like separators.
-    fn decimal_commas_between_commas(&self, lines: &[&str]) -> Option<String> {
-        let count = |line: &&str| fields(line, self.delimiter).len();
-        let rows = lines.get(self.skipped).map_or(0, count);
-        let above = self.skipped.checked_sub(1).and_then(|k| lines.get(k));
-        let above = above.filter(|line| !line.starts_with(['#', '%', '!']));
-        let names = above.map_or(0, count);
-        let is_comma = self.delimiter == Delimiter::Character(',') && !self.decimal_comma;
-        (is_comma && names >= 2 && rows == 2 * names).then(|| {
-            format!(
-                "its rows have {rows} fields and the line above them {names}: decimal commas between commas cannot be \
-                 told apart; save it with semicolons or decimal points"
-            )
-        })
-    }
-
-    /// Origins of the columns of calendar times, in words.
-    fn notes_on_times(&self) -> Vec<String> {
-        let of = |is_own: fn(&Origin) -> bool| {
-            let own = self
-                .columns
-                .iter()
-                .filter(|c| c.origin.is_some_and(|o| is_own(&o)));
-            let names: Vec<&str> = own.map(|c| c.head.name.as_str()).collect();
-            names.join(", ")
-        };
-        let first = of(|origin| matches!(origin, Origin::First(_)));
-        let midnight = of(|origin| matches!(origin, Origin::Midnight { .. }));
-        [
-            ("calendar times are seconds from the first row's", first),
-            (
-                "times with a date are seconds from the first date's midnight",
-                midnight,
-            ),
-        ]
-        .into_iter()
-        .filter(|(_, names)| !names.is_empty())
-        .map(|(what, names)| format!("{what}: {names}"))
-        .collect()
-    }
-
-    /// Appends a row to a batch; a field that is no number is missing.
-    fn append(
-        &self,
-        line: &str,
-        number_of_line: usize,
-        batch: &mut [Vec<f64>],
-        failures: &mut Failures,
-    ) {
-        let fields = fields(line, self.delimiter);
-        for (column, NumberColumn { at, origin, .. }) in batch.iter_mut().zip(&self.columns) {
-            let field = fields.get(*at);
-            let value = match origin {
-                Some(origin) => origin.seconds(&fields, *at),
-                None => field.and_then(|field| number(field, self.decimal_comma)),
-            };
-            match (field, value) {
-                (None, _) => failures.short_rows += 1,
-                (Some(field), None) if !is_missing(field) => {
-                    failures.add(number_of_line, field);
-                }
-                _ => {}
-            }
-            column.push(value.unwrap_or(f64::NAN));
-        }
-    }
-}
-
-/// Message for dates that may be others, in a text without another clock.
-fn ambiguous_dates(lines: &[&str], layout: Option<&Layout>) -> Option<String> {
-    let has_clock = |layout: &Layout| layout.columns.iter().any(|c| Role::Time.has(&c.head.name));
-    if layout.is_some_and(has_clock) {
-        return None;
-    }
-    let separators = ['\t', ';', ',', '|', '"'];
-    let ambiguous = |line: &&str| {
-        let mut fields = line.split(separators);
-        fields.find(|field| is_ambiguous(field)).map(str::to_owned)
-    };
-    let head = lines.iter().take(HEAD_ROWS);
-    let found: Vec<String> = head.clone().filter_map(ambiguous).collect();
-    let first = found.first().filter(|_| 2 * found.len() > head.len())?;
-    Some(format!(
-        "`{}` may have the day or the month first: write 2026-02-01, or 01.02.2026 with the day first and four digits of \
-         the year",
-        first.trim()
-    ))
-}
-
-/// Gives columns without a name, or with the name of another, a number.
-fn make_unique(columns: &mut [NumberColumn]) {
-    let mut taken = BTreeSet::new();
-    for NumberColumn {
-        at, head: column, ..
-    } in columns
-    {
-        if column.name.is_empty() {
-            column.name = format!("column_{}", *at + 1);
-        }
-        let base = column.name.clone();
-        let mut n = 2;
-        while !taken.insert(column.name.clone()) {
-            column.name = format!("{base}_{n}");
-            n += 1;
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn layout(text: &str) -> Layout {
-        Layout::of(text).unwrap()
-    }
-
-    fn names(layout: &Layout) -> Vec<(&str, &str)> {
-        let columns = layout.columns.iter().map(|c| &c.head);
-        columns
-            .map(|c| (c.name.as_str(), c.unit.as_deref().unwrap_or("")))
-            .collect()
-    }
-
-    #[test]
-    fn delimiters_decimal_commas_and_units_are_found() {
-        let comma = layout("time,alpha [deg],q (deg/s)\n0,1.5,2\n0.1,1.6,3\n");
-        assert_eq!(
-            names(&comma),
-            [("time", ""), ("alpha", "deg"), ("q", "deg/s")]
-        );
-        let german = layout("Zeit;Alpha\ns;deg\n0,00;1,5\n0,10;1,6\n");
-        assert_eq!(
-            (german.delimiter, german.decimal_comma),
-            (Delimiter::Character(';'), true)
-        );
-        assert_eq!(names(&german), [("Zeit", "s"), ("Alpha", "deg")]);
-        let tabs = layout("# recorded by nobody\ntime\tV\n[s]\t[m/s]\n0\t50\n1\t51\n");
-        assert_eq!(names(&tabs), [("time", "s"), ("V", "m/s")]);
-        let spaces = layout("  t     q\n 0.0   1.0e-3\n 0.1  -2.0D+1\n");
-        assert_eq!(
-            (spaces.delimiter, names(&spaces).len()),
-            (Delimiter::Space, 2)
-        );
-        let bare = layout("0 1 2\n1 2 3\n");
-        assert_eq!(names(&bare)[2].0, "column_3");
-    }
-
-    #[test]
-    fn a_row_of_words_below_the_header_is_one_of_units_known_or_not() {
-        let german = layout("Zeit;q;alpha\ns;Grad/s;Grad\n0,1;1,5;2\n0,2;1,6;2\n");
-        assert_eq!(
-            names(&german),
-            [("Zeit", "s"), ("q", "Grad/s"), ("alpha", "Grad")]
-        );
-        let unknown = layout("t\tp\tq\nsek.\tGrd/s\tGrd/s\n0\t1\t2\n1\t2\t3\n");
-        assert_eq!(
-            names(&unknown),
-            [("t", "sek."), ("p", "Grd/s"), ("q", "Grd/s")]
-        );
-        // A title names no column, and prose between spaces or behind a comment sign is no header.
-        for text in [
-            "Flight 12;;\ntime;p;q\n0;1;2\n1;2;3\n",
-            "Rates;Rates;Rates\ntime;p;q\n0;1;2\n1;2;3\n",
-            "# left;right;both\ntime;p;q\n0;1;2\n1;2;3\n",
-            "recorded by nobody\ntime p q\n0 1 2\n1 2 3\n",
-        ] {
-            let layout = layout(text);
-            let found = names(&layout).into_iter().map(|(name, _)| name);
-            assert_eq!(found.collect::<Vec<_>>(), ["time", "p", "q"], "{text}");
-        }
-    }
-
-    #[test]
-    fn a_recording_may_begin_with_missing_values() {
-        let slow = layout("time,mach,q,note\n0.0,nan,,\n0.1,nan,1,\n0.2,0.5,2,\n");
-        assert_eq!(slow.skipped, 1);
-        assert_eq!(names(&slow)[..3], [("time", ""), ("mach", ""), ("q", "")]);
-        let empty = layout("time;q\n0,0;nan\n0,1;nan\n");
-        assert_eq!((empty.skipped, names(&empty).len()), (1, 2));
-        let padded = layout("Sample rate,40,,\ntime,a,b,c\n0,1,2,3\n1,2,3,4\n");
-        assert_eq!((padded.skipped, names(&padded)[1].0), (2, "a"));
-    }
-
-    #[test]
-    fn decimal_commas_between_commas_are_read_in_quotes_and_else_named() {
-        let quoted = layout("time,q\n\"0,0\",\"1,5\"\n\"0,1\",\"2,5\"\n");
-        assert_eq!(
-            (quoted.delimiter, quoted.decimal_comma, names(&quoted).len()),
-            (Delimiter::Character(','), true, 2)
-        );
-        let bare = Layout::of("time,q\n0,0,1,5\n0,1,2,5\n").unwrap_err();
-        assert!(bare.contains("decimal commas between commas"), "{bare}");
-    }
-
     #[test]
     fn other_encodings_and_line_ends_are_named() {
-        let said = |head: &[u8]| other_text(head).unwrap_or_default();
-        assert!(said(b"\xff\xfet\0").contains("UTF-16"));
-        assert!(said(b"time,q\r0,1\r1,2\r").contains("carriage returns"));
-        assert_eq!(said(b"time,q\r\n0,1\r\n"), "");
-    }
-
-    #[test]
-    fn text_columns_are_dropped_and_what_is_no_number_is_missing() {
-        let layout = layout("time,mode,q\n00:00:01.5,AUTO,1\n00:00:02.5,MAN,2\n");
-        assert_eq!(layout.dropped, ["mode"]);
-        let (mut batch, mut failures) = (vec![Vec::new(), Vec::new()], Failures::default());
-        layout.append("01:00:00.25,AUTO,oops", 4, &mut batch, &mut failures);
-        assert_eq!(batch[0], [3600.25]);
-        assert!(batch[1][0].is_nan());
-        assert!(failures.notes()[0].contains("line 4: `oops`"));
-    }
-
-    #[test]
-    fn calendar_times_are_seconds_from_the_first() {
-        let text = "time [UTC];q\n2024-05-01T12:30:05.25Z;1,5\n2024-05-01T12:30:05.27Z;1,6\n";
-        let layout = layout(text);
-        assert_eq!(names(&layout), [("time", "s"), ("q", "")]);
-        let (mut batch, mut failures) = (vec![Vec::new(), Vec::new()], Failures::default());
-        layout.append("2024-05-02T00:00:05.25Z;1,5", 2, &mut batch, &mut failures);
-        layout.append("05.25;1,5", 3, &mut batch, &mut failures);
-        assert_eq!(batch[0][0].to_bits(), 41_400.0_f64.to_bits());
-        assert!(batch[0][1].is_nan());
-        assert!(failures.notes()[0].contains("line 3: `05.25`"));
-    }
-
-    /// First column of some lines in a layout.
-    fn first_column(layout: &Layout, lines: &[&str]) -> Vec<f64> {
-        let mut batch = vec![Vec::new(); layout.columns.len()];
-        let mut failures = Failures::default();
-        for line in lines {
-            layout.append(line, 2, &mut batch, &mut failures);
-        }
-        batch.swap_remove(0)
-    }
-
-    #[test]
-    fn dates_with_points_are_calendar_times() {
-        let rows = ["25.11.2026 13:45:12,5;1,5", "25.11.2026 13:45:12,6;1,6"];
-        let layout = layout(&format!("Zeit;q\n{}\n", rows.join("\n")));
-        assert_eq!(names(&layout), [("Zeit", "s"), ("q", "")]);
-        let times = first_column(&layout, &rows);
-        assert!(
-            times[0].abs() < 1e-9 && (times[1] - 0.1).abs() < 1e-9,
-            "{times:?}"
-        );
-    }
-
-    #[test]
-    fn a_date_beside_its_time_counts_days_from_the_first_midnight() {
-        for (first, second) in [("25.11.2026", "26.11.2026"), ("2026-11-25", "2026-11-26")] {
-            let rows = [
-                format!("{first};23:59:59,5;1,5"),
-                format!("{second};00:00:00,5;1,6"),
-            ];
-            let layout = layout(&format!("Datum;Uhrzeit;q\n{}\n", rows.join("\n")));
-            assert_eq!(names(&layout), [("Uhrzeit", "s"), ("q", "")]);
-            assert!(layout.dropped.is_empty());
-            assert!(layout.notes_on_times()[0].contains("midnight: Uhrzeit"));
-            let rows = rows.each_ref().map(String::as_str);
-            let times = first_column(&layout, &rows);
-            assert!((times[0] - 86_399.5).abs() < 1e-9, "{times:?}");
-            assert!((times[1] - 86_400.5).abs() < 1e-9, "{times:?}");
-        }
-        // Without a date the times of day are as they were.
-        let plain = layout("Uhrzeit;q\n13:45:12,5;1\n13:45:12,6;2\n");
-        let times = first_column(&plain, &["13:45:12,5;1"]);
-        assert!((times[0] - 49_512.5).abs() < 1e-9);
-    }
-
-    #[test]
-    fn a_date_that_may_be_another_is_refused_where_it_is_the_clock() {
-        let stamped = "stamp;q\n01/02/2026 13:45:12;1,5\n01/02/2026 13:45:13;1,6\n";
-        let refused = Layout::of(stamped).unwrap_err();
-        assert!(
-            refused.contains("`01/02/2026 13:45:12` may have the day or the month first"),
-            "{refused}"
-        );
-        let with_clock = "time;stamp;q\n0;01/02/2026 13:45:12;1,5\n1;01/02/2026 13:45:13;1,6\n";
-        assert_eq!(layout(with_clock).dropped, ["stamp"]);
-    }
-
-    #[test]
-    fn a_text_without_numbers_is_refused() {
-        assert!(Layout::of("Dear reader,\nthis is prose\n").is_err());
-        assert!(Layout::of("").is_err());
+        let message = |head: &[u8]| other_text(head).unwrap_or_default();
+        assert!(message(b"\xff\xfet\0").contains("UTF-16"));
+        assert!(message(b"time,q\r0,1\r1,2\r").contains("carriage returns"));
+        assert_eq!(message(b"time,q\r\n0,1\r\n"), "");
     }
 }

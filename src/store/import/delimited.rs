@@ -15,6 +15,25 @@ pub enum Delimiter {
     Space,
 }
 
+/// Delimiter and decimal sign of a text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Dialect {
+    pub delimiter: Delimiter,
+    pub decimal_comma: bool,
+}
+
+impl Dialect {
+    /// Fields of a line, as [`fields`].
+    pub fn fields(self, line: &str) -> Vec<String> {
+        fields(line, self.delimiter)
+    }
+
+    /// Number in a field, as [`number`].
+    pub fn number(self, field: &str) -> Option<f64> {
+        number(field, self.decimal_comma)
+    }
+}
+
 /// Reads the next line, with its end; `false` at the end of the text.
 ///
 /// # Errors

@@ -6,6 +6,7 @@
 
 mod calendar_time;
 mod csv_header;
+mod csv_layout;
 mod csv_text;
 mod csv_times;
 mod delimited;
