@@ -15,18 +15,18 @@ pub fn damaged_artefacts(
     night: &Night,
 ) -> Vec<ArtefactName> {
     let records = records(store, night);
-    let is_whole = |(name, bytes): &(&ArtefactName, &u64)| {
+    let is_intact = |(name, bytes): &(&ArtefactName, &u64)| {
         if name.is_of(Kind::Records) {
             let digest = records.get(*name);
             digest.is_some_and(|digest| store.has_record(name, digest, contents))
         } else {
-            store.is_whole(name, **bytes)
+            store.is_intact(name, **bytes)
         }
     };
     let artefacts: Vec<(&ArtefactName, &u64)> = night.artefacts.iter().collect();
     artefacts
         .into_par_iter()
-        .filter(|artefact| !is_whole(artefact))
+        .filter(|artefact| !is_intact(artefact))
         .map(|(name, _)| name.clone())
         .collect()
 }

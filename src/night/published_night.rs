@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::Result;
 use crate::lineage::Lineage;
 use crate::store::files;
-use crate::store::nights::{Night, Nights};
+use crate::store::{Night, Nights};
 use crate::tables::{
     CovarianceRow, EstimateRow, FitRow, InstrumentTrendRow, PosteriorRow, PublishedTrend,
     PublishedVerdict, SelfCheckRow,

@@ -16,8 +16,7 @@ use crate::maneuver::Maneuver;
 use crate::pipeline::{
     Campaign, Conductor, PAGE, PRINTED_PAGE, Progress, Report, make_report, problem,
 };
-use crate::store::nights::{Night, Nights, Summary};
-use crate::store::{Fingerprint, atomic};
+use crate::store::{Fingerprint, Night, Nights, Summary, atomic};
 use crate::tables::{PublishedTrend, PublishedVerdict};
 
 /// Name of the published file with the changes since the night before, for machines to read.
@@ -125,7 +124,7 @@ impl NightRun<'_> {
             .filter(|night| self.has_same_lineage(night) && night.until >= self.until)?;
         let runner = &self.conductor.runner;
         let has_all = damaged_artefacts(&runner.store, &runner.contents, &night).is_empty();
-        (has_all && self.nights.is_whole(&night)).then_some(night)
+        (has_all && self.nights.is_intact(&night)).then_some(night)
     }
 
     fn has_same_lineage(&self, night: &Night) -> bool {
@@ -203,7 +202,7 @@ impl NightRun<'_> {
         } else {
             last
         };
-        self.nights.is_whole(&before).then_some(before)
+        self.nights.is_intact(&before).then_some(before)
     }
 
     /// Tonight's manifest, without its name and files.

@@ -325,7 +325,7 @@ impl Store {
     /// `true` if the folder has an artefact whose seal fits, or only the object store has it, with this
     /// size.
     #[must_use]
-    pub fn is_whole(&self, name: &ArtefactName, bytes: u64) -> bool {
+    pub fn is_intact(&self, name: &ArtefactName, bytes: u64) -> bool {
         if self.has_file(name) {
             self.has_sealed(name)
         } else {
@@ -438,7 +438,7 @@ mod tests {
             std::fs::create_dir_all(path.parent().unwrap()).unwrap();
             std::fs::copy(store.path(&names[0]), &path).unwrap();
             assert_eq!(store.load::<f64>(other), None);
-            assert!(!store.has_sealed(other) && !store.is_whole(other, 23));
+            assert!(!store.has_sealed(other) && !store.is_intact(other, 23));
         }
     }
 

@@ -11,74 +11,19 @@
 //! night. A reader of several files follows `current` once and stays in that folder. Without
 //! symbolic links (not Unix), `current` is a text file and the files beside it are copies.
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use serde::{Deserialize, Serialize};
-
-use super::artefact_name::ArtefactName;
 use super::atomic;
 use super::fingerprint::Digest;
 use super::lock::Lock;
+use super::night_links::{self as link, CURRENT};
+use super::night_manifest::{MANIFEST, Night, digests, write_manifest};
 use super::regular;
-use crate::error::{Error, Problem, Result};
-use crate::lineage::{Lineage, Stage};
+use crate::error::{Error, Result};
 
 const NIGHTS: &str = "nights";
-const CURRENT: &str = "current";
-const MANIFEST: &str = "night.json";
-
-/// Counts and problems of a night.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Summary {
-    pub flights: usize,
-    /// Number of flights that ingest rejected.
-    pub refused: usize,
-    pub maneuvers: usize,
-    pub converged: usize,
-    pub problems: Vec<Problem>,
-    /// `true` if a published value moved, vanished or changed.
-    pub alert: bool,
-}
-
-/// Manifest of a published night.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Night {
-    /// Number of the night, the name of its folder.
-    pub name: String,
-    /// Last stage of the night; only a night with a report is complete.
-    pub until: Stage,
-    /// The complete night before it, for its changes.
-    pub since: Option<String>,
-    /// Names that the report prints and that affect no number, such as the archive's.
-    pub shown: BTreeMap<String, String>,
-    pub lineage: Lineage,
-    pub summary: Summary,
-    /// Artefacts from which the night was made, with their sizes, bytes.
-    pub artefacts: BTreeMap<ArtefactName, u64>,
-    /// Published files with their digests.
-    pub files: BTreeMap<String, Digest>,
-    /// Fingerprint of the fields above.
-    pub seal: String,
-}
-
-impl Night {
-    #[must_use]
-    pub fn is_complete(&self) -> bool {
-        self.until == Stage::Report
-    }
-
-    fn sealed(mut self) -> Night {
-        self.seal = String::new();
-        let text = serde_json::to_vec(&self).unwrap_or_default();
-        Night {
-            seal: blake3::hash(&text).to_hex()[..16].to_owned(),
-            ..self
-        }
-    }
-}
 
 /// The nights of a folder of reports.
 #[derive(Debug)]
@@ -189,7 +134,7 @@ impl Nights {
 
     /// `true` if all files of a night are unchanged since they were published.
     #[must_use]
-    pub fn is_whole(&self, night: &Night) -> bool {
+    pub fn is_intact(&self, night: &Night) -> bool {
         self.damaged(night).is_empty()
     }
 
@@ -197,13 +142,13 @@ impl Nights {
     #[must_use]
     pub fn damaged(&self, night: &Night) -> Vec<String> {
         let folder = self.folder(&night.name);
-        let is_whole = |(name, digest): &(&String, &Digest)| {
+        let is_intact = |(name, digest): &(&String, &Digest)| {
             Digest::of_file(&folder.join(name)).is_ok_and(|found| found == **digest)
         };
         night
             .files
             .iter()
-            .filter(|file| !is_whole(file))
+            .filter(|file| !is_intact(file))
             .map(|(name, _)| name.clone())
             .collect()
     }
@@ -373,127 +318,10 @@ fn spellings(name: &str) -> [String; 2] {
     [name.to_owned(), format!("{name:0>4}")]
 }
 
-fn write_manifest(folder: &Path, night: &Night) -> Result<()> {
-    let path = folder.join(MANIFEST);
-    atomic::place(
-        &path,
-        &serde_json::to_vec(night).map_err(|e| Error::store(&path, &e))?,
-    )
-}
-
-/// Digests of a folder's files except the manifest.
-fn digests(folder: &Path) -> Result<BTreeMap<String, Digest>> {
-    let mut files = BTreeMap::new();
-    let entries = fs::read_dir(folder).map_err(Error::io(folder, "cannot list the folder"))?;
-    for entry in entries.flatten() {
-        let (name, path) = (
-            entry.file_name().to_string_lossy().into_owned(),
-            entry.path(),
-        );
-        if name != MANIFEST {
-            files.insert(name, Digest::of_file(&path)?);
-        }
-    }
-    Ok(files)
-}
-
-/// Symbolic links.
-#[cfg(unix)]
-mod link {
-    use super::{CURRENT, Error, Path, Result, atomic, fs};
-
-    pub fn target(path: &Path) -> Option<String> {
-        Some(fs::read_link(path).ok()?.to_string_lossy().into_owned())
-    }
-
-    /// Places a link by one rename, replacing any file or link of that name.
-    pub fn place(path: &Path, target: &str) -> Result<()> {
-        let folder = path.parent().unwrap_or(Path::new("."));
-        let beside = folder.join(format!("{}link", atomic::TEMPORARY));
-        let _ = fs::remove_file(&beside);
-        std::os::unix::fs::symlink(target, &beside)
-            .map_err(Error::io(&beside, "cannot create a link"))?;
-        fs::rename(&beside, path).map_err(Error::io(path, "cannot put the link in its place"))
-    }
-
-    /// `true` if the file of a night in the folder of reports is the link to it.
-    pub fn is_placed(reports: &Path, _: &Path, name: &str) -> bool {
-        target(&reports.join(name)) == Some(link_to(name))
-    }
-
-    fn link_to(name: &str) -> String {
-        format!("{CURRENT}/{name}")
-    }
-
-    /// Links each file of a night in the folder of reports, and removes the links of other files.
-    pub fn place_all<'a>(
-        reports: &Path,
-        _: &Path,
-        names: impl Iterator<Item = &'a String>,
-    ) -> Result<()> {
-        let wanted: std::collections::BTreeMap<String, String> =
-            names.map(|name| (name.clone(), link_to(name))).collect();
-        for (name, to) in &wanted {
-            let path = reports.join(name);
-            if target(&path).as_ref() != Some(to) {
-                place(&path, to)?;
-            }
-        }
-        for entry in fs::read_dir(reports)
-            .map_err(Error::io(reports, "cannot list the folder"))?
-            .flatten()
-        {
-            let (name, path) = (
-                entry.file_name().to_string_lossy().into_owned(),
-                entry.path(),
-            );
-            let ours = target(&path).is_some_and(|to| to.starts_with(&format!("{CURRENT}/")));
-            if ours && !wanted.contains_key(&name) {
-                fs::remove_file(&path).map_err(Error::io(&path, "cannot remove it"))?;
-            }
-        }
-        Ok(())
-    }
-}
-
-/// Systems without links: the pointer is a text file, the files are copies.
-#[cfg(not(unix))]
-mod link {
-    use super::{Error, Path, Result, atomic, fs};
-
-    pub fn target(path: &Path) -> Option<String> {
-        Some(fs::read_to_string(path).ok()?.trim().to_owned())
-    }
-
-    pub fn place(path: &Path, target: &str) -> Result<()> {
-        atomic::place(path, target.as_bytes())
-    }
-
-    /// `true` if the file of a night in the folder of reports has the bytes of the night's.
-    pub fn is_placed(reports: &Path, night: &Path, name: &str) -> bool {
-        let read = |folder: &Path| fs::read(folder.join(name)).ok();
-        read(reports) == read(night)
-    }
-
-    pub fn place_all<'a>(
-        reports: &Path,
-        night: &Path,
-        names: impl Iterator<Item = &'a String>,
-    ) -> Result<()> {
-        for name in names {
-            let from = night.join(name);
-            atomic::place(
-                &reports.join(name),
-                &fs::read(&from).map_err(Error::io(&from, "cannot read it"))?,
-            )?;
-        }
-        Ok(())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lineage::Stage;
 
     fn publish(nights: &Nights, text: &str, until: Stage) -> Night {
         atomic::place(&nights.tonight().unwrap().join("fits.csv"), text.as_bytes()).unwrap();
@@ -564,7 +392,7 @@ mod tests {
     fn damage_to_a_file_or_to_the_manifest_is_seen() {
         let (folder, nights) = opened();
         let night = publish(&nights, "one", Stage::Report);
-        assert!(nights.is_whole(&night));
+        assert!(nights.is_intact(&night));
         fs::write(folder.path().join("nights/0001/fits.csv"), "onf").unwrap();
         assert_eq!(nights.damaged(&night), ["fits.csv"]);
         let manifest = folder.path().join("nights/0001/night.json");
