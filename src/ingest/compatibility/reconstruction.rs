@@ -56,7 +56,7 @@ pub type Row = [f64; WIDE];
 
 /// Reconstructed motion of a window at its points.
 #[derive(Clone, Debug)]
-pub struct Path {
+pub struct Trajectory {
     inputs: CorrectedInputs,
     states: Vec<State>,
     /// Reading of each output at the points, as an instrument without errors would give it.
@@ -65,7 +65,7 @@ pub struct Path {
 
 /// Sensitivities of a window at its nodes.
 #[derive(Clone, Debug)]
-pub struct PathSensitivities {
+pub struct TrajectorySensitivities {
     /// At each node, slopes of each output's reading, errors included, along the parameters of a row.
     pub rows: Vec<[Row; OUTPUTS]>,
     /// Slopes of the states along the initial state.
@@ -93,7 +93,7 @@ pub fn reconstruct(
     aircraft: &Aircraft,
     local: &LocalParameters,
     shared: &Parameters,
-) -> Option<Path> {
+) -> Option<Trajectory> {
     let inputs = CorrectedInputs::of(window, shared);
     let (states, readings) = Arch::new().dispatch(Integration {
         window,
@@ -101,7 +101,7 @@ pub fn reconstruct(
         local,
         inputs: &inputs,
     })?;
-    Some(Path {
+    Some(Trajectory {
         inputs,
         states,
         readings,
@@ -113,13 +113,13 @@ pub fn sensitivities(
     window: &Window,
     aircraft: &Aircraft,
     shared: &Parameters,
-    path: &Path,
-) -> PathSensitivities {
+    trajectory: &Trajectory,
+) -> TrajectorySensitivities {
     Arch::new().dispatch(Linearisation {
         window,
         aircraft,
         shared,
-        path,
+        trajectory,
     })
 }
 
@@ -202,23 +202,23 @@ struct Linearisation<'a> {
     window: &'a Window,
     aircraft: &'a Aircraft,
     shared: &'a Parameters,
-    path: &'a Path,
+    trajectory: &'a Trajectory,
 }
 
 /// Sensitivities of the states, a row for each state.
 type Sensitivities = [Row; STATES];
 
 impl WithSimd for Linearisation<'_> {
-    type Output = PathSensitivities;
+    type Output = TrajectorySensitivities;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> PathSensitivities {
+    fn with_simd<S: Simd>(self, simd: S) -> TrajectorySensitivities {
         let nodes = self.window.nodes();
         let mut s = [[0.0; WIDE]; STATES];
         for i in 0..STATES {
             s[i][i] = 1.0;
         }
-        let mut out = PathSensitivities {
+        let mut out = TrajectorySensitivities {
             rows: Vec::with_capacity(nodes),
             transitions: Vec::with_capacity(nodes),
             by_input: Vec::with_capacity(nodes),
@@ -243,7 +243,7 @@ impl Linearisation<'_> {
     /// Slopes of the equations at a point.
     #[inline(always)]
     fn linearised(&self, point: usize) -> Linearised {
-        let Path { inputs, states, .. } = self.path;
+        let Trajectory { inputs, states, .. } = self.trajectory;
         let terms = &self.window.terms[point];
         Linearised {
             slopes: equations::rate_slopes(&states[point], &inputs.values[2 * point], terms),
@@ -262,7 +262,7 @@ impl Linearisation<'_> {
     ) -> Sensitivities {
         let h = 2.0 * self.window.point_step_s();
         let (reaches_s, weights_s) = (reaches_s(h), weights_s(h));
-        let by_error = self.path.inputs.mean_by_error(2 * node, h);
+        let by_error = self.trajectory.inputs.mean_by_error(2 * node, h);
         let forcing = linearised.map(|at| at.forcing(&by_error));
         let mut end = *s;
         // Stages alternate between two buffers: copies would take a third of the time.
@@ -296,11 +296,11 @@ impl Linearisation<'_> {
     /// reading contains, and along the output's own bias, scale and delay.
     #[inline(always)]
     fn reading_rows<S: Simd>(&self, simd: S, node: usize, s: &Sensitivities) -> [Row; OUTPUTS] {
-        let Path {
+        let Trajectory {
             inputs,
             states,
             readings,
-        } = self.path;
+        } = self.trajectory;
         let point = 2 * node;
         let (x, input) = (&states[point], &inputs.values[2 * point]);
         let at = equations::reading_slopes(self.aircraft, x, input, &self.window.terms[point]);

@@ -396,19 +396,19 @@ fn changed(
 const STEP_ERROR: f64 = 0.02;
 
 #[test]
-fn the_path_is_that_of_steps_twenty_times_as_short() {
+fn the_trajectory_is_that_of_steps_twenty_times_as_short() {
     let record = flight(24.0);
     let window = windows(&record).remove(0);
     let mut local = [0.0; LOCAL];
     local[..STATES].copy_from_slice(window.start.as_slice());
     let shared = [0.0; PARAMETERS];
-    let path = reconstruct(&window, &aircraft(), &local, &shared).unwrap();
+    let trajectory = reconstruct(&window, &aircraft(), &local, &shared).unwrap();
     let samples = window.margin..window.samples - window.margin;
-    let comparison = Comparison::of(&window, &path, &shared, &samples);
+    let comparison = Comparison::of(&window, &trajectory, &shared, &samples);
     for o in 0..OUTPUTS {
         let allowed = STEP_ERROR * NOISE[INPUTS + o];
         let measured = window.outputs[o].iter().step_by(window.samples_per_point);
-        for (point, (reading, exact)) in path.readings[o].iter().zip(measured).enumerate() {
+        for (point, (reading, exact)) in trajectory.readings[o].iter().zip(measured).enumerate() {
             let error = (reading - exact).abs();
             assert!(
                 error < allowed,
@@ -477,15 +477,15 @@ fn nodding_at_one_hertz_neither_turns_nor_accelerates() {
     let window = nodding_window(800);
     let mut local = [0.0; LOCAL];
     local[..STATES].copy_from_slice(window.start.as_slice());
-    let path = reconstruct(&window, &aircraft(), &local, &[0.0; PARAMETERS]).unwrap();
+    let trajectory = reconstruct(&window, &aircraft(), &local, &[0.0; PARAMETERS]).unwrap();
     for point in 0..window.points() {
         let t = point as f64 * window.point_step_s();
         assert_relative_eq!(
-            path.readings[2][point],
+            trajectory.readings[2][point],
             300.0 + PULL * t,
             max_relative = 1e-4
         );
-        assert_abs_diff_eq!(path.readings[3][point], DEG * nod(t), epsilon = 0.002);
+        assert_abs_diff_eq!(trajectory.readings[3][point], DEG * nod(t), epsilon = 0.002);
     }
 }
 
@@ -504,8 +504,8 @@ fn sensitivities_of_the_readings_are_those_of_finite_differences() {
             .unwrap()
             .readings
     };
-    let path = reconstruct(&window, &aircraft, &local, &shared).unwrap();
-    let at = sensitivities(&window, &aircraft, &shared, &path);
+    let trajectory = reconstruct(&window, &aircraft, &local, &shared).unwrap();
+    let at = sensitivities(&window, &aircraft, &shared, &trajectory);
     for column in 0..DRIVING {
         let h = 1e-6 * local.get(column).map_or(1.0, |l| l.abs().max(1.0));
         let moved = |change| {
@@ -539,12 +539,12 @@ fn the_gradient_of_each_output_is_that_of_finite_differences_of_its_squares() {
     let aircraft = aircraft();
     let samples = window.margin..window.samples - window.margin;
     let compared = |local: &LocalParameters, shared: &[f64; PARAMETERS]| {
-        let path = reconstruct(&window, &aircraft, local, shared).unwrap();
-        Comparison::of(&window, &path, shared, &samples)
+        let trajectory = reconstruct(&window, &aircraft, local, shared).unwrap();
+        Comparison::of(&window, &trajectory, shared, &samples)
     };
     let at = compared(&local, &shared);
-    let path = reconstruct(&window, &aircraft, &local, &shared).unwrap();
-    let slopes = sensitivities(&window, &aircraft, &shared, &path);
+    let trajectory = reconstruct(&window, &aircraft, &local, &shared).unwrap();
+    let slopes = sensitivities(&window, &aircraft, &shared, &trajectory);
     let gradients = at.gradients(&slopes);
     let linearised = LinearisedWindow::of(slopes, &at);
     for o in 0..OUTPUTS {

@@ -9,7 +9,9 @@ use nalgebra::{DMatrix, DVector};
 use super::equations::STATES;
 use super::input_noise::{score_covariance, with_input_noise};
 use super::parameters::{INPUTS, Kind, OUTPUTS, PARAMETERS, Parameters, output};
-use super::reconstruction::{LOCAL, LocalParameters, Path, Row, WIND, reconstruct, sensitivities};
+use super::reconstruction::{
+    LOCAL, LocalParameters, Row, Trajectory, WIND, reconstruct, sensitivities,
+};
 use super::settings::Compatibility;
 use super::window::Window;
 use super::window_sums::{Comparison, LinearisedWindow, ReducedInformation, weighted_gradient};
@@ -57,7 +59,7 @@ pub struct WindowFit<'a> {
     local: LocalParameters,
     /// R: long-run variances of the outputs' residuals.
     variances: [f64; OUTPUTS],
-    path: Path,
+    trajectory: Trajectory,
     comparison: Comparison,
     linearised: Arc<LinearisedWindow>,
     information: Arc<ReducedInformation>,
@@ -121,9 +123,9 @@ impl<'a> WindowFit<'a> {
             let bias = context.settings.ordinary.of(INPUTS + output, Kind::Bias);
             bias.powi(2)
         });
-        let path = reconstruct(window, context.aircraft, &local, shared)?;
-        let comparison = Comparison::of(window, &path, shared, &context.compared(window));
-        let slopes = sensitivities(window, context.aircraft, shared, &path);
+        let trajectory = reconstruct(window, context.aircraft, &local, shared)?;
+        let comparison = Comparison::of(window, &trajectory, shared, &context.compared(window));
+        let slopes = sensitivities(window, context.aircraft, shared, &trajectory);
         let linearised = LinearisedWindow::of(slopes, &comparison);
         let priors = local_priors(window, &local, context);
         let information = reduced_information(&linearised, &variances, &priors)?;
@@ -132,7 +134,7 @@ impl<'a> WindowFit<'a> {
             window,
             local,
             variances,
-            path,
+            trajectory,
             comparison,
             linearised: Arc::new(linearised),
             information: Arc::new(information),
@@ -164,16 +166,16 @@ impl<'a> WindowFit<'a> {
     ) -> Option<WindowFit<'a>> {
         let local_step = self.information.local_step(&self.full_gradient, step);
         let local = std::array::from_fn(|i| self.local[i] + share * local_step[i]);
-        let path = reconstruct(self.window, context.aircraft, &local, shared)?;
+        let trajectory = reconstruct(self.window, context.aircraft, &local, shared)?;
         let samples = context.compared(self.window);
-        let comparison = Comparison::of(self.window, &path, shared, &samples);
+        let comparison = Comparison::of(self.window, &trajectory, shared, &samples);
         let mut moved = WindowFit {
             window: self.window,
             local,
             variances: self.variances,
             gradients: comparison.gradients(&self.linearised.sensitivities),
             comparison,
-            path,
+            trajectory,
             linearised: Arc::clone(&self.linearised),
             information: Arc::clone(&self.information),
             full_gradient: DVector::zeros(0),
@@ -188,7 +190,7 @@ impl<'a> WindowFit<'a> {
 
     /// Linearises the equations anew, about the present parameters.
     pub fn linearise(&mut self, context: &FitContext, shared: &Parameters) {
-        let slopes = sensitivities(self.window, context.aircraft, shared, &self.path);
+        let slopes = sensitivities(self.window, context.aircraft, shared, &self.trajectory);
         self.gradients = self.comparison.gradients(&slopes);
         self.linearised = Arc::new(LinearisedWindow::of(slopes, &self.comparison));
         self.weigh(context);

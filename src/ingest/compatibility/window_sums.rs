@@ -12,7 +12,9 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use pulp::{Arch, Simd, WithSimd};
 
 use super::parameters::{ALL_KINDS, INPUTS, KINDS, Kind, OUTPUTS, PARAMETERS, Parameters, place};
-use super::reconstruction::{LOCAL, Path, PathSensitivities, ROW, Row, WIDE, shared_place};
+use super::reconstruction::{
+    LOCAL, ROW, Row, Trajectory, TrajectorySensitivities, WIDE, shared_place,
+};
 use super::window::Window;
 use crate::flight::interpolation_kernel::InterpolationKernel;
 use crate::numerics::row_products::StridedRows;
@@ -33,7 +35,7 @@ pub fn place_among_all(column: usize, output: usize) -> usize {
     }
 }
 
-/// Comparison of a window's outputs with what the instruments read along a path.
+/// Comparison of a window's outputs with what the instruments read along a trajectory.
 #[derive(Clone, Debug)]
 pub struct Comparison {
     /// Residuals of each output at every sample; NaN where the output does not count.
@@ -106,7 +108,7 @@ impl Comparison {
     /// Compares some samples of a window.
     pub fn of(
         window: &Window,
-        path: &Path,
+        trajectory: &Trajectory,
         shared: &Parameters,
         samples: &Range<usize>,
     ) -> Comparison {
@@ -125,7 +127,7 @@ impl Comparison {
             },
         };
         for (output, error) in errors.into_iter().enumerate() {
-            comparison.compare(output, window, &path.readings[output], error, samples);
+            comparison.compare(output, window, &trajectory.readings[output], error, samples);
             comparison.share_out(output);
         }
         comparison
@@ -176,7 +178,7 @@ impl Comparison {
     }
 
     /// Σ s v of each output, s its sensitivities.
-    pub fn gradients(&self, sensitivities: &PathSensitivities) -> [Row; OUTPUTS] {
+    pub fn gradients(&self, sensitivities: &TrajectorySensitivities) -> [Row; OUTPUTS] {
         Arch::new().dispatch(Gradients {
             rows: &sensitivities.rows,
             residuals: &self.sums,
@@ -211,11 +213,11 @@ impl WithSimd for Gradients<'_> {
     }
 }
 
-/// Equations of a window linearised about a path, with the sums that do not depend on the weights of
+/// Equations of a window linearised about a trajectory, with the sums that do not depend on the weights of
 /// the outputs.
 #[derive(Debug)]
 pub struct LinearisedWindow {
-    pub sensitivities: PathSensitivities,
+    pub sensitivities: TrajectorySensitivities,
     /// Numbers of samples that each node stands for.
     pub counts: [Vec<f64>; OUTPUTS],
     /// Σ s sᵀ of each output. The lower triangle counts.
@@ -223,7 +225,7 @@ pub struct LinearisedWindow {
 }
 
 impl LinearisedWindow {
-    pub fn of(sensitivities: PathSensitivities, comparison: &Comparison) -> LinearisedWindow {
+    pub fn of(sensitivities: TrajectorySensitivities, comparison: &Comparison) -> LinearisedWindow {
         let mut rows = AlignedBuffer::zeros(sensitivities.rows.len() * WIDE);
         let counts: [_; OUTPUTS] = std::array::from_fn(|output| comparison.counts(output));
         let products = |output: usize| {
