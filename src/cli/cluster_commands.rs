@@ -262,16 +262,11 @@ pub fn submit(options: &SubmitOptions) -> anyhow::Result<ExitCode> {
         atomic::place(&out.join(script.name), script.text.as_bytes())?;
     }
     let bars = Bars::new(options.options.quiet, None);
-    let plan = shard::deal(
-        &config,
-        Dealt::Flights,
-        config.cluster.shards,
-        &plan_file(&config, Dealt::Flights),
-        &bars,
-    )?;
+    let file = plan_file(&config, Dealt::Flights);
+    let plan = shard::deal(&config, Dealt::Flights, config.cluster.shards, &file, &bars)?;
     let submit = out.join("submit.sh");
     if !options.options.quiet {
-        print_plan(&plan, &plan_file(&config, Dealt::Flights));
+        print_plan(&plan, &file);
         if config.cluster.shards > LARGEST_ARRAY {
             out!("arrays of more than {LARGEST_ARRAY} need a larger MaxArraySize of the scheduler");
         }
@@ -282,14 +277,20 @@ pub fn submit(options: &SubmitOptions) -> anyhow::Result<ExitCode> {
         );
     }
     if options.go {
-        let status = Command::new("bash")
-            .arg(&submit)
-            .status()
-            .with_context(|| format!("cannot run {}", submit.display()))?;
-        anyhow::ensure!(
-            status.success(),
-            "the scheduler did not accept the jobs: {status}"
-        );
+        run_script(&submit)?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Runs the script that submits the jobs.
+fn run_script(script: &Path) -> anyhow::Result<()> {
+    let status = Command::new("bash")
+        .arg(script)
+        .status()
+        .with_context(|| format!("cannot run {}", script.display()))?;
+    anyhow::ensure!(
+        status.success(),
+        "the scheduler did not accept the jobs: {status}"
+    );
+    Ok(())
 }

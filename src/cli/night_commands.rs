@@ -1,6 +1,6 @@
 //! The commands `status`, `explain`, `diff`, `verify` and `gc`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
@@ -9,6 +9,7 @@ use super::bars::Bars;
 use super::changes::{self, MOST_LISTED};
 use super::cluster_commands;
 use super::options::{ATTENTION, Options, Patience, REJECTED, exit_code, start_threads};
+use crate::night::status::NightStatus;
 use crate::night::{diff, explain, gc, status, verify};
 
 #[derive(Args, Debug)]
@@ -82,58 +83,61 @@ pub fn status(options: &StatusOptions) -> anyhow::Result<ExitCode> {
         return cluster_commands::missing(&options.options, plan);
     }
     let options = &options.options;
-    let status = status::status(&options.load()?, &bars(options)?)?;
+    let config = options.load()?;
+    let status = status::status(&config, &bars(options)?)?;
     if !options.quiet {
-        match (&status.night, &status.damaged_night) {
-            (Some(night), _) => out!(
-                "night {night} is published in {}",
-                options.load()?.reports.display()
-            ),
-            (None, Some(night)) => out!(
-                "night {night} is damaged: its night.json is not as it was published; the next run \
-                 publishes another night"
-            ),
-            (None, None) => out!("no night is published yet"),
-        }
-        for (flight_id, since) in &status.in_work {
-            out!("in work: flight {flight_id} since {since}");
-        }
-        out!("{:<9} {:>6} {:>6} {:>6}", "", "fresh", "stale", "failed");
-        for stage in &status.stages {
-            let stale: usize = stage.stale.values().map(Vec::len).sum();
-            out!(
-                "{:<9} {:>6} {stale:>6} {:>6}",
-                stage.stage.name(),
-                stage.fresh,
-                stage.failed.len()
-            );
-        }
-        for stage in &status.stages {
-            for (why, items) in &stage.stale {
-                out!(
-                    "  {}: stale: {}: {why}",
-                    stage.stage.name(),
-                    first_items(items)
-                );
-            }
-            for failure in stage.failed.iter().take(MOST_LISTED) {
-                let (item, why) = (&failure.item, &failure.reason);
-                out!("  {}: failed: {item}: {why}", stage.stage.name());
-            }
-            if stage.failed.len() > MOST_LISTED {
-                out!(
-                    "  {}: and {} more failed",
-                    stage.stage.name(),
-                    stage.failed.len() - MOST_LISTED
-                );
-            }
-        }
+        print_status(&status, &config.reports);
     }
     Ok(if status.is_fresh() {
         exit_code(status.has_failures(), REJECTED)
     } else {
         ExitCode::from(ATTENTION)
     })
+}
+
+/// Prints the published night, the flights in work, and the artefacts of each stage.
+fn print_status(status: &NightStatus, reports: &Path) {
+    match (&status.night, &status.damaged_night) {
+        (Some(night), _) => out!("night {night} is published in {}", reports.display()),
+        (None, Some(night)) => out!(
+            "night {night} is damaged: its night.json is not as it was published; the next run \
+                 publishes another night"
+        ),
+        (None, None) => out!("no night is published yet"),
+    }
+    for (flight_id, since) in &status.in_work {
+        out!("in work: flight {flight_id} since {since}");
+    }
+    out!("{:<9} {:>6} {:>6} {:>6}", "", "fresh", "stale", "failed");
+    for stage in &status.stages {
+        let stale: usize = stage.stale.values().map(Vec::len).sum();
+        out!(
+            "{:<9} {:>6} {stale:>6} {:>6}",
+            stage.stage.name(),
+            stage.fresh,
+            stage.failed.len()
+        );
+    }
+    for stage in &status.stages {
+        for (why, items) in &stage.stale {
+            out!(
+                "  {}: stale: {}: {why}",
+                stage.stage.name(),
+                first_items(items)
+            );
+        }
+        for failure in stage.failed.iter().take(MOST_LISTED) {
+            let (item, why) = (&failure.item, &failure.reason);
+            out!("  {}: failed: {item}: {why}", stage.stage.name());
+        }
+        if stage.failed.len() > MOST_LISTED {
+            out!(
+                "  {}: and {} more failed",
+                stage.stage.name(),
+                stage.failed.len() - MOST_LISTED
+            );
+        }
+    }
 }
 
 /// The first items, and the number of the others.

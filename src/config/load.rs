@@ -74,11 +74,14 @@ impl Config {
         );
         let template = pipeline.report.template.as_deref();
         let template = template.map(store::files::text).transpose()?;
-        let default = Path::new("data/store").join(&name);
-        let cache = pipeline.store_cache;
-        let (store, shared_store) = places::store(pipeline.store, cache, default, &files.pipeline)?;
-        let default = || Path::new("reports").join(&name);
-        let reports = pipeline.reports.unwrap_or_else(default);
+        let (store, shared_store) = places::store(
+            pipeline.store,
+            pipeline.store_cache,
+            Path::new("data/store").join(&name),
+            &files.pipeline,
+        )?;
+        let default_reports = Path::new("reports").join(&name);
+        let reports = pipeline.reports.unwrap_or(default_reports);
         places::reachable(Path::new(&pipeline.archive))?;
         let read_tables = |file| tunnel_tables::read_optional(file, &buildup, &pipeline.tunnel);
         let tunnel = read_tables(pipeline.wind_tunnel.as_deref())?;
@@ -170,7 +173,7 @@ fn share_keys(pipeline: &mut PipelineFile, errors: &BTreeMap<String, InstrumentE
     }
 }
 
-/// Tells each class the surfaces whose derivatives it estimates and whose steps are found.
+/// Enters into each class the surfaces whose derivatives it estimates and whose steps are found.
 fn name_surfaces(classes: &mut [Class], buildup: &Buildup, segment: &segment::Settings) {
     for class in classes {
         let estimated = buildup

@@ -321,27 +321,35 @@ fn correlations(contents: &ExportContents, table: &ExportTable, xml: &mut Xml) {
     }
 }
 
+/// Gridded tables of a derivative: its values with their uncertainties, and its flag for flight.
 fn gridded(contents: &ExportContents, table: &ExportTable, xml: &mut Xml) {
-    let n = table.alphas_deg.len().max(1);
-    let lines = |of: &dyn Fn(&GridCell) -> f64| -> Vec<String> {
-        let values: Vec<f64> = table.cells.iter().map(of).collect();
-        let rows: Vec<String> = values.chunks(n).map(numbers).collect();
-        let last = rows.len().saturating_sub(1);
-        rows.into_iter()
-            .enumerate()
-            .map(|(i, row)| if i < last { format!("{row},") } else { row })
-            .collect()
-    };
-    let references = |xml: &mut Xml| {
-        xml.open("breakpointRefs", &[]);
-        for (variable, _) in variables(table, None) {
-            xml.empty(
-                "bpRef",
-                &[("bpID", &format!("{}_{variable}", table.derivative))],
-            );
-        }
-        xml.close();
-    };
+    values_table(contents, table, xml);
+    flag_table(table, xml);
+}
+
+/// Values of the cells of a table as lines, one per row of its grid.
+fn data_lines(table: &ExportTable, value: impl Fn(&GridCell) -> f64) -> Vec<String> {
+    let values: Vec<f64> = table.cells.iter().map(value).collect();
+    let rows = values.chunks(table.alphas_deg.len().max(1));
+    let mut lines: Vec<String> = rows.map(|row| format!("{},", numbers(row))).collect();
+    if let Some(last) = lines.last_mut() {
+        last.pop();
+    }
+    lines
+}
+
+/// References of a gridded table to its breakpoints.
+fn breakpoint_references(table: &ExportTable, xml: &mut Xml) {
+    xml.open("breakpointRefs", &[]);
+    for (variable, _) in variables(table, None) {
+        let id = format!("{}_{variable}", table.derivative);
+        xml.empty("bpRef", &[("bpID", &id)]);
+    }
+    xml.close();
+}
+
+/// Gridded table of a derivative's values, with uncertainties if every cell has one.
+fn values_table(contents: &ExportContents, table: &ExportTable, xml: &mut Xml) {
     let id = format!("{}_table", table.derivative);
     xml.open(
         "griddedTableDef",
@@ -352,24 +360,25 @@ fn gridded(contents: &ExportContents, table: &ExportTable, xml: &mut Xml) {
         ],
     );
     xml.text("description", &[], &table.sources());
-    references(xml);
+    breakpoint_references(table, xml);
     if table.cells.iter().all(|c| c.uncertainty.is_some()) {
         xml.open("uncertainty", &[("effect", "additive")]);
         xml.open("normalPDF", &[("numSigmas", "1")]);
         xml.open("bounds", &[]);
-        xml.block(
-            "dataTable",
-            &[],
-            &lines(&|c| c.uncertainty.unwrap_or_default()),
-        );
+        let uncertainties = data_lines(table, |c| c.uncertainty.unwrap_or_default());
+        xml.block("dataTable", &[], &uncertainties);
         xml.close();
         correlations(contents, table, xml);
         for _ in 0..2 {
             xml.close();
         }
     }
-    xml.block("dataTable", &[], &lines(&|c| c.value));
+    xml.block("dataTable", &[], &data_lines(table, |c| c.value));
     xml.close();
+}
+
+/// Gridded table of the flag: 1 in cells that flight mostly determines, else 0.
+fn flag_table(table: &ExportTable, xml: &mut Xml) {
     let flag = flag(&table.derivative);
     xml.open(
         "griddedTableDef",
@@ -379,12 +388,9 @@ fn gridded(contents: &ExportContents, table: &ExportTable, xml: &mut Xml) {
             ("units", "nd"),
         ],
     );
-    references(xml);
-    xml.block(
-        "dataTable",
-        &[],
-        &lines(&|c| f64::from(u8::from(c.is_flight))),
-    );
+    breakpoint_references(table, xml);
+    let flags = data_lines(table, |c| f64::from(u8::from(c.is_flight)));
+    xml.block("dataTable", &[], &flags);
     xml.close();
 }
 

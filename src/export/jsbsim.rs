@@ -256,7 +256,13 @@ fn function(contents: &ExportContents, table: &ExportTable, xml: &mut Xml) {
         .into_iter()
         .filter(|(_, points)| points.len() > 1)
         .collect();
-    match axes.as_slice() {
+    lookup(&axes, &values, xml);
+    xml.close();
+}
+
+/// Writes values over their axes: a constant, or a table of one, two or three variables.
+fn lookup(axes: &[(&str, &[f64])], values: &[f64], xml: &mut Xml) {
+    match axes {
         [] => xml.text(
             "value",
             &[],
@@ -265,11 +271,8 @@ fn function(contents: &ExportContents, table: &ExportTable, xml: &mut Xml) {
         [(property, points)] => {
             xml.open("table", &[]);
             xml.text("independentVar", &[("lookup", "row")], property);
-            let lines: Vec<String> = points
-                .iter()
-                .zip(&values)
-                .map(|(x, y)| format!("{x} {y}"))
-                .collect();
+            let cells = points.iter().zip(values);
+            let lines: Vec<String> = cells.map(|(x, y)| format!("{x} {y}")).collect();
             xml.block("tableData", &[], &lines);
             xml.close();
         }
@@ -288,12 +291,11 @@ fn function(contents: &ExportContents, table: &ExportTable, xml: &mut Xml) {
                     );
                 }
             } else {
-                xml.block("tableData", &[], &plane(rows, columns, &values));
+                xml.block("tableData", &[], &plane(rows, columns, values));
             }
             xml.close();
         }
     }
-    xml.close();
 }
 
 /// Lines of a table of two variables: the columns' breakpoints, then each row's with its values.

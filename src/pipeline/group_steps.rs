@@ -252,9 +252,8 @@ pub fn predict(
     let sources = prediction::predicting_maneuvers(&campaign.maneuvers, &fits, settings);
     let bring = |(i, sources): (usize, &Option<Vec<usize>>)| {
         let Some(sources) = sources else {
-            let predicted =
-                Predicted::not_predicted("its own fit did not converge or is doubtful", 0);
-            return Ok(Some(predicted));
+            let reason = "its own fit did not converge or is doubtful";
+            return Ok(Some(Predicted::not_predicted(reason, 0)));
         };
         let from = sources.iter().filter_map(|&j| {
             let name = campaign.estimate_names.get(j)?;
@@ -262,23 +261,19 @@ pub fn predict(
         });
         let from: Vec<_> = from.collect();
         let member = Member::of(campaign, i).filter(|_| !from.is_empty());
-        match member.zip(estimates.get(i)) {
-            Some((member, own)) => {
-                let step = PredictStep {
-                    config: runner.config,
-                    store: &runner.store,
-                    settings,
-                    member,
-                    own,
-                    from,
-                };
-                Ok(runner.bring(&step)?.map(|brought| brought.artefact))
-            }
-            None => Ok(Some(Predicted::not_predicted(
-                "no other maneuver of its class and angle of attack",
-                0,
-            ))),
-        }
+        let Some((member, own)) = member.zip(estimates.get(i)) else {
+            let reason = "no other maneuver of its class and angle of attack";
+            return Ok(Some(Predicted::not_predicted(reason, 0)));
+        };
+        let step = PredictStep {
+            config: runner.config,
+            store: &runner.store,
+            settings,
+            member,
+            own,
+            from,
+        };
+        Ok(runner.bring(&step)?.map(|brought| brought.artefact))
     };
     let brought: Result<Vec<Option<Predicted>>> =
         sources.par_iter().enumerate().map(bring).collect();

@@ -5,9 +5,10 @@ use super::conductor::{Conductor, step_versions};
 use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::lineage::Changes;
+use crate::maneuver::Class;
 use crate::pdf;
 use crate::report;
-use crate::store::Kind;
+use crate::store::{ArtefactName, Kind};
 use crate::tables::{EstimateRow, History};
 
 /// Published file of the page.
@@ -46,19 +47,14 @@ pub fn make_report(
         .maneuvers
         .iter()
         .zip(&campaign.estimate_names)
-        .filter(|(m, _)| pages.contains(&m.maneuver_id));
-    let store = &conductor.runner.store;
-    let histories: Vec<History> = with_page
-        .filter_map(|(_, name)| store.load::<Option<History>>(&name.sibling(Kind::History))?)
-        .collect();
-    let classes = config.classes.iter();
-    let classes: Vec<_> = classes
-        .map(|c| report::ConfiguredClass {
-            name: c.name.clone(),
-            title: c.title.clone(),
-            axis: c.axis,
-        })
-        .collect();
+        .filter(|(maneuver, _)| pages.contains(&maneuver.maneuver_id));
+    let history = |name: &ArtefactName| {
+        let name = name.sibling(Kind::History);
+        conductor.runner.store.load::<Option<History>>(&name)?
+    };
+    let histories: Vec<History> = with_page.filter_map(|(_, name)| history(name)).collect();
+    let classes = config.classes.iter().map(configured_class);
+    let classes: Vec<report::ConfiguredClass> = classes.collect();
     let estimates: Vec<EstimateRow> = campaign.estimates_and_sums().cloned().collect();
     let contents = report::Contents {
         title: &config.title,
@@ -98,6 +94,14 @@ pub fn make_report(
         .map_err(|e| Error::store(&config.reports.join(PAGE), &e))?;
     let pdf = pdf::pdf(&html);
     Ok(Report { html, pdf })
+}
+
+fn configured_class(class: &Class) -> report::ConfiguredClass {
+    report::ConfiguredClass {
+        name: class.name.clone(),
+        title: class.title.clone(),
+        axis: class.axis,
+    }
 }
 
 /// Everything that decided the results, so that anyone can make them again.

@@ -57,17 +57,15 @@ pub fn with_events(
             Err(reason) => problems.push(problems::at_time(record, event.start_s, reason)),
         }
     }
-    let (explained, unknown): (Vec<Unknown>, Vec<Unknown>) = unknown
-        .into_iter()
-        .partition(|u| given.iter().any(|g| explains(g, u)));
+    let is_explained = |u: &Unknown| given.iter().any(|g| explains(g, u));
+    let (explained, unknown) = unknown.into_iter().partition::<Vec<_>, _>(is_explained);
     let explained = problems::of_unknown(record, &explained);
     problems.retain(|problem| !explained.contains(problem));
-    let kept: Vec<Maneuver> = found
-        .into_iter()
-        .filter(|f| !given.iter().any(|g| replaces(g, f, record.step_s)))
-        .collect();
-    rows.extend(kept.iter().map(|f| compare(None, Some(f))));
-    let mut maneuvers: Vec<Maneuver> = kept.into_iter().chain(given).collect();
+    let is_replaced = |f: &Maneuver| given.iter().any(|g| replaces(g, f, record.step_s));
+    let mut maneuvers = found;
+    maneuvers.retain(|f| !is_replaced(f));
+    rows.extend(maneuvers.iter().map(|f| compare(None, Some(f))));
+    maneuvers.extend(given);
     maneuvers.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
     let time_s = |r: &EventRow| r.given_start_s.or(r.found_start_s).unwrap_or(f64::INFINITY);
     rows.sort_by(|a, b| time_s(a).total_cmp(&time_s(b)));

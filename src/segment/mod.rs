@@ -27,7 +27,7 @@ use std::collections::BTreeSet;
 
 use crate::aircraft::Aircraft;
 use crate::flight::Record;
-use crate::maneuver::{Acceptance, Class};
+use crate::maneuver::{Acceptance, Class, Maneuver};
 use noisy_controls::{control_noise, without_noisy_controls};
 use recognition::detections::Detections;
 use recognition::found::FoundManeuver;
@@ -64,6 +64,15 @@ pub fn signals(classes: &[Class], settings: &Settings) -> BTreeSet<String> {
     signals
 }
 
+/// Reason for which a maneuver is rejected, by its quality or because its condition cannot be computed.
+fn rejection_of(maneuver: Result<Maneuver, String>) -> Option<String> {
+    match maneuver.map(|maneuver| maneuver.quality) {
+        Ok(quality) if quality.verdict == Acceptance::Accepted => None,
+        Ok(quality) => Some(quality.reason),
+        Err(reason) => Some(reason),
+    }
+}
+
 /// Finds the maneuvers of one record.
 ///
 /// Excitation that fits no class or several is `unknown` and a problem. Stuck flags and signals
@@ -90,17 +99,12 @@ pub fn maneuvers(
     };
     let rejection = |found: &FoundManeuver| {
         let alone = windows(&detections, std::slice::from_ref(found));
-        let maneuver = maneuver(found, *alone.first()?);
-        let quality = maneuver.map(|maneuver| maneuver.quality);
-        match quality {
-            Ok(quality) if quality.verdict == Acceptance::Accepted => None,
-            Ok(quality) => Some(quality.reason),
-            Err(reason) => Some(reason),
-        }
+        rejection_of(maneuver(found, *alone.first()?))
     };
     let mut recognition = without_overlaps(&detections, recognition, rejection);
-    let nothing = nothing_found(&detections, &recognition);
-    recognition.unknown.extend(nothing);
+    recognition
+        .unknown
+        .extend(nothing_found(&detections, &recognition));
     let windows = windows(&detections, &recognition.found);
     problems.extend(problems::of_unknown(record, &recognition.unknown));
     problems.extend(problems::of_stuck_flags(record, &recognition.found));

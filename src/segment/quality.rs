@@ -42,14 +42,11 @@ pub(super) fn measure(
     is_given: bool,
 ) -> Quality {
     let whole = record.sample_at(maneuver.start_s)..=record.sample_at(maneuver.end_s);
-    let first_s = maneuver
-        .recognised
-        .first_input_s
-        .unwrap_or(maneuver.start_s + class.recognition.lead_in_s);
-    let last_s = maneuver
-        .recognised
-        .last_input_s
-        .unwrap_or(maneuver.end_s - class.recognition.decay_s);
+    let (recognised, recognition) = (&maneuver.recognised, &class.recognition);
+    let default_first_s = maneuver.start_s + recognition.lead_in_s;
+    let default_last_s = maneuver.end_s - recognition.decay_s;
+    let first_s = recognised.first_input_s.unwrap_or(default_first_s);
+    let last_s = recognised.last_input_s.unwrap_or(default_last_s);
     let lead_in = *whole.start()..=record.sample_at(first_s - CLEAR_OF_INPUT_S);
     let excited = record.sample_at(first_s)..=record.sample_at(last_s);
     let own = rates(class.axis);
@@ -66,21 +63,18 @@ pub(super) fn measure(
         ..Quality::default()
     };
     let not_recorded = states_not_recorded(record, class.axis);
-    let beyond = reasons(&measured, limits);
-    let all: Vec<&str> = not_recorded
-        .iter()
-        .chain(&beyond)
-        .map(String::as_str)
+    let is_accepted = is_given && not_recorded.is_none();
+    let reasons: Vec<String> = not_recorded
+        .into_iter()
+        .chain(reasons(&measured, limits))
         .collect();
-    let reason = all.join("; ");
-    let verdict = if reason.is_empty() || is_given && not_recorded.is_none() {
-        Acceptance::Accepted
-    } else {
-        Acceptance::Rejected
-    };
     Quality {
-        verdict,
-        reason,
+        verdict: if is_accepted || reasons.is_empty() {
+            Acceptance::Accepted
+        } else {
+            Acceptance::Rejected
+        },
+        reason: reasons.join("; "),
         ..measured
     }
 }

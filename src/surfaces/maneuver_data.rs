@@ -85,48 +85,54 @@ impl ManeuverData {
             ..Model::default()
         };
         let case = Case::<NX, E>::new(basis.aircraft, &window, Measurements::default(), &model);
-        let frequencies_hz = band.frequencies_hz();
-        let slope_response = slope_response(&frequencies_hz, record.step_s);
         let regressors = regressors(&band, &case);
+        let condition = maneuver.condition(basis.tunnel);
         let term = |j: usize| {
             let derivative = basis.buildup.derivative(&case.names[j])?;
             let regressor = regressors.get(&case.terms[j].column)?;
-            let condition = maneuver.condition(basis.tunnel);
+            let tunnel = basis.tunnel.at(&derivative.name, &condition);
             Some(TermData {
                 regressor: regressor.clone(),
                 surface: surface_index(derivative, &surfaces),
-                tunnel: basis
-                    .tunnel
-                    .at(&derivative.name, &condition)
-                    .map(|v| v.value),
+                tunnel: tunnel.map(|reading| reading.value),
                 size: basis.tunnel.root_mean_square(&derivative.name),
             })
         };
-        let implied = |k: usize| case.motion.implied.iter().map(|c| c[k]).collect();
-        let implied: Vec<Vec<f64>> = (0..COEFFICIENTS).map(implied).collect();
         let is_measured = |k: usize| {
             let accelerometer = E::AXIS.coefficients()[k].accelerometer();
             accelerometer.is_none_or(|output| !record.is_assumed(output.signal()))
         };
-        let coefficients = band.spectra(&implied).into_iter().enumerate();
-        let coefficients = coefficients
-            .filter(|(k, _)| is_measured(*k))
-            .map(|(k, mut implied)| {
-                if E::AXIS.coefficients()[k].is_moment() {
-                    divide(&mut implied, &slope_response);
-                }
-                CoefficientData {
-                    implied,
-                    terms: case.ranges[k].clone().filter_map(&term).collect(),
-                }
-            })
-            .collect();
+        let implied = implied_spectra(&band, &case, record.step_s).into_iter();
+        let measured = implied.enumerate().filter(|(k, _)| is_measured(*k));
+        let coefficients = measured.map(|(k, implied)| CoefficientData {
+            implied,
+            terms: case.ranges[k].clone().filter_map(&term).collect(),
+        });
         Some(ManeuverData {
-            frequencies_hz,
+            frequencies_hz: band.frequencies_hz(),
+            coefficients: coefficients.collect(),
             surfaces,
-            coefficients,
         })
     }
+}
+
+/// Spectra of the coefficients that the measured motion implies. Moments follow from slopes of the
+/// rates, whose response to frequency is removed.
+fn implied_spectra<const NX: usize, E: Equations<NX>>(
+    band: &Band,
+    case: &Case<NX, E>,
+    step_s: f64,
+) -> Vec<Vec<Complex<f64>>> {
+    let implied = |k: usize| case.motion.implied.iter().map(|c| c[k]).collect();
+    let implied: Vec<Vec<f64>> = (0..COEFFICIENTS).map(implied).collect();
+    let slope_response = slope_response(&band.frequencies_hz(), step_s);
+    let mut spectra = band.spectra(&implied);
+    for (spectrum, coefficient) in spectra.iter_mut().zip(E::AXIS.coefficients()) {
+        if coefficient.is_moment() {
+            divide(spectrum, &slope_response);
+        }
+    }
+    spectra
 }
 
 /// Spectra of the distinct columns of regressors.

@@ -88,11 +88,7 @@ fn trends_of_derivative(
     let mut trends = Trends::default();
     let group = settings.group_of(derivative);
     if let Some(group) = group {
-        let members: Vec<&EstimateRow> = own
-            .iter()
-            .filter(|e| group.has(&e.class))
-            .copied()
-            .collect();
+        let members = members(own, |class| group.has(class));
         let knots = group.knots_deg.as_ref().unwrap_or(&settings.knots_deg);
         if members.len() < FEWEST_MANEUVERS {
             trends.rows = mean_rows(&members, &group.name, settings);
@@ -106,13 +102,10 @@ fn trends_of_derivative(
         }
     }
     if settings.per_class {
-        let names: BTreeSet<&str> = own.iter().map(|e| e.class.as_str()).collect();
-        for class in names
-            .into_iter()
-            .filter(|name| group.is_none_or(|g| g.name != *name))
-        {
-            let members: Vec<&EstimateRow> =
-                own.iter().filter(|e| e.class == class).copied().collect();
+        let mut classes: BTreeSet<&str> = own.iter().map(|e| e.class.as_str()).collect();
+        classes.retain(|class| group.is_none_or(|group| group.name != *class));
+        for class in classes {
+            let members = members(own, |other| other == class);
             // Outliers of the class's trend are not published: the group's trend names them too.
             let of_class = fit_trend(&members, class, settings, &settings.knots_deg, further);
             trends
@@ -121,6 +114,15 @@ fn trends_of_derivative(
         }
     }
     trends
+}
+
+/// Estimates of some classes.
+fn members<'a>(
+    estimates: &[&'a EstimateRow],
+    is_member: impl Fn(&str) -> bool,
+) -> Vec<&'a EstimateRow> {
+    let members = estimates.iter().filter(|e| is_member(&e.class));
+    members.copied().collect()
 }
 
 /// The usable estimates of each derivative, derivatives in order of appearance.
@@ -178,13 +180,14 @@ fn fit_trend(
     let fit = Trend::through(&points, settings, knots_deg)
         .ok_or("the least-squares fit has no solution")?;
     let outliers = outliers(&placed, &fit, group, settings.outlier_z);
-    let (half_width, named) = (fit.best.quantile_95(), outliers.len());
+    let quantile_95 = fit.best.quantile_95();
     let one_more = fit.best.deviation_of_one_more();
     let row = |alpha_deg: f64| {
-        let (value, own_error) = fit.value_and_error(clamp_to_data(&points, alpha_deg));
-        let standard_error =
-            own_error.hypot(common_error(members, alpha_deg, settings.alpha_step_deg));
-        let prediction = half_width * standard_error.hypot(one_more);
+        let (value, fit_error) = fit.value_and_error(clamp_to_data(&points, alpha_deg));
+        let common_error = common_error(members, alpha_deg, settings.alpha_step_deg);
+        let standard_error = fit_error.hypot(common_error);
+        let half_width = quantile_95 * standard_error;
+        let prediction = quantile_95 * standard_error.hypot(one_more);
         TrendRow {
             derivative: members[0].derivative.clone(),
             unit: members[0].unit.clone(),
@@ -192,24 +195,19 @@ fn fit_trend(
             alpha_deg,
             value,
             standard_error,
-            lower_95: value - half_width * standard_error,
-            upper_95: value + half_width * standard_error,
+            lower_95: value - half_width,
+            upper_95: value + half_width,
             prediction_lower_95: value - prediction,
             prediction_upper_95: value + prediction,
             maneuvers: points.len(),
-            outliers: named,
+            outliers: outliers.len(),
             curve: fit.best.basis().name(),
             order: fit.best.basis().order(),
             scatter: fit.best.scatter(),
         }
     };
-    Ok((
-        grid(&points, settings, breakpoints)
-            .into_iter()
-            .map(row)
-            .collect(),
-        outliers,
-    ))
+    let grid = grid(&points, settings, breakpoints);
+    Ok((grid.into_iter().map(row).collect(), outliers))
 }
 
 /// Estimates with their points, sorted by α: sums do not depend on the order in which the maneuvers

@@ -1,14 +1,19 @@
 //! Figures of the report and strip charts, as SVG text.
 //!
-//! In the order of use: `style` (colours, font), `scale` (limits and ticks of an axis),
-//! `legend`, `marker` (one per maneuver class), `verdict_bar`, `derivative_figure`
-//! (estimates over angle of attack; the only file that uses the plotting crate), `svg_writer`,
-//! `layers` (everything alike as one path), `strips` (signals over time, the renderer of all strip
-//! charts), `strip_figure` (time histories of the report) and `annotated_chart` (strip charts with
-//! shaded maneuvers).
-//! `xy_chart` draws one quantity over another, with levels.
+//! In the order of use:
+//!
+//! - `style` (colours, font), `scale` (limits and ticks of an axis), `legend`, `marker` (one per
+//!   maneuver class), `verdict_bar`;
+//! - `derivative_figure`: estimates over angle of attack; the only file that uses the plotting crate;
+//! - `svg_writer`, and `layers` (shapes of one style as one path);
+//! - `strips` (signals over time, the renderer of all strip charts), `strip_figure` (time histories
+//!   of the report), `annotated_chart` (strip charts with shaded maneuvers);
+//! - `xy_chart`: one quantity over another, with levels; `chart_axis` and `chart_labels` are its
+//!   parts.
 
 pub mod annotated_chart;
+pub mod chart_axis;
+mod chart_labels;
 pub mod derivative_figure;
 mod layers;
 pub mod legend;

@@ -2,29 +2,17 @@
 
 use std::fmt::Write;
 
-use super::scale::Scale;
+use super::chart_axis::ChartAxis;
+use super::chart_labels::{
+    ASCENT, Area, LABEL_GAPS, Labels, MARGINS, SIZE, TEXT, corners_inside, frame, width_of,
+};
 use super::style::{FAINT, INK};
 use super::svg_writer::{
     Alternative, Anchor, PathStyle, SvgWriter, TextStyle, coordinate, rectangle,
 };
-use crate::report::notation::Digits;
 
-/// Half the width of a page, where text of 11 units is over 7 pt.
-const SIZE: (f64, f64) = (400.0, 240.0);
-const TEXT: f64 = 11.0;
-/// Left, top, right and bottom margin of the frame.
-const MARGINS: [f64; 4] = [52.0, 8.0, 10.0, 36.0];
 /// Half of the side of a point's mark.
 const MARK: f64 = 2.2;
-
-/// Axis of a chart, linear or logarithmic.
-#[derive(Clone, Debug)]
-pub struct ChartAxis {
-    pub label: String,
-    /// Limits and ticks; of the decimal logarithm on a logarithmic axis.
-    pub scale: Scale,
-    pub is_logarithmic: bool,
-}
 
 /// A point with the outline of its uncertainty.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,68 +54,6 @@ pub struct XyChart<'a> {
     pub series: Vec<ChartSeries>,
 }
 
-impl ChartAxis {
-    #[must_use]
-    pub fn linear(label: &str, scale: Scale) -> ChartAxis {
-        ChartAxis {
-            label: label.to_owned(),
-            scale,
-            is_logarithmic: false,
-        }
-    }
-
-    /// Share of the axis at a value, kept inside the frame; `None` for a value that has no place.
-    fn share(&self, value: f64) -> Option<f64> {
-        let placed = if self.is_logarithmic {
-            value.max(f64::MIN_POSITIVE).log10()
-        } else {
-            value
-        };
-        let share = (placed - self.scale.min) / (self.scale.max - self.scale.min);
-        share.is_finite().then_some(share.clamp(0.0, 1.0))
-    }
-
-    /// Ticks with their labels.
-    fn ticks(&self) -> Vec<(f64, String)> {
-        let digits = Digits::of_ticks(self.scale.decimals());
-        let count = ((self.scale.max - self.scale.min) / self.scale.step + 1e-6).floor();
-        let first = (self.scale.min / self.scale.step - 1e-6).ceil() * self.scale.step;
-        let mut ticks = Vec::new();
-        let mut i = 0.0;
-        while i <= count {
-            let place = first + i * self.scale.step;
-            i += 1.0;
-            if place > self.scale.max + 1e-9 * self.scale.step {
-                break;
-            }
-            let label = if self.is_logarithmic {
-                format!("{}", 10_f64.powf(place))
-            } else {
-                digits.write(Some(place))
-            };
-            let value = if self.is_logarithmic {
-                10_f64.powf(place)
-            } else {
-                place
-            };
-            ticks.push((value, label));
-        }
-        ticks
-    }
-}
-
-/// Logarithmic scale of whole decades that covers values.
-#[must_use]
-pub fn decades(low: f64, high: f64) -> Scale {
-    let least = low.max(1e-12).log10().floor();
-    let most = high.max(1e-12).log10().ceil();
-    Scale {
-        min: least,
-        max: most.max(least + 1.0),
-        step: 1.0,
-    }
-}
-
 /// Draws the chart.
 #[must_use]
 pub fn draw(chart: &XyChart) -> String {
@@ -152,55 +78,8 @@ struct Pen<'a> {
     chart: &'a XyChart<'a>,
 }
 
-/// Width of a letter over its height: an upper estimate.
-const LETTER: f64 = 0.6;
-/// Share of the text's height above the base line.
-const ASCENT: f64 = 0.8;
-/// Distance of a label from the side of its box.
-const LABEL_GAP: f64 = 4.0;
-
-/// Distances of a label from its point, the first that is free counts.
-const LABEL_GAPS: [f64; 5] = [3.0, 6.0, 12.0, 20.0, 30.0];
 /// Areas that a piece of a line is divided into.
 const LINE_AREAS: u32 = 24;
-
-/// Left, top, right and bottom of an area.
-type Area = [f64; 4];
-
-fn overlap(a: &Area, b: &Area) -> bool {
-    a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]
-}
-
-/// Areas of the labels written so far.
-#[derive(Debug, Default)]
-struct Labels {
-    areas: Vec<Area>,
-}
-
-impl Labels {
-    /// Takes the first place inside the frame that overlaps neither a label nor one of the areas to avoid.
-    /// Returns the left end of the text's base line.
-    fn place(
-        &mut self,
-        text: &str,
-        corners: &[(f64, f64)],
-        avoided: &[Area],
-    ) -> Option<(f64, f64)> {
-        let [left, top, right, bottom] = Pen::frame();
-        let width = LETTER * TEXT * text.chars().count() as f64;
-        let areas = corners.iter().map(|(x, y)| [*x, *y, x + width, y + TEXT]);
-        let is_free = |area: &Area| {
-            area[0] >= left
-                && area[1] >= top
-                && area[2] <= right
-                && area[3] <= bottom
-                && !self.areas.iter().chain(avoided).any(|a| overlap(a, area))
-        };
-        let area = areas.into_iter().find(is_free)?;
-        self.areas.push(area);
-        Some((area[0], area[1] + ASCENT * TEXT))
-    }
-}
 
 impl Pen<'_> {
     fn x(&self, value: f64) -> Option<f64> {
@@ -217,18 +96,9 @@ impl Pen<'_> {
         Some((self.x(x)?, self.y(y)?))
     }
 
-    fn frame() -> [f64; 4] {
-        [
-            MARGINS[0],
-            MARGINS[1],
-            SIZE.0 - MARGINS[2],
-            SIZE.1 - MARGINS[3],
-        ]
-    }
-
     /// Area of a box; `None` for one without a width or height.
     fn area(&self, level: &LevelBox) -> Option<Area> {
-        let [left, top, right, bottom] = Pen::frame();
+        let [left, top, right, bottom] = frame();
         let x = |side: Option<f64>, open: f64| side.and_then(|v| self.x(v)).unwrap_or(open);
         let y = |side: Option<f64>, open: f64| side.and_then(|v| self.y(v)).unwrap_or(open);
         let (from, to) = (x(level.x.0, left), x(level.x.1, right));
@@ -279,7 +149,7 @@ impl Pen<'_> {
                 let Some((x, y)) = self.point_in_frame(point.at) else {
                     continue;
                 };
-                let width = LETTER * TEXT * point.label.chars().count() as f64;
+                let width = width_of(&point.label);
                 let around = |gap: f64| {
                     let (right, left) = (x + gap, x - gap - width);
                     let (above, below) = (y - gap - TEXT, y + gap);
@@ -320,14 +190,36 @@ impl Pen<'_> {
         areas
     }
 
+    /// Draws ticks, lines at zero, the frame, and the labels of the axes.
     fn axes(&self, svg: &mut SvgWriter) {
-        let [left, top, right, bottom] = Pen::frame();
-        let mut grid = String::new();
+        let [left, top, right, bottom] = frame();
+        let mut grid = self.ticks(svg);
+        grid.push_str(&self.lines_at_zero());
+        svg.path(&grid, PathStyle::line(FAINT, 0.7));
+        let outline = rectangle((left, top), (right - left, bottom - top));
+        svg.path(&outline, PathStyle::line(INK, 1.0));
+        let middle = TextStyle {
+            anchor: Anchor::Middle,
+            ..TextStyle::coloured(INK)
+        };
+        let below = (0.5 * (left + right), SIZE.1 - 6.0);
+        svg.text(below, &self.chart.x.label, middle);
+        let upright = TextStyle {
+            is_vertical: true,
+            ..middle
+        };
+        svg.text((12.0, 0.5 * (top + bottom)), &self.chart.y.label, upright);
+    }
+
+    /// Writes the labels of the ticks of both axes; returns the ticks as a path.
+    fn ticks(&self, svg: &mut SvgWriter) -> String {
+        let [left, _, _, bottom] = frame();
+        let mut ticks = String::new();
         let text = TextStyle::coloured(INK);
         for (value, label) in self.chart.x.ticks() {
             let Some(x) = self.x(value) else { continue };
             // Writing into a String cannot fail.
-            let _ = write!(grid, "M{} {}v4", coordinate(x), coordinate(bottom));
+            let _ = write!(ticks, "M{} {}v4", coordinate(x), coordinate(bottom));
             let middle = TextStyle {
                 anchor: Anchor::Middle,
                 ..text
@@ -336,52 +228,31 @@ impl Pen<'_> {
         }
         for (value, label) in self.chart.y.ticks() {
             let Some(y) = self.y(value) else { continue };
-            let _ = write!(grid, "M{} {}h-4", coordinate(left), coordinate(y));
+            let _ = write!(ticks, "M{} {}h-4", coordinate(left), coordinate(y));
             let end = TextStyle {
                 anchor: Anchor::End,
                 ..text
             };
             svg.text((left - 6.0, y + 4.0), &label, end);
         }
-        for (at_zero, is_vertical) in [(self.chart.x.zero(), true), (self.chart.y.zero(), false)] {
-            if !at_zero {
-                continue;
-            }
-            if let (true, Some(x)) = (is_vertical, self.x(0.0)) {
-                let _ = write!(
-                    grid,
-                    "M{} {}V{}",
-                    coordinate(x),
-                    coordinate(top),
-                    coordinate(bottom)
-                );
-            } else if let Some(y) = self.y(0.0) {
-                let _ = write!(
-                    grid,
-                    "M{} {}H{}",
-                    coordinate(left),
-                    coordinate(y),
-                    coordinate(right)
-                );
-            }
+        ticks
+    }
+
+    /// Lines at zero of the axes that contain it, as a path.
+    fn lines_at_zero(&self) -> String {
+        let [left, top, right, bottom] = frame().map(coordinate);
+        let mut lines = String::new();
+        if self.chart.x.contains_zero()
+            && let Some(x) = self.x(0.0)
+        {
+            let _ = write!(lines, "M{} {top}V{bottom}", coordinate(x));
         }
-        svg.path(&grid, PathStyle::line(FAINT, 0.7));
-        let outline = rectangle((left, top), (right - left, bottom - top));
-        svg.path(&outline, PathStyle::line(INK, 1.0));
-        let middle = TextStyle {
-            anchor: Anchor::Middle,
-            ..text
-        };
-        svg.text(
-            (0.5 * (left + right), SIZE.1 - 6.0),
-            &self.chart.x.label,
-            middle,
-        );
-        let upright = TextStyle {
-            is_vertical: true,
-            ..middle
-        };
-        svg.text((12.0, 0.5 * (top + bottom)), &self.chart.y.label, upright);
+        if self.chart.y.contains_zero()
+            && let Some(y) = self.y(0.0)
+        {
+            let _ = write!(lines, "M{left} {}H{right}", coordinate(y));
+        }
+        lines
     }
 
     fn series(&self, svg: &mut SvgWriter, series: &ChartSeries) {
@@ -419,23 +290,10 @@ impl Pen<'_> {
     }
 }
 
-/// Upper left ends of a label in the corners of a box: top right, bottom left, top left, bottom right.
-fn corners_inside(label: &str, [from, upper, to, lower]: &Area) -> [(f64, f64); 4] {
-    let width = LETTER * TEXT * label.chars().count() as f64;
-    let (left, right) = (from + LABEL_GAP, to - LABEL_GAP - width);
-    let (top, bottom) = (upper + LABEL_GAP, lower - LABEL_GAP - TEXT);
-    [(right, top), (left, bottom), (left, top), (right, bottom)]
-}
-
-impl ChartAxis {
-    /// `true` where zero lies inside the axis.
-    fn zero(&self) -> bool {
-        !self.is_logarithmic && self.scale.min < 0.0 && self.scale.max > 0.0
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::chart_axis::decades;
+    use super::super::scale::Scale;
     use super::*;
 
     fn axis(low: f64, high: f64) -> ChartAxis {
@@ -478,7 +336,7 @@ mod tests {
     fn points_are_at_their_values_on_linear_and_logarithmic_axes() {
         let chart = chart();
         let pen = Pen { chart: &chart };
-        let [left, top, right, bottom] = Pen::frame();
+        let [left, top, right, bottom] = frame();
         assert!((pen.x(0.5).unwrap() - 0.5 * (left + right)).abs() < 1e-9);
         // Decades from 0.01 to 10: 0.1 is a third up.
         assert!((pen.y(0.1).unwrap() - (bottom - (bottom - top) / 3.0)).abs() < 1e-9);
@@ -529,7 +387,7 @@ mod tests {
         chart.y = axis(0.0, 1.0);
         chart.boxes.clear();
         chart.series[0].points[0].at = (1.0, 1.0);
-        let [left, top, right, bottom] = Pen::frame();
+        let [left, top, right, bottom] = frame();
         let (_, x, y) = places(&draw(&chart), "10°").remove(0);
         assert!(x > left && x + 12.0 < right, "{x}");
         assert!(y - ASCENT * TEXT >= top && y < bottom, "{y}");

@@ -4,9 +4,10 @@
 use super::quality_charts::QualityChart;
 use crate::numerics::normal::NORMAL_95;
 use crate::report::contents::Contents;
+use crate::report::figure::chart_axis::ChartAxis;
 use crate::report::figure::scale::{Scale, extent};
 use crate::report::figure::style::INK;
-use crate::report::figure::xy_chart::{ChartAxis, ChartPoint, ChartSeries, LevelBox, XyChart};
+use crate::report::figure::xy_chart::{ChartPoint, ChartSeries, LevelBox, XyChart};
 use crate::tables::{
     ALL_FLIGHTS, CommonErrorVerdict, InstrumentError, InstrumentRow, InstrumentTrend,
     InstrumentTrendRow,

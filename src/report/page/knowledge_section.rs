@@ -11,9 +11,10 @@ use crate::aero::Axis;
 use crate::maneuver::Status;
 use crate::numerics::order_statistics::median;
 use crate::report::contents::{Contents, group_by};
+use crate::report::figure::chart_axis::ChartAxis;
 use crate::report::figure::scale::{Scale, extent};
 use crate::report::figure::style::{DARK_COLOURS, INK, TOLERANCE_LIMIT};
-use crate::report::figure::xy_chart::{ChartAxis, ChartPoint, ChartSeries, XyChart};
+use crate::report::figure::xy_chart::{ChartPoint, ChartSeries, XyChart};
 use crate::report::notation::{angle, coefficient_of, count, fixed};
 use crate::tables::{EstimateRow, LevelRow, PosteriorRow};
 

@@ -2,9 +2,10 @@
 
 use super::quality_charts::QualityChart;
 use crate::report::contents::Contents;
+use crate::report::figure::chart_axis::ChartAxis;
 use crate::report::figure::scale::{Scale, extent};
 use crate::report::figure::style::DARK_COLOURS;
-use crate::report::figure::xy_chart::{ChartAxis, ChartPoint, ChartSeries, LevelBox, XyChart};
+use crate::report::figure::xy_chart::{ChartPoint, ChartSeries, LevelBox, XyChart};
 use crate::tables::{MatchVerdict, MatchVerdictRow, ModelSource};
 
 /// Least margin that a chart reaches: twice the tolerance.

@@ -5,11 +5,10 @@ use serde::Serialize;
 
 use crate::aero::Axis;
 use crate::qualities::{Qualities, Range, Specification};
+use crate::report::figure::chart_axis::{ChartAxis, decades};
 use crate::report::figure::scale::{Scale, extent};
 use crate::report::figure::style::{DARK_COLOURS, INK};
-use crate::report::figure::xy_chart::{
-    self, ChartAxis, ChartPoint, ChartSeries, LevelBox, XyChart, decades,
-};
+use crate::report::figure::xy_chart::{self, ChartPoint, ChartSeries, LevelBox, XyChart};
 use crate::report::notation::angle;
 use crate::tables::{
     ALL_PARAGRAPHS, Airframe, FlyingQuality, Level, LevelRow, QualityRow, RootRow,

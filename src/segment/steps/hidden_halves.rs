@@ -61,22 +61,14 @@ fn add_hidden_halves(
         let ([first, ..], [.., last]) = (group, group) else {
             continue;
         };
-        let before_s = k
-            .checked_sub(1)
-            .and_then(|k| groups[k].last())
-            .map_or(f64::NEG_INFINITY, |s| s.time_s);
-        let after_s = groups
-            .get(k + 1)
-            .and_then(|g| g.first())
-            .map_or(f64::INFINITY, |s| s.time_s);
-        let earlier = between(
-            deflections,
-            (before_s.max(first.time_s - hold_s), first.time_s),
-        );
-        let later = between(
-            deflections,
-            (last.time_s, after_s.min(last.time_s + hold_s)),
-        );
+        let previous = k.checked_sub(1).and_then(|k| groups[k].last());
+        let next = groups.get(k + 1).and_then(|group| group.first());
+        let after_s = previous.map_or(f64::NEG_INFINITY, |step| step.time_s);
+        let before_s = next.map_or(f64::INFINITY, |step| step.time_s);
+        let earliest_s = after_s.max(first.time_s - hold_s);
+        let latest_s = before_s.min(last.time_s + hold_s);
+        let earlier = between(deflections, (earliest_s, first.time_s));
+        let later = between(deflections, (last.time_s, latest_s));
         let second_last = group.len().checked_sub(2).and_then(|k| group.get(k));
         let opening = hidden_half(&earlier, first, group.get(1), noise);
         let closing = hidden_half(&later, last, second_last, noise);

@@ -115,29 +115,18 @@ fn matrix(
         bytes: data,
         is_little,
     };
-    let flags = reader.next()?;
     let flags = Reader {
-        bytes: flags.data,
+        bytes: reader.next()?.data,
         is_little,
     }
     .word(0)?;
-    let dimensions = reader.next()?;
-    let dimensions = numbers(&dimensions, is_little)?;
+    let sizes = sizes(&reader.next()?, is_little)?;
     let name = text(reader.next()?.data);
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a size, checked against the data"
-    )]
-    let sizes: Vec<usize> = dimensions.iter().map(|d| d.max(0.0) as usize).collect();
     let count = sizes
         .iter()
         .try_fold(1_usize, |a, b| a.checked_mul(*b))
         .ok_or(TRUNCATED)?;
-    let (rows, columns) = (
-        sizes.first().copied().unwrap_or(0),
-        count / sizes.first().copied().unwrap_or(1).max(1),
-    );
+    let rows = sizes.first().copied().unwrap_or(0);
     let value = match flags & 0xff {
         1 => {
             let cells = (0..count.min(data.len()))
@@ -154,13 +143,25 @@ fn matrix(
                     values.len()
                 ));
             }
-            Value::Numbers(rows, columns, values)
+            Value::Numbers(rows, count / rows.max(1), values)
         }
         2 => Value::Other("an array of structs"),
         5 => Value::Other("a sparse matrix"),
         _ => Value::Other("an object; save its numbers as plain vectors"),
     };
     Ok((name, value))
+}
+
+/// Sizes of a matrix along its dimensions.
+fn sizes(dimensions: &Element, is_little: bool) -> std::result::Result<Vec<usize>, String> {
+    let dimensions = numbers(dimensions, is_little)?;
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a size, checked against the data"
+    )]
+    let sizes = dimensions.iter().map(|d| d.max(0.0) as usize).collect();
+    Ok(sizes)
 }
 
 /// Fields of a struct of one element.
