@@ -1,7 +1,7 @@
 //! The changes of a night on the terminal.
 
 use crate::lineage::{
-    Changes, Contradiction, InstrumentChange, Learnt, ManeuverChange, Moved, VerdictChange,
+    Changes, Contradiction, InformationGain, InstrumentChange, ManeuverChange, Moved, VerdictChange,
 };
 use crate::numerics::digits::rounded;
 
@@ -101,7 +101,7 @@ fn instrument(i: &InstrumentChange) -> String {
     )
 }
 
-fn learnt(l: &Learnt) -> String {
+fn learnt(l: &InformationGain) -> String {
     format!(
         "{}: {:.1} nats; at {:.1} deg {} ± {} became {} ± {}",
         l.derivative,

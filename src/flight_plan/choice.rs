@@ -54,7 +54,7 @@ pub struct AimPart {
 
 /// Covariance of one coefficient's derivatives, with the cards' observations.
 #[derive(Clone, Debug)]
-pub struct CoefficientKnowledge {
+pub struct CoefficientCovariance {
     pub covariance: DMatrix<f64>,
     /// In the order of the cards; `None` for a card that observes nothing of the coefficient.
     pub cards: Vec<Option<PlannedRows>>,
@@ -101,7 +101,7 @@ impl Budget {
 /// Choice to be made.
 #[derive(Clone, Debug)]
 pub struct CardChoice {
-    pub coefficients: Vec<CoefficientKnowledge>,
+    pub coefficients: Vec<CoefficientCovariance>,
     pub aims: Vec<Aim>,
     pub prices: Vec<Price>,
     pub budget: Budget,
@@ -336,7 +336,7 @@ impl Aim {
 /// Rows of a card with the covariance of their observations; `None` if the card observes nothing of
 /// the coefficient.
 fn predicted<'s>(
-    coefficient: &'s CoefficientKnowledge,
+    coefficient: &'s CoefficientCovariance,
     covariance: &DMatrix<f64>,
     card: usize,
 ) -> Option<(&'s PlannedRows, Cholesky<f64, Dyn>)> {

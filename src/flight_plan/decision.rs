@@ -66,8 +66,8 @@ impl Decision {
     /// Limits of the most probable interval, and its probability, if g has this standard deviation.
     #[must_use]
     pub fn most_probable(&self, deviation: f64) -> ((f64, f64), f64) {
-        let spread = deviation.hypot(self.fixed_deviation);
-        let below = |limit: f64| normal::below((limit - self.mean) / spread);
+        let total_deviation = deviation.hypot(self.fixed_deviation);
+        let below = |limit: f64| normal::below((limit - self.mean) / total_deviation);
         let all = self.intervals();
         let all = all.map(|(low, high)| ((low, high), below(high) - below(low)));
         let anything = ((f64::NEG_INFINITY, f64::INFINITY), 0.0);
@@ -85,14 +85,14 @@ impl Decision {
     /// `before` to `after`.
     #[must_use]
     pub fn probability_of_decision(&self, before: f64, after: f64) -> f64 {
-        let spread = after.hypot(self.fixed_deviation);
+        let total_deviation = after.hypot(self.fixed_deviation);
         let moved = (before * before - after * after).max(0.0).sqrt();
         if self.follows_mean || moved <= 0.0 {
             return f64::from(u8::from(self.is_decided(after)));
         }
         let deciding = self
             .intervals()
-            .filter_map(|own| self.deciding_means(own, spread));
+            .filter_map(|own| self.deciding_means(own, total_deviation));
         let probability = deciding.map(|(low, high)| {
             normal::below((high - self.mean) / moved) - normal::below((low - self.mean) / moved)
         });
@@ -122,16 +122,16 @@ impl Decision {
     }
 
     /// Deciding means a and b of the interval from `low` to `high`, for the standard deviation
-    /// `spread` of x. `None` if the interval is too narrow to have any.
-    fn deciding_means(&self, (low, high): (f64, f64), spread: f64) -> Option<(f64, f64)> {
-        let distance = normal::quantile(self.required_probability) * spread;
+    /// `total_deviation` of x. `None` if the interval is too narrow to have any.
+    fn deciding_means(&self, (low, high): (f64, f64), total_deviation: f64) -> Option<(f64, f64)> {
+        let distance = normal::quantile(self.required_probability) * total_deviation;
         match (low.is_finite(), high.is_finite()) {
             (false, false) => Some((low, high)),
             (false, true) => Some((low, high - distance)),
             (true, false) => Some((low + distance, high)),
             (true, true) => {
                 let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
-                let inside = |offset: f64| normal::within(half, offset, spread);
+                let inside = |offset: f64| normal::within(half, offset, total_deviation);
                 (inside(0.0) >= self.required_probability).then(|| {
                     let offset =
                         largest_up_to(half, |offset| inside(offset) >= self.required_probability);

@@ -2,7 +2,7 @@
 
 use super::candidate::{Candidate, reach_deg};
 use super::choice::{
-    Aim, AimPart, Budget, CardChoice, CardSet, CoefficientKnowledge, Price, variance,
+    Aim, AimPart, Budget, CardChoice, CardSet, CoefficientCovariance, Price, variance,
 };
 use super::experience::{CampaignHistory, noise_factors, with_noise};
 use super::goal_points::{GoalBasis, GoalPoint, Matches, Target};
@@ -198,7 +198,7 @@ fn knowledge(
     state: &CampaignState,
     kept: &[KeptCard],
     outlooks: Vec<Outlook>,
-) -> Vec<CoefficientKnowledge> {
+) -> Vec<CoefficientCovariance> {
     let share = |kept: &KeptCard| {
         let experience = state.history.of(&kept.candidate.card.class);
         experience.usable * experience.weight
@@ -211,7 +211,7 @@ fn knowledge(
                 card.noise /= *share;
             }
         }
-        CoefficientKnowledge {
+        CoefficientCovariance {
             covariance: outlook.covariance,
             cards,
         }

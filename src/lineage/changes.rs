@@ -56,7 +56,7 @@ pub struct VerdictChange {
 
 /// Information of flight about a derivative since the earlier night.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Learnt {
+pub struct InformationGain {
     pub derivative: String,
     /// Divergence of the posterior over α from the posterior of the earlier night, nats.
     pub nats: f64,
@@ -116,7 +116,7 @@ pub struct Changes {
     pub gone_trends: Vec<String>,
     pub verdicts: Vec<VerdictChange>,
     /// Information of flight about the derivatives, the most first.
-    pub learnt: Vec<Learnt>,
+    pub learnt: Vec<InformationGain>,
     pub contradictions: Vec<Contradiction>,
     /// Instruments whose errors changed since the earlier night, or over the flights of a first night.
     #[serde(default)]

@@ -7,8 +7,8 @@ mod parts;
 mod stage;
 
 pub use changes::{
-    Changes, Contradiction, InstrumentChange, Learnt, ManeuverChange, ManeuverDifference, Moved,
-    VerdictChange,
+    Changes, Contradiction, InformationGain, InstrumentChange, ManeuverChange, ManeuverDifference,
+    Moved, VerdictChange,
 };
 pub use differences::{Cause, Origin};
 pub use parts::{Code, Lineage};

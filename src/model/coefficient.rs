@@ -72,12 +72,12 @@ impl CoefficientPosterior {
             gaussian: &found,
         };
         let held = data.held(&posterior, &weights, evidence, basis.tunnel);
-        let mut whole = data.posterior(terms, scales, &weights, found, evidence);
-        add_open_scales(&observed, &whole.scales, &mut whole.gaussian);
+        let mut posterior = data.posterior(terms, scales, &weights, found, evidence);
+        add_open_scales(&observed, &posterior.scales, &mut posterior.gaussian);
         Some(CoefficientPosterior {
             noise_scales,
             held,
-            ..whole
+            ..posterior
         })
     }
 }

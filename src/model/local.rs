@@ -53,22 +53,22 @@ impl Model {
             })
             .collect();
         let count = parts.iter().map(|part| part.values.len()).sum();
-        let mut whole = LocalPosterior {
+        let mut joined = LocalPosterior {
             values: Vec::with_capacity(count),
             mean: DVector::zeros(count),
             covariance: DMatrix::zeros(count, count),
         };
         for part in parts {
-            let (first, length) = (whole.values.len(), part.values.len());
-            whole
+            let (first, length) = (joined.values.len(), part.values.len());
+            joined
                 .mean
                 .rows_range_mut(first..first + length)
                 .copy_from(&part.mean);
-            let mut block = whole.covariance.view_mut((first, first), (length, length));
+            let mut block = joined.covariance.view_mut((first, first), (length, length));
             block.copy_from(&part.covariance);
-            whole.values.extend(part.values);
+            joined.values.extend(part.values);
         }
-        whole
+        joined
     }
 }
 

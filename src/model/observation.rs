@@ -201,9 +201,9 @@ impl Evidence<'_> {
             let change = DVector::from_column_slice(&effect.change);
             own -= &change * change.transpose();
         }
-        let whole = DMatrix::from_row_slice(n, n, &self.covariance.corrected);
-        let whole = of_rows * whole * of_rows.transpose();
-        floored(&(of_rows * own * of_rows.transpose()), &whole)
+        let corrected = DMatrix::from_row_slice(n, n, &self.covariance.corrected);
+        let corrected = of_rows * corrected * of_rows.transpose();
+        floored(&(of_rows * own * of_rows.transpose()), &corrected)
     }
 }
 
@@ -211,15 +211,18 @@ fn is_held(effect: &ErrorEffect) -> bool {
     matches!(effect.error, SharedError::Held(_))
 }
 
-/// Raises eigenvalues of a covariance that are negative, or tiny beside the variances of `whole`.
-/// `None` unless both matrices are finite and the variances of `whole` positive.
-fn floored(covariance: &DMatrix<f64>, whole: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let is_sound = covariance.iter().chain(whole.iter()).all(|v| v.is_finite())
-        && whole.diagonal().iter().all(|v| *v > 0.0);
+/// Raises eigenvalues of a covariance that are negative, or tiny beside the variances of `corrected`.
+/// `None` unless both matrices are finite and the variances of `corrected` positive.
+fn floored(covariance: &DMatrix<f64>, corrected: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let is_sound = covariance
+        .iter()
+        .chain(corrected.iter())
+        .all(|v| v.is_finite())
+        && corrected.diagonal().iter().all(|v| *v > 0.0);
     if !is_sound {
         return None;
     }
-    let units = scale(whole);
+    let units = scale(corrected);
     let at_unit = scaled(covariance, &units);
     let mut eigen = at_unit.symmetric_eigen();
     eigen

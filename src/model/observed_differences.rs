@@ -79,11 +79,11 @@ impl ObservedDifferences {
     /// ignored.
     #[must_use]
     pub fn root(&self, scales: &[Scale], least: f64) -> BlockRoot {
-        let mut whole = BlockRoot::default();
+        let mut blocks = BlockRoot::default();
         for (term, scale) in self.terms.iter().zip(scales) {
-            whole.push(root(&term.covariance.for_scale(scale), least));
+            blocks.push(root(&term.covariance.for_scale(scale), least));
         }
-        whole
+        blocks
     }
 
     /// Posterior mean of all differences for some scales.

@@ -20,21 +20,21 @@ use nalgebra::DVector;
 
 use super::observed_differences::ObservedDifferences;
 use super::posterior::Gaussian;
-use super::scale_prior::{SPREAD_OF_SIZE, Scale};
+use super::scale_prior::{DEVIATION_OF_LOG_SIZE, Scale};
 use super::scales::{LEAST_VARIANCE, logarithms_of, negative_log_posterior, scales_of};
 
 /// Least eigenvalue of H that is used, so that points stay where the prior allows scales. The widest
-/// prior of a scale alone gives 1/`SPREAD_OF_SIZE`² = 1.56; the limit is 4 % below it, so it acts only
+/// prior of a scale alone gives 1/`DEVIATION_OF_LOG_SIZE`² = 1.56; the limit is 4 % below it, so it acts only
 /// where the data make H less curved than the prior.
 const LEAST_CURVATURE: f64 = 1.5;
-const _: () = assert!(LEAST_CURVATURE < 1.0 / (SPREAD_OF_SIZE * SPREAD_OF_SIZE));
+const _: () = assert!(LEAST_CURVATURE < 1.0 / (DEVIATION_OF_LOG_SIZE * DEVIATION_OF_LOG_SIZE));
 
 /// Weight of each outer point of the Gauss-Hermite rule.
 const OUTER: f64 = 1.0 / 6.0;
 
-/// Adds the variance of the mean over the scales to the posterior `whole` at the most probable
+/// Adds the variance of the mean over the scales to the posterior `posterior` at the most probable
 /// `scales`. An eigenvector along which the mean cannot be computed is left out.
-pub fn add_open_scales(observed: &ObservedDifferences, scales: &[Scale], whole: &mut Gaussian) {
+pub fn add_open_scales(observed: &ObservedDifferences, scales: &[Scale], posterior: &mut Gaussian) {
     let at = logarithms_of(scales);
     let mean = |logarithms: &DVector<f64>| observed.mean(&scales_of(logarithms), LEAST_VARIANCE);
     let local = negative_log_posterior(observed, scales, LEAST_VARIANCE);
@@ -50,7 +50,7 @@ pub fn add_open_scales(observed: &ObservedDifferences, scales: &[Scale], whole: 
         };
         let (above, below) = (above - &centre, below - &centre);
         let squares = &above * above.transpose() + &below * below.transpose();
-        let mut own = whole.covariance.view_mut((0, 0), (n, n));
+        let mut own = posterior.covariance.view_mut((0, 0), (n, n));
         own += squares * OUTER;
     }
 }

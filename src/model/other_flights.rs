@@ -14,57 +14,64 @@ use super::unknowns::{SparseRow, covariance_between, weighted_sum};
 
 /// Posterior of all flights other than one.
 pub struct OtherFlights<'a> {
-    whole: &'a Gaussian,
-    own: Option<OwnRows<'a>>,
+    all_flights: &'a Gaussian,
+    left_out: Option<LeftOutRows<'a>>,
 }
 
 /// Rows of the flight that is left out: factor of K, and K⁻¹ (y − A m).
-struct OwnRows<'a> {
+struct LeftOutRows<'a> {
     flight: &'a FlightData,
     root: Cholesky<f64, Dyn>,
     weighted: DVector<f64>,
 }
 
 impl<'a> OtherFlights<'a> {
-    /// Leaves out `flight`; without a flight the posterior stays whole. `None` if a covariance is
+    /// Leaves out `flight`; without a flight the posterior is of all flights. `None` if a covariance is
     /// not positive definite.
     #[must_use]
     pub fn new(
-        whole: &'a Gaussian,
+        all_flights: &'a Gaussian,
         flight: Option<&'a FlightData>,
         weights: &[f64],
     ) -> Option<OtherFlights<'a>> {
         let Some(flight) = flight else {
-            return Some(OtherFlights { whole, own: None });
+            return Some(OtherFlights {
+                all_flights,
+                left_out: None,
+            });
         };
-        let (predicted, spread) = flight.image(&whole.mean, &whole.covariance);
-        let root = Cholesky::new(flight.covariance(weights) - spread)?;
+        let (predicted, predicted_covariance) =
+            flight.image(&all_flights.mean, &all_flights.covariance);
+        let root = Cholesky::new(flight.covariance(weights) - predicted_covariance)?;
         let weighted = root.solve(&(&flight.differences - predicted));
-        let own = Some(OwnRows {
+        let left_out = Some(LeftOutRows {
             flight,
             root,
             weighted,
         });
-        Some(OtherFlights { whole, own })
+        Some(OtherFlights {
+            all_flights,
+            left_out,
+        })
     }
 
     /// Means and covariance of weighted sums of the unknowns, one sum per row.
     #[must_use]
     pub fn means_and_covariance(&self, rows: &[SparseRow]) -> (DVector<f64>, DMatrix<f64>) {
-        let Gaussian { mean, covariance } = self.whole;
+        let Gaussian { mean, covariance } = self.all_flights;
         let sums = rows.iter().map(|row| weighted_sum(row, mean));
         let mut values = DVector::from_iterator(rows.len(), sums);
-        let mut spread = DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
+        let mut sum_covariance = DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
             covariance_between(&rows[i], &rows[j], covariance)
         });
-        if let Some(own) = &self.own {
-            let own_rows = &own.flight.rows;
+        if let Some(left_out) = &self.left_out {
+            let own_rows = &left_out.flight.rows;
             let cross = DMatrix::from_fn(rows.len(), own_rows.len(), |i, j| {
                 covariance_between(&rows[i], &own_rows[j], covariance)
             });
-            values -= &cross * &own.weighted;
-            spread += &cross * own.root.solve(&cross.transpose());
+            values -= &cross * &left_out.weighted;
+            sum_covariance += &cross * left_out.root.solve(&cross.transpose());
         }
-        (values, spread)
+        (values, sum_covariance)
     }
 }

@@ -147,11 +147,12 @@ pub struct LeavingOut {
 impl LeavingOut {
     /// Prepares the predictions for a flight; `None` unless its covariances are positive definite.
     #[must_use]
-    pub fn new(flight: &FlightData, weights: &[f64], whole: &Gaussian) -> Option<LeavingOut> {
-        let (predicted, spread) = flight.image(&whole.mean, &whole.covariance);
+    pub fn new(flight: &FlightData, weights: &[f64], all_flights: &Gaussian) -> Option<LeavingOut> {
+        let (predicted, predicted_covariance) =
+            flight.image(&all_flights.mean, &all_flights.covariance);
         let inverse = flight.cholesky(weights)?.inverse();
         Some(LeavingOut {
-            precision: &inverse - &inverse * spread * &inverse,
+            precision: &inverse - &inverse * predicted_covariance * &inverse,
             weighted: inverse * (&flight.differences - predicted),
         })
     }
@@ -185,12 +186,12 @@ impl LeavingOut {
 pub fn reweighted(
     flights: &[FlightData],
     weights: &[f64],
-    whole: &Gaussian,
+    all_flights: &Gaussian,
     degrees_of_freedom: f64,
 ) -> Vec<f64> {
     let mut next = weights.to_vec();
     for flight in flights {
-        let Some(leaving_out) = LeavingOut::new(flight, weights, whole) else {
+        let Some(leaving_out) = LeavingOut::new(flight, weights, all_flights) else {
             continue;
         };
         for (i, (place, rows)) in flight.maneuvers.iter().enumerate() {
@@ -211,10 +212,10 @@ pub fn reweighted(
 /// Prior covariance of the differences.
 #[must_use]
 pub fn prior(unknowns: &Unknowns, terms: &[PosteriorTerm], scales: &[Scale]) -> DMatrix<f64> {
-    let mut whole = DMatrix::zeros(unknowns.differences, unknowns.differences);
+    let mut joined = DMatrix::zeros(unknowns.differences, unknowns.differences);
     for ((term, scale), &start) in terms.iter().zip(scales).zip(&unknowns.starts) {
         let own = term.prior.covariance.for_scale(scale);
-        whole.view_mut((start, start), own.shape()).copy_from(&own);
+        joined.view_mut((start, start), own.shape()).copy_from(&own);
     }
-    whole
+    joined
 }

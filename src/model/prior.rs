@@ -24,13 +24,13 @@ use super::grid::{Grid, Node};
 use super::prior_covariance::{PriorCovariance, fading, variance_factor};
 use super::scale_prior::{Scale, ScalePrior};
 use crate::aero::Condition;
-use crate::tables::Knowledge;
+use crate::tables::PriorSource;
 
 /// Prior of one derivative, or sum of derivatives.
 #[derive(Clone, Debug)]
 pub struct DerivativePrior {
     pub name: String,
-    pub known: Knowledge,
+    pub source: PriorSource,
     pub grid: Grid,
     /// Tunnel's value at the points of the grid; zero without a table.
     pub mean: Vec<f64>,
@@ -43,7 +43,7 @@ pub struct DerivativePrior {
 /// Tunnel's table of a derivative, read at the points of a grid.
 #[derive(Clone, Debug)]
 pub struct TableOnGrid {
-    pub known: Knowledge,
+    pub source: PriorSource,
     pub mean: Vec<f64>,
     /// Stated uncertainty at each point.
     pub uncertainty: Vec<f64>,
@@ -56,10 +56,12 @@ impl DerivativePrior {
     pub fn new(name: String, grid: Grid, table: TableOnGrid, centre: Scale) -> DerivativePrior {
         let nodes = grid.nodes();
         let n = nodes.len();
-        let shape = |i: usize, j: usize| match table.known {
-            Knowledge::Table => 0.5 * table.size * table.size + 0.5 * table.mean[i] * table.mean[j],
-            Knowledge::TableWithUncertainty => table.uncertainty[i] * table.uncertainty[j],
-            Knowledge::Magnitude => table.size * table.size,
+        let shape = |i: usize, j: usize| match table.source {
+            PriorSource::Table => {
+                0.5 * table.size * table.size + 0.5 * table.mean[i] * table.mean[j]
+            }
+            PriorSource::TableWithUncertainty => table.uncertainty[i] * table.uncertainty[j],
+            PriorSource::Magnitude => table.size * table.size,
         };
         let across = |a: &Node, b: &Node| {
             fading_between(a.mach, b.mach, &grid.machs)
@@ -74,9 +76,9 @@ impl DerivativePrior {
         };
         DerivativePrior {
             covariance,
-            scale: ScalePrior::new(centre, table.known),
+            scale: ScalePrior::new(centre, table.source),
             name,
-            known: table.known,
+            source: table.source,
             mean: table.mean,
             grid,
         }

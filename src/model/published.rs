@@ -6,7 +6,7 @@ use super::coefficient::CoefficientPosterior;
 use super::grid::Node;
 use super::term::PosteriorTerm;
 use super::unknowns::{SparseRow, covariance_between, weighted_sum};
-use crate::tables::Knowledge;
+use crate::tables::PriorSource;
 
 /// A published derivative or sum over the points of its grid: tunnel + rows · differences.
 #[derive(Clone, Debug)]
@@ -43,7 +43,7 @@ impl CoefficientPosterior {
             nodes: term.prior.grid.nodes(),
             term: i,
             tunnel: term.prior.mean.clone(),
-            has_tunnel: term.prior.known != Knowledge::Magnitude,
+            has_tunnel: term.prior.source != PriorSource::Magnitude,
             rows: (0..term.prior.grid.len())
                 .map(|node| vec![(start + node, 1.0)])
                 .collect(),
@@ -57,7 +57,7 @@ impl CoefficientPosterior {
         let slope = &self.terms[j].prior;
         let mut constant = self.of_term(i, term);
         constant.name.clone_from(&term.derivative);
-        constant.has_tunnel &= slope.known != Knowledge::Magnitude;
+        constant.has_tunnel &= slope.source != PriorSource::Magnitude;
         for (node, (at, row)) in constant.nodes.iter().zip(&mut constant.rows).enumerate() {
             for (place, share) in slope.grid.shares(&at.condition()) {
                 let weight = -at.alpha_deg * share;

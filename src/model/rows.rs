@@ -117,7 +117,7 @@ impl CoefficientPosterior {
         let both = self.terms.iter().zip(&self.scales);
         both.map(|(term, scale)| ScaleRow {
             derivative: term.prior.name.clone(),
-            knowledge: term.prior.known,
+            knowledge: term.prior.source,
             size: scale.size,
             length_deg: scale.length_deg,
         })

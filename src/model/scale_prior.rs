@@ -1,15 +1,15 @@
 //! Prior of the size and length of a derivative's difference from the tunnel: both are lognormal.
 
-use crate::tables::Knowledge;
+use crate::tables::PriorSource;
 
 /// Standard deviation of the logarithm of the size.
-pub(super) const SPREAD_OF_SIZE: f64 = 0.8;
+pub(super) const DEVIATION_OF_LOG_SIZE: f64 = 0.8;
 
 /// Standard deviation of the logarithm of the size of a table with stated uncertainties.
-const SPREAD_OF_STATED_SIZE: f64 = 0.4;
+const DEVIATION_OF_LOG_STATED_SIZE: f64 = 0.4;
 
 /// Standard deviation of the logarithm of the length.
-const SPREAD_OF_LENGTH: f64 = 0.5;
+const DEVIATION_OF_LOG_LENGTH: f64 = 0.5;
 
 /// Size and length of a difference.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,7 +24,7 @@ pub struct Scale {
 pub struct ScalePrior {
     pub centre: Scale,
     /// Standard deviations of the logarithms of size and length.
-    spreads: [f64; 2],
+    log_deviations: [f64; 2],
 }
 
 /// Minus the log of the prior of a scale, with its first and second derivatives by the logarithms
@@ -38,14 +38,14 @@ pub struct Penalty {
 
 impl ScalePrior {
     #[must_use]
-    pub fn new(centre: Scale, known: Knowledge) -> ScalePrior {
-        let size = match known {
-            Knowledge::TableWithUncertainty => SPREAD_OF_STATED_SIZE,
-            Knowledge::Table | Knowledge::Magnitude => SPREAD_OF_SIZE,
+    pub fn new(centre: Scale, source: PriorSource) -> ScalePrior {
+        let size = match source {
+            PriorSource::TableWithUncertainty => DEVIATION_OF_LOG_STATED_SIZE,
+            PriorSource::Table | PriorSource::Magnitude => DEVIATION_OF_LOG_SIZE,
         };
         ScalePrior {
             centre,
-            spreads: [size, SPREAD_OF_LENGTH],
+            log_deviations: [size, DEVIATION_OF_LOG_LENGTH],
         }
     }
 
@@ -53,7 +53,9 @@ impl ScalePrior {
     pub fn penalty(&self, scale: &Scale) -> Penalty {
         let size = (scale.size / self.centre.size).ln();
         let length = (scale.length_deg / self.centre.length_deg).ln();
-        let curvature = self.spreads.map(|spread| 1.0 / (spread * spread));
+        let curvature = self
+            .log_deviations
+            .map(|deviation| 1.0 / (deviation * deviation));
         let gradient = [size * curvature[0], length * curvature[1]];
         Penalty {
             value: 0.5 * (size * gradient[0] + length * gradient[1]),

@@ -50,8 +50,8 @@ impl LeftOut {
 
 /// Agreement of a flight with the other flights.
 #[must_use]
-pub fn flight(data: &FlightData, weights: &[f64], whole: &Gaussian) -> Option<Agreement> {
-    let left_out = LeavingOut::new(data, weights, whole)?.flight()?;
+pub fn flight(data: &FlightData, weights: &[f64], all_flights: &Gaussian) -> Option<Agreement> {
+    let left_out = LeavingOut::new(data, weights, all_flights)?.flight()?;
     Some(left_out.agreement())
 }
 
@@ -75,9 +75,9 @@ pub fn maneuvers(
         if own.rows.is_empty() {
             continue;
         }
-        let (predicted, spread) = rest.image(&own, &sums);
+        let (predicted, predicted_covariance) = rest.image(&own, &sums);
         let differences: DVector<f64> = &own.differences - predicted;
-        let covariance = spread + own.covariance(weights);
+        let covariance = predicted_covariance + own.covariance(weights);
         let prediction = LeftOut {
             differences,
             covariance,

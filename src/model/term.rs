@@ -14,7 +14,7 @@ use super::settings::Settings;
 use crate::aero::{Buildup, Coefficient, Condition, Derivative, Regressor, WindTunnel};
 use crate::maneuver::Status;
 use crate::numerics::order_statistics::median;
-use crate::tables::Knowledge;
+use crate::tables::PriorSource;
 
 /// Derivative or sum of one coefficient, whose difference from the tunnel is unknown over its grid.
 #[derive(Clone, Debug)]
@@ -162,17 +162,17 @@ impl TermSources<'_> {
         if let Some(values) = values.filter(|_| size > 0.0) {
             let mean = values.iter().map(|v| v.value).collect();
             let stated: Option<Vec<f64>> = values.iter().map(|v| v.uncertainty).collect();
-            let (known, centre) = match stated {
-                Some(_) => (Knowledge::TableWithUncertainty, 1.0),
+            let (source, centre) = match stated {
+                Some(_) => (PriorSource::TableWithUncertainty, 1.0),
                 None => (
-                    Knowledge::Table,
+                    PriorSource::Table,
                     self.settings.tunnel_uncertainty_pct / 100.0,
                 ),
             };
             let uncertainty = stated.unwrap_or_default();
             return Some((
                 TableOnGrid {
-                    known,
+                    source,
                     mean,
                     uncertainty,
                     size,
@@ -186,7 +186,7 @@ impl TermSources<'_> {
         let own = rows.filter(|row| row.derivative == name && row.status == Status::Estimated);
         let size = median(own.filter_map(|row| row.value).map(f64::abs))?;
         let table = TableOnGrid {
-            known: Knowledge::Magnitude,
+            source: PriorSource::Magnitude,
             mean: vec![0.0; grid.len()],
             uncertainty: vec![],
             size,

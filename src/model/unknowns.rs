@@ -145,30 +145,30 @@ impl Unknowns {
     /// variance is below the share `least` of the largest of their kind are ignored.
     #[must_use]
     pub fn root_of_others(&self, least: f64) -> BlockRoot {
-        let mut whole = BlockRoot::default();
-        self.push_others(least, &mut whole);
-        whole
+        let mut blocks = BlockRoot::default();
+        self.push_others(least, &mut blocks);
+        blocks
     }
 
     /// Root of the prior covariance of all unknowns; `least` as in [`Unknowns::root_of_others`].
     #[must_use]
     pub fn root(&self, terms: &[PosteriorTerm], scales: &[Scale], least: f64) -> BlockRoot {
-        let mut whole = root_of_differences(terms, scales, least);
-        self.push_others(least, &mut whole);
-        whole
+        let mut blocks = root_of_differences(terms, scales, least);
+        self.push_others(least, &mut blocks);
+        blocks
     }
 
-    fn push_others(&self, least: f64, whole: &mut BlockRoot) {
+    fn push_others(&self, least: f64, blocks: &mut BlockRoot) {
         for error in self.classes.values() {
             let alphas = &error.grid.alphas_deg;
             let covariance = DMatrix::from_fn(alphas.len(), alphas.len(), |i, j| {
                 let distance = (alphas[i] - alphas[j]).abs() / CLASS_LENGTH_DEG;
                 self.class_error * self.class_error * fading(distance)
             });
-            whole.push(root(&covariance, least));
+            blocks.push(root(&covariance, least));
         }
         let of_campaign = self.campaign.len();
-        whole.push(DMatrix::identity(of_campaign, of_campaign));
+        blocks.push(DMatrix::identity(of_campaign, of_campaign));
     }
 }
 
@@ -176,11 +176,11 @@ impl Unknowns {
 /// variance are ignored.
 #[must_use]
 pub fn root_of_differences(terms: &[PosteriorTerm], scales: &[Scale], least: f64) -> BlockRoot {
-    let mut whole = BlockRoot::default();
+    let mut blocks = BlockRoot::default();
     for (term, scale) in terms.iter().zip(scales) {
-        whole.push(root(&term.prior.covariance.for_scale(scale), least));
+        blocks.push(root(&term.prior.covariance.for_scale(scale), least));
     }
-    whole
+    blocks
 }
 
 /// `true` for an error that is common to all flights, such as a recorder's delay of a surface.

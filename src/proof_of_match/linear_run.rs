@@ -70,7 +70,7 @@ struct RunSlopes<'a> {
     stages: [Option<StageSlopes>; STAGES],
     /// Direct change of the coefficients by the parameters at each stage: coefficient by
     /// coefficient, each parameter.
-    own: [AlignedBuffer; STAGES],
+    direct: [AlignedBuffer; STAGES],
     /// Slopes of the state: state by state, each parameter.
     states: AlignedBuffer,
     /// Slopes of the outputs at a sample: output by output, each parameter.
@@ -113,7 +113,7 @@ impl<'a> RunSlopes<'a> {
             coefficients: parameters.iter().map(coefficient).collect(),
             step_s,
             stages: [None; STAGES],
-            own: from_fn(|_| AlignedBuffer::zeros(COEFFICIENTS * width)),
+            direct: from_fn(|_| AlignedBuffer::zeros(COEFFICIENTS * width)),
             states,
             outputs: AlignedBuffer::zeros(COUNT * width),
             width,
@@ -137,11 +137,11 @@ impl Companion for RunSlopes<'_> {
                 inputs.gravity_ft_s2,
             ),
         });
-        let own = self.own[stage].slice_mut();
+        let direct = self.direct[stage].slice_mut();
         let parameters = self.parameters.iter().zip(&self.coefficients);
         for (column, (parameter, coefficient)) in parameters.enumerate() {
             if let Some(coefficient) = coefficient {
-                own[coefficient * self.width + column] = match parameter {
+                direct[coefficient * self.width + column] = match parameter {
                     Parameter::Start(_) => 1.0,
                     Parameter::Derivative(place) => by_derivative[*place],
                 };
@@ -156,7 +156,7 @@ impl Companion for RunSlopes<'_> {
         Arch::new().dispatch(Read {
             readings: &ReadingSlopes::new(instant, self.simulation.aircraft),
             stage: &stage,
-            own: self.own[0].slice(),
+            direct: self.direct[0].slice(),
             states: self.states.slice(),
             width: self.width,
             outputs: self.outputs.slice_mut(),
@@ -174,7 +174,7 @@ impl Companion for RunSlopes<'_> {
         };
         Arch::new().dispatch(Advance {
             stages: &[a, b, c, d],
-            own: from_fn(|stage| self.own[stage].slice()),
+            direct: from_fn(|stage| self.direct[stage].slice()),
             end: end.attitude.coords.into(),
             step_s: self.step_s,
             width: self.width,
@@ -203,10 +203,10 @@ impl StageSlopes {
     fn rate<S: Simd>(
         &self,
         state: &StateChange<S>,
-        own: &[Lanes<S>; COEFFICIENTS],
+        direct: &[Lanes<S>; COEFFICIENTS],
     ) -> (StateChange<S>, [Lanes<S>; 3]) {
         let air = self.air.change(state);
-        let loads = self.loads.change(&self.body, state, &air, own);
+        let loads = self.loads.change(&self.body, state, &air, direct);
         let rate = self.body.change(state, &loads.force, &loads.moment);
         (rate, loads.force)
     }
@@ -216,7 +216,7 @@ impl StageSlopes {
 struct Read<'a> {
     readings: &'a ReadingSlopes,
     stage: &'a StageSlopes,
-    own: &'a [f64],
+    direct: &'a [f64],
     states: &'a [f64],
     width: usize,
     /// Output by output, each parameter.
@@ -230,8 +230,8 @@ impl WithSimd for Read<'_> {
     fn with_simd<S: Simd>(self, simd: S) {
         for column in (0..self.width).step_by(S::F64_LANES) {
             let state = StateChange(load(simd, self.states, self.width, column));
-            let own = load(simd, self.own, self.width, column);
-            let (rate, force) = self.stage.rate(&state, &own);
+            let direct = load(simd, self.direct, self.width, column);
+            let (rate, force) = self.stage.rate(&state, &direct);
             let air = self.stage.air.change(&state);
             let read = self.readings.change(&state, &rate, &air, &force);
             let [p, q, r] = read.rates_deg_s;
@@ -259,7 +259,7 @@ impl WithSimd for Read<'_> {
 /// Slopes of the state after a step.
 struct Advance<'a> {
     stages: &'a [StageSlopes; STAGES],
-    own: [&'a [f64]; STAGES],
+    direct: [&'a [f64]; STAGES],
     /// Attitude at the end, before it is normalised.
     end: [f64; 4],
     step_s: f64,
@@ -279,8 +279,8 @@ impl WithSimd for Advance<'_> {
                 self.step_s,
                 #[inline(always)]
                 |stage, at| {
-                    let own = load(simd, self.own[stage], self.width, column);
-                    self.stages[stage].rate(at, &own).0
+                    let direct = load(simd, self.direct[stage], self.width, column);
+                    self.stages[stage].rate(at, &direct).0
                 },
                 StateChange::plus,
             );

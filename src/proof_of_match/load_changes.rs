@@ -106,7 +106,7 @@ impl LoadSlopes {
         body: &BodySlopes,
         state: &StateChange<S>,
         air: &AirChange<S>,
-        own: &[Lanes<S>; COEFFICIENTS],
+        direct: &[Lanes<S>; COEFFICIENTS],
     ) -> LoadsChange<S> {
         let [p, q, r] = state.rates();
         let flow = [air.alpha, air.beta, air.velocity, air.mach, p, q, r];
@@ -115,7 +115,7 @@ impl LoadSlopes {
             |i| {
                 let [alpha, beta, velocity, mach, p, q, r, _, qbar] = self.coefficients[i];
                 let along_flow = combination(&[alpha, beta, velocity, mach, p, q, r], &flow);
-                own[i] + along_flow.plus(qbar, air.relative_qbar)
+                direct[i] + along_flow.plus(qbar, air.relative_qbar)
             },
         );
         let mut loads = LoadsChange {

@@ -368,7 +368,7 @@ impl<'a> RepeatableManeuver<'a> {
             verdict: judgement::verdict(margin),
             margin: finite(margin),
             decided_by,
-            repeat_pct: repeat.map(|r| 100.0 * r.whole),
+            repeat_pct: repeat.map(|r| 100.0 * r.all_requirements),
             closed_loop: self.closed_loop(),
             ..verdict_row(self.maneuver, model)
         }

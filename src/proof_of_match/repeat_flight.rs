@@ -59,13 +59,17 @@ struct Draw {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Probabilities {
     pub tolerances: Vec<f64>,
-    pub whole: f64,
+    pub all_requirements: f64,
 }
 
 impl Probabilities {
     /// Limits the probabilities to 0 and 1, which rounding errors of the sums may exceed.
     fn clamped(mut self) -> Probabilities {
-        for probability in self.tolerances.iter_mut().chain([&mut self.whole]) {
+        for probability in self
+            .tolerances
+            .iter_mut()
+            .chain([&mut self.all_requirements])
+        {
             *probability = probability.clamp(0.0, 1.0);
         }
         self
@@ -137,7 +141,7 @@ impl Repeats {
     ) -> Probabilities {
         let mut sums = Probabilities {
             tolerances: vec![0.0; judged.len()],
-            whole: 0.0,
+            all_requirements: 0.0,
         };
         if simulated.run.has_departed || self.expected.len() * self.stride < recording.samples {
             return sums;
@@ -165,7 +169,7 @@ impl Repeats {
             for (sum, inside) in sums.tolerances.iter_mut().zip(&drawn.tolerances) {
                 *sum += inside / count;
             }
-            sums.whole += drawn.whole / count;
+            sums.all_requirements += drawn.all_requirements / count;
         }
         sums.clamped()
     }
@@ -217,14 +221,17 @@ impl Repeat<'_> {
             }
         };
         let tolerances: Vec<f64> = self.judged.iter().zip(&self.limits).map(inside).collect();
-        let mut whole = 1.0;
+        let mut all_requirements = 1.0;
         let mut rest = tolerances.as_slice();
         for requirement in self.judged.chunk_by(Judged::is_alternative) {
             let (own, others) = rest.split_at(requirement.len());
-            whole *= 1.0 - own.iter().map(|inside| 1.0 - inside).product::<f64>();
+            all_requirements *= 1.0 - own.iter().map(|inside| 1.0 - inside).product::<f64>();
             rest = others;
         }
-        Probabilities { tolerances, whole }
+        Probabilities {
+            tolerances,
+            all_requirements,
+        }
     }
 
     /// `true` if the model's Dutch roll is within the tolerance of a repeat flight's.

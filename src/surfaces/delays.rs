@@ -23,7 +23,7 @@ const OF_STEP: f64 = 0.02;
 
 /// Standard deviations that delays may have, in common and by surface, s: each twice the one
 /// before, all with the same prior probability.
-const SPREADS_S: [f64; 8] = [0.125e-3, 0.25e-3, 0.5e-3, 1e-3, 2e-3, 4e-3, 8e-3, 16e-3];
+const STANDARD_DEVIATIONS_S: [f64; 8] = [0.125e-3, 0.25e-3, 0.5e-3, 1e-3, 2e-3, 4e-3, 8e-3, 16e-3];
 
 /// Standard deviation of a maneuver's own delays, s, when its distance from the others is measured.
 const OWN_S: f64 = 0.02;
@@ -252,12 +252,12 @@ struct DelayPosterior {
 }
 
 impl DelayPosterior {
-    /// Mixture over the spreads of the delays, weighted by the evidence for each.
+    /// Mixture over the standard deviations of the delays, weighted by the evidence for each.
     fn of(data: &DelayInformation) -> Option<DelayPosterior> {
-        let mut parts = Vec::with_capacity(SPREADS_S.len().pow(2));
-        for common_s in SPREADS_S {
-            for own_s in SPREADS_S {
-                parts.push(SpreadPosterior::new(data, common_s, own_s)?);
+        let mut parts = Vec::with_capacity(STANDARD_DEVIATIONS_S.len().pow(2));
+        for common_s in STANDARD_DEVIATIONS_S {
+            for own_s in STANDARD_DEVIATIONS_S {
+                parts.push(PosteriorAtDeviations::new(data, common_s, own_s)?);
             }
         }
         let largest = parts
@@ -272,7 +272,7 @@ impl DelayPosterior {
             delays += *share * &part.delays;
         }
         let variance = |s: usize| {
-            let of_part = |(part, share): (&SpreadPosterior, &f64)| {
+            let of_part = |(part, share): (&PosteriorAtDeviations, &f64)| {
                 share * (part.variances[s] + (part.delays[s] - delays[s]).powi(2))
             };
             parts.iter().zip(&shares).map(of_part).sum::<f64>()
@@ -282,16 +282,16 @@ impl DelayPosterior {
     }
 }
 
-/// Posterior at one pair of spreads.
-struct SpreadPosterior {
+/// Posterior at one pair of standard deviations of the delays, common and own.
+struct PosteriorAtDeviations {
     delays: DVector<f64>,
     variances: DVector<f64>,
     log_evidence: f64,
 }
 
-impl SpreadPosterior {
-    /// Posterior for one pair of spreads. The prior covariance is own² I + common² 1 1ᵀ.
-    fn new(data: &DelayInformation, common_s: f64, own_s: f64) -> Option<SpreadPosterior> {
+impl PosteriorAtDeviations {
+    /// Posterior for one pair of standard deviations. The prior covariance is own² I + common² 1 1ᵀ.
+    fn new(data: &DelayInformation, common_s: f64, own_s: f64) -> Option<PosteriorAtDeviations> {
         let count = data.moment.len();
         let (own, common) = (own_s * own_s, common_s * common_s);
         let along_one = own + count as f64 * common;
@@ -303,7 +303,7 @@ impl SpreadPosterior {
         let delays = &covariance * &data.moment;
         let log_determinant = posterior.cholesky()?.ln_determinant();
         let log_prior = (count as f64 - 1.0) * own.ln() + along_one.ln();
-        Some(SpreadPosterior {
+        Some(PosteriorAtDeviations {
             log_evidence: 0.5 * (data.moment.dot(&delays) - log_prior - log_determinant),
             variances: covariance.diagonal(),
             delays,
@@ -410,8 +410,8 @@ mod tests {
 
     #[test]
     fn flights_that_differ_widen_the_bound() {
-        let flights = |spread_ms: f64| -> Vec<FlightEvidence> {
-            let delay_ms = |k: u32| 8.0 + spread_ms * (f64::from(k) - 2.5);
+        let flights = |step_ms: f64| -> Vec<FlightEvidence> {
+            let delay_ms = |k: u32| 8.0 + step_ms * (f64::from(k) - 2.5);
             let maneuvers = |k| vec![maneuver(&[("da", delay_ms(k), 0.5)])];
             (0..6).map(|k| flight(maneuvers(k))).collect()
         };

@@ -38,8 +38,8 @@ pub use flights::{
 pub use history::{History, HistoryOutput};
 pub use page::page;
 pub use posterior::{
-    ContributionRow, CovarianceRow, Knowledge, LeftOutKind, LiftAndDragRow, PosteriorRow, ScaleRow,
-    SelfCheckRow,
+    ContributionRow, CovarianceRow, LeftOutKind, LiftAndDragRow, PosteriorRow, PriorSource,
+    ScaleRow, SelfCheckRow,
 };
 pub use predictions::{AgreementRow, PredictedRow, PredictionStatus};
 pub use proof_of_match::{MatchRow, MatchVerdict, MatchVerdictRow, MatchedQuantity, ModelSource};

@@ -69,8 +69,8 @@ table! {
 }
 
 words! {
-    /// Knowledge about a derivative before flight.
-    pub enum Knowledge {
+    /// Source of the prior of a derivative.
+    pub enum PriorSource {
         /// Tunnel table.
         Table = "table",
         /// Tunnel table that states its uncertainty.
@@ -87,7 +87,7 @@ table! {
         /// Name of the derivative in the model, or of a sum.
         pub derivative: String,
         /// Knowledge about the derivative before flight.
-        pub knowledge: Knowledge,
+        pub knowledge: PriorSource,
         /// Standard deviation of the difference: over the root mean square of the tunnel's table, over
         /// its stated uncertainty, or over the order of magnitude of the estimates.
         pub size: f64 ["1"],

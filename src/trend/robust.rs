@@ -113,15 +113,15 @@ impl RobustSolution {
 
     /// Residuals over their standard deviations: leverage reduces the variance of a residual.
     pub(super) fn standardised(&self, design: &DMatrix<f64>) -> Vec<Residual> {
-        let residual = |(i, spread): (usize, f64)| {
-            let left = (1.0 - self.weights[i] * spread).max(1e-6);
+        let residual = |(i, form): (usize, f64)| {
+            let freedom = (1.0 - self.weights[i] * form).max(1e-6);
             Residual {
-                z: self.residuals[i] / (self.variances[i] * left).sqrt(),
+                z: self.residuals[i] / (self.variances[i] * freedom).sqrt(),
                 share: self.weights[i] * self.variances[i],
             }
         };
-        let spreads = spreads(design, &self.inverse).into_iter();
-        spreads.enumerate().map(residual).collect()
+        let quadratic_forms = quadratic_forms(design, &self.inverse).into_iter();
+        quadratic_forms.enumerate().map(residual).collect()
     }
 }
 
@@ -146,15 +146,15 @@ fn residual_freedom(
     weights: &DVector<f64>,
     inverse: &DMatrix<f64>,
 ) -> Vec<f64> {
-    let spreads = spreads(design, inverse).into_iter().zip(weights);
-    spreads
-        .map(|(spread, weight)| (1.0 - weight * spread).max(0.0))
+    let quadratic_forms = quadratic_forms(design, inverse).into_iter().zip(weights);
+    quadratic_forms
+        .map(|(form, weight)| (1.0 - weight * form).max(0.0))
         .collect()
 }
 
 /// Quadratic form x M xᵀ of each row x of the design with the matrix M. For products this small the
 /// linear-algebra library takes several times as long.
-fn spreads(design: &DMatrix<f64>, matrix: &DMatrix<f64>) -> Vec<f64> {
+fn quadratic_forms(design: &DMatrix<f64>, matrix: &DMatrix<f64>) -> Vec<f64> {
     let (rows, columns_of_rows) = (design.transpose(), matrix.transpose());
     let mut image = vec![0.0; matrix.ncols()];
     let of = |row: &[f64]| {

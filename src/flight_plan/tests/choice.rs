@@ -4,7 +4,7 @@ use approx::assert_relative_eq;
 use nalgebra::DMatrix;
 
 use crate::flight_plan::choice::{
-    Aim, AimPart, Budget, CardChoice, CardSet, CoefficientKnowledge, Price,
+    Aim, AimPart, Budget, CardChoice, CardSet, CoefficientCovariance, Price,
 };
 use crate::model::PlannedRows;
 use crate::numerics::random::RandomStream;
@@ -18,7 +18,7 @@ const AIMS: usize = 8;
 
 /// Random posterior of the coefficient with a place: covariance G Gᵀ of cards' rows and aims over fewer
 /// unknowns, so that cards overlap and complete each other.
-fn coefficient(place: usize, random: &mut RandomStream) -> (CoefficientKnowledge, Vec<Aim>) {
+fn coefficient(place: usize, random: &mut RandomStream) -> (CoefficientCovariance, Vec<Aim>) {
     let (rows, unknowns) = (CARDS * ROWS + AIMS, 10);
     let gains = DMatrix::from_fn(rows, unknowns, |_, j| random.normal() / (1.0 + j as f64));
     let noise = |random: &mut RandomStream| {
@@ -43,7 +43,7 @@ fn coefficient(place: usize, random: &mut RandomStream) -> (CoefficientKnowledge
         point: place * AIMS + i,
     });
     let aims = aims.collect();
-    let coefficient = CoefficientKnowledge {
+    let coefficient = CoefficientCovariance {
         covariance: &gains * gains.transpose(),
         cards,
     };
@@ -151,7 +151,7 @@ fn a_card_updates_the_covariance_as_a_gaussian_observation_does() {
     for card in [1, 4, 4, 9] {
         times[card] += 1;
     }
-    let updated = |coefficient: &CoefficientKnowledge| {
+    let updated = |coefficient: &CoefficientCovariance| {
         let mut expected = coefficient.covariance.clone();
         for card in [1, 4, 4, 9] {
             let Some(rows) = &coefficient.cards[card] else {

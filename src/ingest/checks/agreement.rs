@@ -224,7 +224,7 @@ fn disturbance(relation: &Relation, pairs: &[WindowPair], gusts: &Gusts) -> Dist
         return Disturbance::default();
     };
     let response = match relation.selection {
-        Selection::Above(_) => spread(pairs.iter().map(|p| p.predicted)),
+        Selection::Above(_) => robust_deviation(pairs.iter().map(|p| p.predicted)),
         Selection::Largest { .. } => f64::INFINITY,
     };
     Disturbance {
@@ -234,7 +234,7 @@ fn disturbance(relation: &Relation, pairs: &[WindowPair], gusts: &Gusts) -> Dist
 }
 
 /// Robust standard deviation.
-fn spread(values: impl Iterator<Item = f64> + Clone) -> f64 {
+fn robust_deviation(values: impl Iterator<Item = f64> + Clone) -> f64 {
     let middle = upper_median(values.clone()).unwrap_or_default();
     SIGMA_PER_MAD * upper_median(values.map(|v| (v - middle).abs())).unwrap_or_default()
 }
@@ -277,11 +277,11 @@ fn find_jumps(relation: &Relation, pairs: &[WindowPair], settings: &Checks) -> V
     let slope = median_slope(pairs);
     let distance =
         |p: &WindowPair| (p.measured - slope * p.predicted).abs() / (1.0 + slope * slope).sqrt();
-    let spread = SIGMA_PER_MAD * upper_median(pairs.iter().map(distance)).unwrap_or_default();
+    let deviation = SIGMA_PER_MAD * upper_median(pairs.iter().map(distance)).unwrap_or_default();
     let limit = match relation.gusts {
-        GustEffect::Excite => MANEUVER_DEVIATIONS * spread,
+        GustEffect::Excite => MANEUVER_DEVIATIONS * deviation,
         GustEffect::Slight | GustEffect::Disturb { .. } => {
-            (JUMP_DEVIATIONS * spread).max(relation.selection.level())
+            (JUMP_DEVIATIONS * deviation).max(relation.selection.level())
         }
     };
     let jumps: Vec<usize> = pairs

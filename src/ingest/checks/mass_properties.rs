@@ -149,8 +149,8 @@ fn impossible_inertia(blocks: &BlockMeans) -> Option<ImpossibleSignal> {
             ),
         });
     }
-    let spread = (0.5 * (x - z)).hypot(xz);
-    let (smaller, larger) = (0.5 * (x + z) - spread, 0.5 * (x + z) + spread);
+    let radius = (0.5 * (x - z)).hypot(xz);
+    let (smaller, larger) = (0.5 * (x + z) - radius, 0.5 * (x + z) + radius);
     let of_plane = if x > z { signal::IX } else { signal::IZ };
     let (largest, others, name) = if y > larger {
         (y, smaller + larger, signal::IY)

@@ -9,7 +9,7 @@
 mod causes;
 mod contradictions;
 mod instruments;
-mod learnt;
+mod information_gain;
 #[cfg(test)]
 mod tests;
 
@@ -17,8 +17,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use self::causes::Causes;
 use self::contradictions::contradictions;
+use self::information_gain::information_gains;
 use self::instruments::instruments;
-use self::learnt::learnt;
 use super::published_night::{ManeuverWindow, NightTables, PublishedNight};
 use crate::lineage::{Changes, ManeuverChange, ManeuverDifference, Moved, Stage, VerdictChange};
 use crate::maneuver::Status;
@@ -59,7 +59,7 @@ pub fn between(since: &str, before: &NightTables, now: &NightTables) -> Changes 
         gone_trends: trends_before.difference(&trends_now).cloned().collect(),
         trends: moved_trends(before, now, &causes),
         verdicts: changed_verdicts(before, now, &causes),
-        learnt: learnt(before, now),
+        learnt: information_gains(before, now),
         contradictions: contradictions(before, now),
         instruments: instruments(before.instrument_trends, now.instrument_trends),
         causes: causes.all,

@@ -226,7 +226,7 @@ fn upright_labels(svg: &mut SvgWriter, chart: &Chart, column: &StripColumn, y: f
         .iter()
         .map(|w| column.x(0.5 * (w.start_s + w.end_s)))
         .collect();
-    let places = spread(&centres, LABEL_PITCH, column.right);
+    let places = spread_apart(&centres, LABEL_PITCH, column.right);
     let style = TextStyle {
         is_vertical: true,
         ..INK_TEXT
@@ -250,19 +250,19 @@ fn upright_labels(svg: &mut SvgWriter, chart: &Chart, column: &StripColumn, y: f
 
 /// Moves ascending places apart, so that neighbours are at least `pitch` apart and none is beyond
 /// `end`.
-fn spread(places: &[f64], pitch: f64, end: f64) -> Vec<f64> {
-    let mut spread = places.to_vec();
+fn spread_apart(places: &[f64], pitch: f64, end: f64) -> Vec<f64> {
+    let mut apart = places.to_vec();
     let mut last = f64::NEG_INFINITY;
-    for x in &mut spread {
+    for x in &mut apart {
         *x = x.max(last + pitch);
         last = *x;
     }
     let mut next = end + pitch;
-    for x in spread.iter_mut().rev() {
+    for x in apart.iter_mut().rev() {
         *x = x.min(next - pitch);
         next = *x;
     }
-    spread
+    apart
 }
 
 /// Shades each maneuver through all strips, with its identifier as a tooltip.
@@ -436,9 +436,12 @@ mod tests {
 
     #[test]
     fn labels_are_spread_apart_and_stay_inside() {
-        assert_eq!(spread(&[10.0, 12.0, 50.0], 15.0, 100.0), [10.0, 25.0, 50.0]);
         assert_eq!(
-            spread(&[90.0, 95.0, 99.0], 15.0, 100.0),
+            spread_apart(&[10.0, 12.0, 50.0], 15.0, 100.0),
+            [10.0, 25.0, 50.0]
+        );
+        assert_eq!(
+            spread_apart(&[90.0, 95.0, 99.0], 15.0, 100.0),
             [70.0, 85.0, 100.0]
         );
     }

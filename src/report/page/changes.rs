@@ -1,6 +1,8 @@
 //! Changes since the previously published night, with their causes.
 
-use crate::lineage::{Changes, Contradiction, InstrumentChange, Learnt, ManeuverDifference, Moved};
+use crate::lineage::{
+    Changes, Contradiction, InformationGain, InstrumentChange, ManeuverDifference, Moved,
+};
 use crate::report::notation::{angle, number};
 use crate::report::table_view::TableView;
 
@@ -158,7 +160,7 @@ fn instruments(changes: &Changes) -> TableView {
 }
 
 fn learnt(changes: &Changes) -> TableView {
-    let row = |l: &Learnt| {
+    let row = |l: &InformationGain| {
         let value = |v, deviation| {
             let [v, deviation] = [v, deviation].map(|x| number(Some(x), 3));
             format!("{v} ± {deviation}")

@@ -13,7 +13,7 @@ mod failures;
 mod history_strips;
 mod identifiability_tables;
 mod instrument_charts;
-mod knowledge_section;
+mod uncertainty_section;
 mod maneuver_page;
 mod maneuver_table;
 mod match_charts;
@@ -40,12 +40,12 @@ use class_outcomes::ClassOutcomes;
 use correlation_triangle::CorrelationTriangle;
 use derivative_page::DerivativeGroup;
 use derivative_results::DerivativeResults;
-use knowledge_section::KnowledgeSection;
 use maneuver_page::ManeuverPage;
 use match_section::MatchSection;
 use qualities_section::QualitiesSection;
 use quality_charts::QualityChart;
 use summary::Summary;
+use uncertainty_section::UncertaintySection;
 use verdict_table::VerdictGroup;
 
 /// Values that the template prints.
@@ -64,7 +64,7 @@ pub struct Page<'a> {
     verdicts: Vec<VerdictGroup>,
     qualities: Option<QualitiesSection>,
     proof_of_match: Option<MatchSection>,
-    knowledge: Option<KnowledgeSection>,
+    knowledge: Option<UncertaintySection>,
     derivative_groups: Vec<DerivativeGroup>,
     never_estimated: Vec<&'a str>,
     inputs: Vec<ClassFigure>,
@@ -104,7 +104,7 @@ impl<'a> Page<'a> {
             verdicts: verdict_table::by_axis(&derivatives, &anchors),
             qualities: qualities_section::section(contents),
             proof_of_match: match_section::section(contents, &markers),
-            knowledge: knowledge_section::section(contents),
+            knowledge: uncertainty_section::section(contents),
             derivative_groups: derivative_page::groups(&derivatives, &anchors, &markers),
             never_estimated: never_estimated(contents, &derivatives),
             inputs: class_figures::inputs(contents, &markers),

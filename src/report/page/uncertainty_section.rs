@@ -1,5 +1,5 @@
-//! Knowledge that flights have added, the basis for what to fly next: posterior standard deviations over those before
-//! flight, and what one more of the flown maneuvers would add.
+//! Uncertainty that flights have left, the basis for what to fly next: posterior standard deviations over
+//! those before flight, and the effect of one more of the flown maneuvers.
 
 use std::collections::BTreeMap;
 
@@ -24,9 +24,9 @@ const NAMED: usize = 3;
 /// Number of maneuvers to repeat that the answer names.
 const REPEATS: usize = 2;
 
-/// Answer in sentences, with its charts.
+/// Answer in sentences, with its chart.
 #[derive(Clone, Debug, Serialize)]
-pub struct KnowledgeSection {
+pub struct UncertaintySection {
     pub answer: String,
     pub chart: QualityChart,
 }
@@ -43,11 +43,11 @@ struct AxisMedians {
 
 /// The section; `None` without a posterior.
 #[must_use]
-pub fn section(contents: &Contents) -> Option<KnowledgeSection> {
+pub fn section(contents: &Contents) -> Option<UncertaintySection> {
     let rows: Vec<(&PosteriorRow, f64)> = contents
         .posterior
         .iter()
-        .filter_map(|row| Some((row, left_pct(row)?)))
+        .filter_map(|row| Some((row, remaining_pct(row)?)))
         .collect();
     let axes = [
         (Axis::Longitudinal, "longitudinal", DARK_COLOURS[1], 1),
@@ -59,43 +59,47 @@ pub fn section(contents: &Contents) -> Option<KnowledgeSection> {
         label_at,
         medians: medians(&rows, axis),
     });
-    let least = least_known(&rows);
-    Some(KnowledgeSection {
-        answer: answer(contents, &rows, &least)?,
-        chart: chart(&rows, &axes, &least)?,
+    let most_uncertain = most_uncertain(&rows);
+    Some(UncertaintySection {
+        answer: answer(contents, &rows, &most_uncertain)?,
+        chart: chart(&rows, &axes, &most_uncertain)?,
     })
 }
 
 /// Posterior standard deviation, percent of the prior one.
-fn left_pct(row: &PosteriorRow) -> Option<f64> {
-    let left = 100.0 * row.standard_deviation / row.prior_deviation;
-    left.is_finite().then_some(left)
+fn remaining_pct(row: &PosteriorRow) -> Option<f64> {
+    let pct = 100.0 * row.standard_deviation / row.prior_deviation;
+    pct.is_finite().then_some(pct)
 }
 
 fn medians(rows: &[(&PosteriorRow, f64)], axis: Axis) -> Vec<(f64, f64)> {
     let mut own: Vec<(f64, f64)> = rows
         .iter()
         .filter(|(row, _)| coefficient_of(&row.derivative).is_some_and(|c| c.axis() == axis))
-        .map(|(row, left)| (row.alpha_deg, *left))
+        .map(|(row, pct)| (row.alpha_deg, *pct))
         .collect();
     own.sort_by(|a, b| a.0.total_cmp(&b.0));
     let of_angle = own.chunk_by(|a, b| (a.0 - b.0).abs() < 1e-6);
     of_angle
-        .filter_map(|own| Some((own.first()?.0, median(own.iter().map(|(_, left)| *left))?)))
+        .filter_map(|own| Some((own.first()?.0, median(own.iter().map(|(_, pct)| *pct))?)))
         .collect()
 }
 
 /// A row of the posterior, and its standard deviation in percent of that before flight.
-type Left<'a> = (&'a PosteriorRow, f64);
+type RemainingUncertainty<'a> = (&'a PosteriorRow, f64);
 
 /// Median of all, the derivatives on which flights gave least, the maneuvers worth a repeat, the level to decide, and
 /// the command that plans the flight.
-fn answer(contents: &Contents, rows: &[Left], least: &[Left]) -> Option<String> {
-    let all = median(rows.iter().map(|(_, left)| *left))?;
+fn answer(
+    contents: &Contents,
+    rows: &[RemainingUncertainty],
+    most_uncertain: &[RemainingUncertainty],
+) -> Option<String> {
+    let all = median(rows.iter().map(|(_, pct)| *pct))?;
     let information = Information::new(contents);
-    let places: Vec<String> = least
+    let places: Vec<String> = most_uncertain
         .iter()
-        .map(|(row, left)| information.place_in_words(row, *left))
+        .map(|(row, pct)| information.place_in_words(row, *pct))
         .collect();
     let sentences = [
         Some(format!(
@@ -117,15 +121,15 @@ fn answer(contents: &Contents, rows: &[Left], least: &[Left]) -> Option<String> 
 }
 
 /// Largest row of each derivative; the derivatives with the largest of these, descending.
-fn least_known<'a>(rows: &[Left<'a>]) -> Vec<Left<'a>> {
-    let mut of_name: BTreeMap<&str, Left> = BTreeMap::new();
-    for (row, left) in rows {
-        let largest = of_name.entry(&row.derivative).or_insert((row, *left));
-        if *left > largest.1 {
-            *largest = (row, *left);
+fn most_uncertain<'a>(rows: &[RemainingUncertainty<'a>]) -> Vec<RemainingUncertainty<'a>> {
+    let mut of_name: BTreeMap<&str, RemainingUncertainty> = BTreeMap::new();
+    for (row, pct) in rows {
+        let largest = of_name.entry(&row.derivative).or_insert((row, *pct));
+        if *pct > largest.1 {
+            *largest = (row, *pct);
         }
     }
-    let mut all: Vec<Left> = of_name.into_values().collect();
+    let mut all: Vec<RemainingUncertainty> = of_name.into_values().collect();
     all.sort_by(|a, b| b.1.total_cmp(&a.1));
     all.truncate(NAMED);
     all
@@ -233,7 +237,7 @@ impl<'a> Information<'a> {
     }
 
     /// Derivative, angle of attack, share left, and the class that estimates it best.
-    fn place_in_words(&self, row: &PosteriorRow, left: f64) -> String {
+    fn place_in_words(&self, row: &PosteriorRow, pct: f64) -> String {
         let class = self.best_class(&row.derivative).map_or_else(
             || "no class estimates it".to_owned(),
             |class| format!("{class} estimates it best"),
@@ -242,7 +246,7 @@ impl<'a> Information<'a> {
             "{} at {} ({} %; {class})",
             row.derivative,
             angle(row.alpha_deg),
-            fixed(left, 0)
+            fixed(pct, 0)
         )
     }
 
@@ -286,19 +290,23 @@ impl<'a> Information<'a> {
 }
 
 /// Chart over angle of attack: a mark for each derivative, and the medians of both axes.
-fn chart(rows: &[Left], axes: &[AxisMedians], least: &[Left]) -> Option<QualityChart> {
+fn chart(
+    rows: &[RemainingUncertainty],
+    axes: &[AxisMedians],
+    most_uncertain: &[RemainingUncertainty],
+) -> Option<QualityChart> {
     let (low, high) = extent(rows.iter().map(|(row, _)| row.alpha_deg))?;
-    let (_, most) = extent(rows.iter().map(|(_, left)| *left))?;
+    let (_, most) = extent(rows.iter().map(|(_, pct)| *pct))?;
     let caption = "Standard deviation of each derivative over that before flight, the least known named, and the \
                    medians of both axes. From 100 % flights gave nothing; above it, they leave the size of the \
                    tunnel's error uncertain, which counts after flight.";
-    let marks = rows.iter().map(|(row, left)| ChartPoint {
-        at: (row.alpha_deg, *left),
+    let marks = rows.iter().map(|(row, pct)| ChartPoint {
+        at: (row.alpha_deg, *pct),
         label: String::new(),
         outline: vec![],
     });
-    let named = least.iter().map(|(row, left)| ChartPoint {
-        at: (row.alpha_deg, *left),
+    let named = most_uncertain.iter().map(|(row, pct)| ChartPoint {
+        at: (row.alpha_deg, *pct),
         label: row.derivative.clone(),
         outline: vec![],
     });
@@ -360,11 +368,11 @@ mod tests {
             ("Cn_dr", 30.0, 1.3),
             ("CY_beta", 40.0, 0.4),
         ];
-        for (derivative, alpha_deg, left) in rows {
+        for (derivative, alpha_deg, pct) in rows {
             campaign.posterior.push(PosteriorRow {
                 derivative: derivative.into(),
                 alpha_deg,
-                standard_deviation: left * 0.01,
+                standard_deviation: pct * 0.01,
                 prior_deviation: 0.01,
                 ..first.clone()
             });

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use crate::lineage::Learnt;
+use crate::lineage::InformationGain;
 use crate::night::published_night::NightTables;
 use crate::tables::{CovarianceRow, PosteriorRow};
 
@@ -33,13 +33,13 @@ struct PosteriorRows<'a> {
 }
 
 /// Derivatives on which flight added information, the most first.
-pub fn learnt(before: &NightTables, now: &NightTables) -> Vec<Learnt> {
+pub fn information_gains(before: &NightTables, now: &NightTables) -> Vec<InformationGain> {
     let (before, now) = (
         PosteriorRows::of_tables(before),
         PosteriorRows::of_tables(now),
     );
     let names = now.rows.keys();
-    let mut all: Vec<Learnt> = names
+    let mut all: Vec<InformationGain> = names
         .filter_map(|name| information_gained(name, &before, &now))
         .collect();
     all.sort_by(|a, b| {
@@ -54,7 +54,7 @@ fn information_gained(
     derivative: &str,
     before: &PosteriorRows,
     now: &PosteriorRows,
-) -> Option<Learnt> {
+) -> Option<InformationGain> {
     let (rows_before, rows) = (before.rows.get(derivative)?, now.rows.get(derivative)?);
     let points = rows.keys().filter(|p| rows_before.contains_key(p));
     let points: Vec<PublishedPoint> = points
@@ -70,7 +70,7 @@ fn information_gained(
         (is.value - was.value).abs() / was.standard_deviation
     };
     let (was, is) = pairs.max_by(|a, b| moved(a).total_cmp(&moved(b)))?;
-    (nats >= LEAST_NATS).then(|| Learnt {
+    (nats >= LEAST_NATS).then(|| InformationGain {
         derivative: derivative.to_owned(),
         nats,
         alpha_deg: is.alpha_deg,
