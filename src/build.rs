@@ -1,4 +1,4 @@
-//! The build script: a fingerprint of the sources, so that a published table says which code made
+//! The build script: a fingerprint of the sources, so that a published table states which code made
 //! it.
 
 use std::path::{Path, PathBuf};

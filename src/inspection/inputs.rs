@@ -10,7 +10,7 @@ use crate::units;
 
 /// Least significance of an effect that determines a sign. Residuals are coloured, so the standard
 /// errors are several times too small.
-const TELLS_SIGN: f64 = 12.0;
+const SIGN_SIGNIFICANCE: f64 = 12.0;
 /// Time over which a pilot control acts, in steps of the grid.
 const CONTROL_STEPS: usize = 3;
 
@@ -34,7 +34,7 @@ pub struct InputColumn {
     pub evidence: String,
 }
 
-/// Inputs that names tell, with their signs and axes. Signs come from the `liveliest` parts. Axes
+/// Inputs that names determine, with their signs and axes. Signs come from the `liveliest` parts. Axes
 /// of other surfaces come from all of the recordings, since a flap may move in few maneuvers.
 #[must_use]
 pub fn inputs(
@@ -62,7 +62,7 @@ pub fn inputs(
     found
 }
 
-/// Surfaces whose names tell nothing: on each axis without a named surface, the angle that the
+/// Surfaces with names outside the vocabulary: on each axis without a named surface, the angle that the
 /// angular acceleration follows most clearly.
 fn unnamed(
     grid: &Grid,
@@ -129,6 +129,15 @@ pub fn kind_of(facts: &ColumnFacts) -> Option<Input> {
     kind.filter(|_| facts.unit.is_none_or(is_position))
 }
 
+/// Motion whose effects on the angular accelerations are estimated beside those of the inputs.
+const MOTION: [Quantity; 5] = [
+    Quantity::Alpha,
+    Quantity::Beta,
+    Quantity::P,
+    Quantity::Q,
+    Quantity::R,
+];
+
 /// Effects of some inputs on the three angular accelerations.
 struct Responses<'a> {
     inputs: &'a [(&'a ColumnFacts, Input)],
@@ -152,29 +161,21 @@ impl<'a> Responses<'a> {
         };
         let columns: Vec<Option<&Vec<f64>>> =
             inputs.iter().map(|(facts, _)| moving(facts)).collect();
-        let motion: Vec<Vec<f64>> = Quantity::ALL
+        let motion: Vec<Vec<f64>> = MOTION
             .into_iter()
-            .filter(|q| {
-                matches!(
-                    q,
-                    Quantity::Alpha | Quantity::Beta | Quantity::P | Quantity::Q | Quantity::R
-                )
-            })
-            .filter_map(|q| series(grid, assignment, q))
+            .filter_map(|quantity| series(grid, assignment, quantity))
             .collect();
+        let used = columns.iter().flatten().map(|c| c.as_slice());
+        let regressors: Vec<&[f64]> = used.chain(motion.iter().map(Vec::as_slice)).collect();
         let effects = [Quantity::Q, Quantity::P, Quantity::R].map(|rate| {
             let Some(rate) = series(grid, assignment, rate) else {
                 return Vec::new();
             };
-            let response = slopes(grid, &rate, steps);
-            let used = columns.iter().flatten().map(|c| c.as_slice());
-            let regressors: Vec<&[f64]> = used.chain(motion.iter().map(Vec::as_slice)).collect();
-            let found = effects(&Regression {
-                response: &response,
-                regressors,
-            })
-            .unwrap_or_default();
-            let mut found = found.into_iter();
+            let regression = Regression {
+                response: &slopes(grid, &rate, steps),
+                regressors: regressors.clone(),
+            };
+            let mut found = effects(&regression).unwrap_or_default().into_iter();
             columns
                 .iter()
                 .map(|c| c.and_then(|_| found.next()).unwrap_or_default())
@@ -214,56 +215,57 @@ impl<'a> Responses<'a> {
 
     fn input(&self, n: usize) -> InputColumn {
         let (facts, kind) = self.inputs[n];
-        let significance = |acts: Acts| self.significance(n, acts);
-        let acts = usual_axis(kind).unwrap_or_else(|| {
-            let [pitch, roll, yaw] =
-                [Acts::Pitch, Acts::Roll, Acts::Yaw].map(|acts| significance(acts).abs());
-            match (pitch >= roll.max(yaw), roll >= yaw) {
-                (true, _) => Acts::Pitch,
-                (_, true) => Acts::Roll,
-                _ => Acts::Yaw,
-            }
-        });
-        let found = significance(acts);
+        let acts = usual_axis(kind).unwrap_or_else(|| self.clearest_axis(n));
+        let found = self.significance(n, acts);
         let usual = usual_effect(kind);
-        let sign = if found * usual < 0.0 && found.abs() >= TELLS_SIGN {
-            -1.0
-        } else {
-            1.0
-        };
+        let is_significant = found.abs() >= SIGN_SIGNIFICANCE;
         let other = self.clearer_axis(n, acts);
-        let is_sure = usual != 0.0 && found.abs() >= TELLS_SIGN && other.is_none();
-        let direction = if found * sign > 0.0 {
-            "positive"
-        } else {
-            "negative"
-        };
-        let evidence = match (usual == 0.0, is_sure, other) {
-            (true, _, _) => "no motion determines its sign".to_owned(),
-            (_, false, Some(other)) => format!(
-                "by its name; but {} follows it more clearly than {}",
-                acceleration(other),
-                acceleration(acts)
-            ),
-            (_, false, None) => format!(
-                "the motion does not determine its sign ({:.0} standard errors)",
-                found.abs()
-            ),
-            (_, true, _) => format!(
-                "{direction} {} follows it ({:.0} standard errors)",
-                acceleration(acts),
-                found.abs()
-            ),
-        };
         InputColumn {
             column: facts.name.clone(),
             kind,
             acts,
-            sign,
-            is_sure,
-            evidence,
+            sign: if found * usual < 0.0 && is_significant {
+                -1.0
+            } else {
+                1.0
+            },
+            is_sure: usual != 0.0 && is_significant && other.is_none(),
+            evidence: evidence_in_words((found, usual), acts, other),
         }
     }
+
+    /// Axis on which an input acts most clearly.
+    fn clearest_axis(&self, n: usize) -> Acts {
+        let [pitch, roll, yaw] =
+            [Acts::Pitch, Acts::Roll, Acts::Yaw].map(|acts| self.significance(n, acts).abs());
+        match (pitch >= roll.max(yaw), roll >= yaw) {
+            (true, _) => Acts::Pitch,
+            (_, true) => Acts::Roll,
+            _ => Acts::Yaw,
+        }
+    }
+}
+
+/// Evidence for an input with an effect in standard errors and the sign of the usual one, which acts
+/// more clearly on the axis `other`, if there is one.
+fn evidence_in_words((found, usual): (f64, f64), acts: Acts, other: Option<Acts>) -> String {
+    let (acceleration_of, size) = (acceleration(acts), found.abs());
+    let is_significant = size >= SIGN_SIGNIFICANCE;
+    if usual == 0.0 {
+        return "no motion determines its sign".to_owned();
+    }
+    if let Some(other) = other {
+        return format!(
+            "by its name; but {} follows it more clearly than {acceleration_of}",
+            acceleration(other)
+        );
+    }
+    if !is_significant {
+        return format!("the motion does not determine its sign ({size:.0} standard errors)");
+    }
+    // A significant effect of the other sign turns the sign of the input.
+    let direction = if usual > 0.0 { "positive" } else { "negative" };
+    format!("{direction} {acceleration_of} follows it ({size:.0} standard errors)")
 }
 
 /// Rate about the axis on which an input acts.

@@ -1,4 +1,4 @@
-//! Attitudes and rates whose names tell nothing: an attitude is nearly the integral of its rate.
+//! Attitudes and rates with names outside the vocabulary: an attitude is nearly the integral of its rate.
 
 use std::collections::BTreeSet;
 
@@ -21,7 +21,7 @@ const AXES: [(Quantity, Quantity); 3] = [
 ];
 
 impl Search<'_> {
-    /// Adds attitudes and rates whose names tell nothing: pairs in which one column is the integral
+    /// Adds attitudes and rates with names outside the vocabulary: pairs in which one column is the integral
     /// of the other, in the order in which the equations of all three attitudes hold best. Returns them if
     /// another order or other columns fit nearly as well.
     pub fn seed_rotation(&self, assignment: &mut Assignment) -> BTreeSet<Quantity> {
@@ -56,7 +56,7 @@ impl Search<'_> {
         proposed.collect()
     }
 
-    /// Adds pitch and bank with all rates, whose names tell nothing, where no heading is recorded and no other
+    /// Adds pitch and bank with all rates, with names outside the vocabulary, where no heading is recorded and no other
     /// columns fit nearly as well. Pitch and bank differ only by the terms of the yaw rate.
     fn seed_without_heading(&self, integrals: &[(Choice, Choice)], assignment: &mut Assignment) {
         use Quantity::{P, Phi, Q, R, Theta};

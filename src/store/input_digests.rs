@@ -140,18 +140,7 @@ impl InputDigests {
         let metadata = std::fs::metadata(path).map_err(|e| format!("cannot be read: {e}"))?;
         // Anything else, such as a pipe, may block for ever.
         if !metadata.is_file() {
-            return Err(if metadata.is_dir() {
-                let why = std::fs::read_dir(path).err().map_or_else(
-                    || {
-                        ", or a link to one that is searched already or holds the archive"
-                            .to_owned()
-                    },
-                    |e| format!(" that cannot be read: {e}"),
-                );
-                format!("is a folder{why}")
-            } else {
-                "is no regular file".to_owned()
-            });
+            return Err(irregular(path, &metadata));
         }
         let before = stamp(&metadata);
         if let (Some(stamp), Some(known)) = (&before, self.remembered.get(path))
@@ -248,6 +237,19 @@ impl InputDigests {
     fn note(&self, path: &Path, stamp: &str, known: Option<Remembered>) {
         if let Ok(mut seen) = self.seen.lock() {
             seen.insert(path.to_owned(), (stamp.to_owned(), known));
+        }
+    }
+}
+
+/// Reason for which something that is no regular file cannot be digested.
+fn irregular(path: &Path, metadata: &std::fs::Metadata) -> String {
+    if !metadata.is_dir() {
+        return "is no regular file".to_owned();
+    }
+    match std::fs::read_dir(path) {
+        Err(e) => format!("is a folder that cannot be read: {e}"),
+        Ok(_) => {
+            "is a folder, or a link to one that is searched already or holds the archive".to_owned()
         }
     }
 }

@@ -53,7 +53,7 @@ impl Unit {
     }
 }
 
-/// Units that are refused because they do not say what harvest needs, with the reason.
+/// Units that are refused because they are ambiguous, with the reason.
 const REFUSED: &[(&str, &str)] = &[
     (
         "kias",

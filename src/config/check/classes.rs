@@ -119,18 +119,7 @@ fn word(output: Output) -> String {
 /// Checks the description by which maneuvers of the class are recognised.
 fn recognition(config: &Config, class: &Class, source: &Source) -> Result<()> {
     let rule = &class.recognition;
-    let user = format!("class {}", class.name);
-    for name in rule.flags.keys() {
-        spelt_signal(config, source, name, &user)?;
-    }
-    for name in rule.counted() {
-        // A signal without a size of its steps is none that the recorder merely lacks.
-        if config.segment.steps.contains_key(name) {
-            spelt_signal(config, source, name, &user)?;
-        } else {
-            known_signal(config, source, name, &user)?;
-        }
-    }
+    signals_of_recognition(config, class, source)?;
     let error =
         |name: &str, what: &str| Err(source.error_under("recognise", name, of_class(class, what)));
     for (name, count) in &rule.steps {
@@ -159,6 +148,24 @@ fn recognition(config: &Config, class: &Class, source: &Source) -> Result<()> {
                 name,
                 &format!("`{name}` must not be negative, not {time_s}"),
             );
+        }
+    }
+    Ok(())
+}
+
+/// Checks the names of the signals by which maneuvers of the class are recognised.
+fn signals_of_recognition(config: &Config, class: &Class, source: &Source) -> Result<()> {
+    let rule = &class.recognition;
+    let user = format!("class {}", class.name);
+    for name in rule.flags.keys() {
+        spelt_signal(config, source, name, &user)?;
+    }
+    for name in rule.counted() {
+        // A signal without a size of its steps is none that the recorder merely lacks.
+        if config.segment.steps.contains_key(name) {
+            spelt_signal(config, source, name, &user)?;
+        } else {
+            known_signal(config, source, name, &user)?;
         }
     }
     Ok(())

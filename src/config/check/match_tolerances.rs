@@ -84,7 +84,7 @@ fn mistake(test: &Test, tolerance: &Tolerance) -> Option<String> {
 }
 
 /// Message for a test with the number of an earlier one that judges the same class: their rows could
-/// not be told apart.
+/// not be distinguished.
 fn ambiguous(earlier: &[Test], test: &Test, config: &Config) -> Option<String> {
     let judges = |test: &Test, class: &Class| test.judges(class.axis, &class.name);
     let mut same = earlier.iter().filter(|other| other.test == test.test);

@@ -120,7 +120,7 @@ pub(super) fn known_class(config: &Config, source: &Source, name: &str) -> Resul
     Err(source.error(name, format!("unknown class `{name}`{near}")))
 }
 
-/// Refuses a name that is not among those known; `kind` says what they are.
+/// Refuses a name that is not among those known; `kind` names what they are.
 pub(super) fn known_name(source: &Source, name: &str, known: &[&str], kind: &str) -> Result<()> {
     if known.contains(&name) {
         return Ok(());

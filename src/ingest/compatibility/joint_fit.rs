@@ -24,7 +24,7 @@ use crate::numerics::mean::finite_mean;
 const ROUNDS: usize = 8;
 
 /// Rounds with the wide prior, in which R settles first. Otherwise the priors of the delays would
-/// widen by chance in turbulence, where the data say little about delays.
+/// widen by chance in turbulence, where the data have little information about delays.
 const WIDE_ROUNDS: usize = 4;
 
 /// Least number of rounds: those with the wide prior, and two estimates of P.

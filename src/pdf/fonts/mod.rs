@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 use pdf_writer::types::{CidFontType, FontFlags, SystemInfo, UnicodeCmap};
-use pdf_writer::{Filter, Finish, Name, Pdf, Rect, Ref, Str};
+use pdf_writer::{Buf, Filter, Finish, Name, Pdf, Rect, Ref, Str};
 use ttf_parser::Face;
 
 const REGULAR: &[u8] = include_bytes!("Arimo-Regular.ttf");
@@ -146,6 +146,7 @@ impl FontFace {
         self.glyphs.get(&c).copied().unwrap_or(missing)
     }
 
+    /// Writes the face, from the reference `first` on.
     fn write(&self, pdf: &mut Pdf, first: Ref, compressed: &dyn Fn(&[u8]) -> Vec<u8>) {
         let [cid, descriptor, file, unicode] = [1, 2, 3, 4].map(|i| Ref::new(first.get() + i));
         let name = Name(self.name.as_bytes());
@@ -159,43 +160,55 @@ impl FontFace {
             ordering: Str(b"Identity"),
             supplement: 0,
         };
+        self.write_cid_font(pdf, (cid, descriptor), system);
+        self.write_descriptor(pdf, (descriptor, file));
+        let bytes = compressed(self.file);
+        let length = i32::try_from(self.file.len()).unwrap_or(i32::MAX);
+        pdf.stream(file, &bytes)
+            .filter(Filter::FlateDecode)
+            .pair(Name(b"Length1"), length);
+        pdf.cmap(unicode, &compressed(&self.unicode_map(system)))
+            .filter(Filter::FlateDecode);
+    }
+
+    /// Writes the widths of the glyphs.
+    fn write_cid_font(&self, pdf: &mut Pdf, (cid, descriptor): (Ref, Ref), system: SystemInfo) {
         let mut font = pdf.cid_font(cid);
         font.subtype(CidFontType::Type2)
-            .base_font(name)
+            .base_font(Name(self.name.as_bytes()))
             .system_info(system)
             .font_descriptor(descriptor);
         font.default_width(0.0)
             .cid_to_gid_map_predefined(Name(b"Identity"));
         font.widths().consecutive(0, self.widths.iter().copied());
         font.finish();
+    }
+
+    /// Writes the face's measures.
+    fn write_descriptor(&self, pdf: &mut Pdf, (descriptor, file): (Ref, Ref)) {
+        let is_bold = self.name.ends_with("Bold");
         pdf.font_descriptor(descriptor)
-            .name(name)
+            .name(Name(self.name.as_bytes()))
             .flags(FontFlags::SYMBOLIC)
             .bbox(self.bounds)
             .italic_angle(0.0)
             .ascent(self.ascent)
             .descent(self.descent)
             .cap_height(688.0)
-            .stem_v(if self.name.ends_with("Bold") {
-                140.0
-            } else {
-                80.0
-            })
+            .stem_v(if is_bold { 140.0 } else { 80.0 })
             .font_file2(file);
-        let bytes = compressed(self.file);
-        let length = i32::try_from(self.file.len()).unwrap_or(i32::MAX);
-        pdf.stream(file, &bytes)
-            .filter(Filter::FlateDecode)
-            .pair(Name(b"Length1"), length);
+    }
+
+    /// Characters of the glyphs, for readers that copy text.
+    fn unicode_map(&self, system: SystemInfo) -> Buf {
         let mut map = UnicodeCmap::new(Name(b"Unicode"), system);
         // Hyphen and soft hyphen share a glyph, which stands for the hyphen: it comes first.
-        let mut known = BTreeSet::new();
+        let mut mapped = BTreeSet::new();
         for (c, (glyph, _)) in &self.glyphs {
-            if known.insert(*glyph) {
+            if mapped.insert(*glyph) {
                 map.pair(*glyph, *c);
             }
         }
-        pdf.cmap(unicode, &compressed(&map.finish()))
-            .filter(Filter::FlateDecode);
+        map.finish()
     }
 }

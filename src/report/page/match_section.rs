@@ -8,6 +8,7 @@ use super::class_markers::ClassMarkers;
 use super::maneuver_page;
 use super::match_charts;
 use super::quality_charts::QualityChart;
+use crate::numerics::order_statistics::median;
 use crate::proof_of_match::Matched;
 use crate::report::contents::Contents;
 use crate::report::notation::{DASH, angle, count, fixed, number};
@@ -157,36 +158,7 @@ fn class_table(contents: &Contents, models: &[ModelSource]) -> TableView {
         .into_iter()
         .chain(heads.iter().map(String::as_str))
         .collect();
-    let line = |class: &str| {
-        let rows = |model: ModelSource| {
-            let mut rows = flown_by(contents, model);
-            rows.retain(|row| row.class == class);
-            rows
-        };
-        let first = models.first().map(|m| rows(*m)).unwrap_or_default();
-        let closed = first
-            .iter()
-            .filter(|row| row.closed_loop == Some(1))
-            .count();
-        let cells = models.iter().flat_map(|model| {
-            let rows = rows(*model);
-            let inside = rows
-                .iter()
-                .filter(|row| row.verdict == MatchVerdict::Inside);
-            let margins = rows.iter().map(|row| size(row.margin));
-            let median = crate::numerics::order_statistics::median(margins);
-            let median = median.filter(|m| m.is_finite());
-            [inside.count().to_string(), number(median, 2)]
-        });
-        [
-            class.to_owned(),
-            first.len().to_string(),
-            closed.to_string(),
-        ]
-        .into_iter()
-        .chain(cells)
-        .collect()
-    };
+    let line = |class: &str| class_row(contents, models, class);
     let classes = contents.classes.iter().map(|c| c.name.as_str());
     let is_found = |class: &&str| contents.maneuvers.iter().any(|m| m.class == *class);
     TableView::new(
@@ -197,7 +169,31 @@ fn class_table(contents: &Contents, models: &[ModelSource]) -> TableView {
     )
 }
 
-/// Margin of each maneuver by model, and what decides it for the first.
+/// Cells of a class: maneuvers flown again, those in closed loop, and of each model the number inside
+/// with the median margin.
+fn class_row(contents: &Contents, models: &[ModelSource], class: &str) -> Vec<String> {
+    let rows_of = |model: &ModelSource| {
+        let mut rows = flown_by(contents, *model);
+        rows.retain(|row| row.class == class);
+        rows
+    };
+    let first = models.first().map(rows_of).unwrap_or_default();
+    let is_closed = |row: &&&MatchVerdictRow| row.closed_loop == Some(1);
+    let mut cells = vec![
+        class.to_owned(),
+        first.len().to_string(),
+        first.iter().filter(is_closed).count().to_string(),
+    ];
+    for rows in models.iter().map(rows_of) {
+        let is_inside = |row: &&&MatchVerdictRow| row.verdict == MatchVerdict::Inside;
+        let median = median(rows.iter().map(|row| size(row.margin)));
+        cells.push(rows.iter().filter(is_inside).count().to_string());
+        cells.push(number(median.filter(|m| m.is_finite()), 2));
+    }
+    cells
+}
+
+/// Margin of each maneuver by model, and the deciding tolerance of the first.
 fn maneuver_table(
     contents: &Contents,
     models: &[ModelSource],

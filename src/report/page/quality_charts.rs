@@ -139,40 +139,17 @@ const LEVEL_LINES: [LevelLine; 3] = [
     },
 ];
 
-/// Lines that differ less cannot be told apart in the chart, per cent.
+/// Least difference at which two lines are distinguishable in the chart, per cent.
 const LEAST_APART_PCT: f64 = 3.0;
 
 /// Lines of the levels. Lines that coincide everywhere share one label; each other line has its label where it is
 /// farthest from the others.
 fn level_lines(levels: &[&LevelRow]) -> Vec<ChartSeries> {
-    let shares: Vec<Vec<f64>> = LEVEL_LINES
-        .iter()
-        .map(|line| levels.iter().map(|row| (line.share)(row)).collect())
-        .collect();
-    let apart = |a: usize, b: usize, i: usize| (shares[a][i] - shares[b][i]).abs();
-    let coincide = |a: usize, b: usize| (0..levels.len()).all(|i| apart(a, b, i) < LEAST_APART_PCT);
-    let all = 0..LEVEL_LINES.len();
-    let group = |own: usize| {
-        let others = all.clone().filter(move |other| coincide(own, *other));
-        others.collect::<Vec<_>>()
-    };
-    let line = |own: usize| {
-        let group = group(own);
-        let nearest = |i: usize| {
-            let others = all.clone().filter(|other| !group.contains(other));
-            others
-                .map(|other| apart(own, other, i))
-                .fold(100.0, f64::min)
-        };
-        let labelled = (0..levels.len()).max_by(|a, b| nearest(*a).total_cmp(&nearest(*b)));
-        // The last line of a group is drawn over the others.
-        let names = group.iter().map(|i| LEVEL_LINES[*i].label);
-        let label = match group.last() {
-            Some(last) if *last == own => names.collect::<Vec<_>>().join(", "),
-            _ => String::new(),
-        };
+    let shares = LevelShares::new(levels);
+    let line = |line: usize| {
+        let (label, labelled) = shares.label(line);
         let point = |(i, row): (usize, &&LevelRow)| ChartPoint {
-            at: (row.alpha_deg, shares[own][i]),
+            at: (row.alpha_deg, shares.of_line[line][i]),
             label: if Some(i) == labelled {
                 label.clone()
             } else {
@@ -181,12 +158,58 @@ fn level_lines(levels: &[&LevelRow]) -> Vec<ChartSeries> {
             outline: vec![],
         };
         ChartSeries {
-            colour: LEVEL_LINES[own].colour,
+            colour: LEVEL_LINES[line].colour,
             points: levels.iter().enumerate().map(point).collect(),
             is_joined: true,
         }
     };
-    all.clone().map(line).collect()
+    (0..LEVEL_LINES.len()).map(line).collect()
+}
+
+/// Probabilities of each line at each angle of attack, per cent.
+struct LevelShares {
+    of_line: [Vec<f64>; LEVEL_LINES.len()],
+    angles: usize,
+}
+
+impl LevelShares {
+    fn new(levels: &[&LevelRow]) -> LevelShares {
+        LevelShares {
+            of_line: LEVEL_LINES
+                .each_ref()
+                .map(|line| levels.iter().map(|row| (line.share)(row)).collect()),
+            angles: levels.len(),
+        }
+    }
+
+    /// Distance of two lines at an angle of attack.
+    fn distance(&self, a: usize, b: usize, angle: usize) -> f64 {
+        (self.of_line[a][angle] - self.of_line[b][angle]).abs()
+    }
+
+    fn coincide(&self, a: usize, b: usize) -> bool {
+        (0..self.angles).all(|angle| self.distance(a, b, angle) < LEAST_APART_PCT)
+    }
+
+    /// Label of a line, and the index of the angle of attack at which it stands.
+    fn label(&self, line: usize) -> (String, Option<usize>) {
+        let lines = 0..LEVEL_LINES.len();
+        let (group, others): (Vec<usize>, Vec<usize>) =
+            lines.partition(|other| self.coincide(line, *other));
+        let nearest = |angle: usize| {
+            let distances = others
+                .iter()
+                .map(|other| self.distance(line, *other, angle));
+            distances.fold(100.0, f64::min)
+        };
+        let labelled = (0..self.angles).max_by(|a, b| nearest(*a).total_cmp(&nearest(*b)));
+        // The last line of a group is drawn over the others.
+        if group.last() != Some(&line) {
+            return (String::new(), labelled);
+        }
+        let names: Vec<&str> = group.iter().map(|i| LEVEL_LINES[*i].label).collect();
+        (names.join(", "), labelled)
+    }
 }
 
 /// Chart of two quantities of one mode.

@@ -344,8 +344,8 @@ impl OpenFile {
             return Ok(());
         }
         if let Some(object) = &self.object {
-            let stretches = remote::stretches(self.metadata.metadata(), column.at, &rows);
-            let read = self.read_from(object.of_stretches(stretches), column, rows, sink);
+            let ranges = remote::byte_ranges(self.metadata.metadata(), column.at, &rows);
+            let read = self.read_from(object.of_ranges(ranges), column, rows, sink);
             return read.map_err(|e| object::failed(&self.path).unwrap_or(e));
         }
         let path = self.wide.as_ref().map_or(self.path.as_path(), Draft::draft);

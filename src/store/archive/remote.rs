@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use glob::{MatchOptions, Pattern};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::ParquetMetaData;
-use parquet::file::page_index::offset_index::OffsetIndexMetaData;
+use parquet::file::page_index::offset_index::{OffsetIndexMetaData, PageLocation};
 
 use super::super::object;
 use super::file_rules::{is_hidden, unreadable};
@@ -82,12 +82,12 @@ pub(super) fn failure_reason(path: &Path, error: &ParquetError) -> String {
 
 /// Byte ranges of these rows of a column. In each row group these are the dictionary and the pages
 /// with the rows, or the whole column of a file without a page index.
-pub(super) fn stretches(
+pub(super) fn byte_ranges(
     metadata: &ParquetMetaData,
     column: usize,
     rows: &Range<usize>,
 ) -> Vec<Range<u64>> {
-    let mut stretches = Vec::new();
+    let mut ranges = Vec::new();
     let mut end = 0;
     for (index, group) in metadata.row_groups().iter().enumerate() {
         let start = end;
@@ -96,44 +96,60 @@ pub(super) fn stretches(
             continue;
         }
         let (from, length) = group.column(column).byte_range();
-        let whole = from..from.saturating_add(length);
+        let bytes = from..from.saturating_add(length);
         let pages = metadata
             .offset_index()
-            .and_then(|i| i.get(index)?.get(column));
-        let pages = pages.map(OffsetIndexMetaData::page_locations);
-        let Some(pages) = pages.filter(|pages| !pages.is_empty()) else {
-            stretches.push(whole);
-            continue;
-        };
-        let row = |at: usize| {
-            pages.get(at).map_or(end, |p| {
-                start + usize::try_from(p.first_row_index).unwrap_or_default()
-            })
-        };
-        let needed: Vec<usize> = (0..pages.len())
-            .filter(|&at| row(at) < rows.end && rows.start < row(at + 1))
-            .collect();
-        let begin = |at: usize| {
-            pages
-                .get(at)
-                .and_then(|p| u64::try_from(p.offset).ok())
-                .unwrap_or(whole.end)
-        };
-        if let (Some(first), Some(last)) = (needed.first(), needed.last()) {
-            stretches.push(whole.start..begin(0));
-            stretches.push(begin(*first)..begin(last + 1));
+            .and_then(|index_of| index_of.get(index)?.get(column));
+        match pages.map(OffsetIndexMetaData::page_locations) {
+            Some(pages) if !pages.is_empty() => {
+                ranges.extend(ranges_of_pages(pages, bytes, start..end, rows));
+            }
+            _ => ranges.push(bytes),
         }
     }
-    // A first page directly after the dictionary is fetched with it.
-    stretches.dedup_by(|next, before| {
+    joined(ranges)
+}
+
+/// Byte ranges of the dictionary and of the pages with these rows, in a column of a row group with the
+/// rows `group` and the bytes `bytes`.
+fn ranges_of_pages(
+    pages: &[PageLocation],
+    bytes: Range<u64>,
+    group: Range<usize>,
+    rows: &Range<usize>,
+) -> impl Iterator<Item = Range<u64>> + use<> {
+    let row = |at: usize| {
+        pages.get(at).map_or(group.end, |page| {
+            group.start + usize::try_from(page.first_row_index).unwrap_or_default()
+        })
+    };
+    let offset = |at: usize| {
+        let offset = pages
+            .get(at)
+            .and_then(|page| u64::try_from(page.offset).ok());
+        offset.unwrap_or(bytes.end)
+    };
+    let is_needed = |at: &usize| row(*at) < rows.end && rows.start < row(at + 1);
+    let mut needed = (0..pages.len()).filter(is_needed);
+    let ranges = needed.next().map(|first| {
+        let last = needed.last().unwrap_or(first);
+        [bytes.start..offset(0), offset(first)..offset(last + 1)]
+    });
+    ranges.into_iter().flatten()
+}
+
+/// Ranges in which adjacent ones are one, without empty ones: a first page directly after the
+/// dictionary is fetched with it.
+fn joined(mut ranges: Vec<Range<u64>>) -> Vec<Range<u64>> {
+    ranges.dedup_by(|next, before| {
         let joins = before.end == next.start;
         if joins {
             before.end = next.end;
         }
         joins
     });
-    stretches.retain(|s| !s.is_empty());
-    stretches
+    ranges.retain(|range| !range.is_empty());
+    ranges
 }
 
 #[cfg(test)]
@@ -233,14 +249,14 @@ mod tests {
             from..from + length
         };
         assert_eq!(
-            stretches(untold.metadata(), 1, &(950..1050)),
+            byte_ranges(untold.metadata(), 1, &(950..1050)),
             [column(0), column(1)]
         );
         assert_eq!(
-            stretches(told.metadata(), 1, &(0..2000)),
+            byte_ranges(told.metadata(), 1, &(0..2000)),
             [column(0), column(1)]
         );
-        let few = stretches(told.metadata(), 1, &(1310..1390));
+        let few = byte_ranges(told.metadata(), 1, &(1310..1390));
         let bytes: u64 = few.iter().map(|s| s.end - s.start).sum();
         let whole = column(1);
         // The dictionary of a thousand values, and one page of ten.
@@ -253,6 +269,6 @@ mod tests {
             few.len() == 2 && bytes < whole.end - whole.start,
             "{few:?} in {whole:?}"
         );
-        assert_eq!(stretches(told.metadata(), 1, &(500..500)), []);
+        assert_eq!(byte_ranges(told.metadata(), 1, &(500..500)), []);
     }
 }

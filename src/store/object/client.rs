@@ -115,21 +115,36 @@ fn code(text: &str) -> Option<&str> {
         .map(|(code, _)| code)
 }
 
-impl Client {
-    pub fn open(bucket: &str) -> Result<Client, Failure> {
-        refuse_environment()?;
-        let backoff = BackoffConfig {
+/// Retries of a request.
+fn retries() -> RetryConfig {
+    RetryConfig {
+        max_retries: 6,
+        retry_timeout: PATIENCE,
+        backoff: BackoffConfig {
             max_backoff: Duration::from_secs(5),
             ..BackoffConfig::default()
-        };
-        let retry = RetryConfig {
-            max_retries: 6,
-            retry_timeout: PATIENCE,
-            backoff,
-        };
+        },
+    }
+}
+
+/// Endpoint of the environment, for messages.
+fn endpoint() -> String {
+    let region = || {
+        set("AWS_REGION")
+            .or_else(|| set("AWS_DEFAULT_REGION"))
+            .unwrap_or("us-east-1".to_owned())
+    };
+    let stated = ENDPOINTS.iter().find_map(|name| set(name));
+    stated.unwrap_or_else(|| format!("Amazon S3 in {}", region()))
+}
+
+impl Client {
+    /// Opens a bucket with the environment's settings.
+    pub fn open(bucket: &str) -> Result<Client, Failure> {
+        refuse_environment()?;
         let store = AmazonS3Builder::from_env()
             .with_bucket_name(bucket)
-            .with_retry(retry)
+            .with_retry(retries())
             .build();
         let store = store.map_err(|e| {
             Failure::Lasting(format!(
@@ -141,23 +156,11 @@ impl Client {
             .enable_all()
             .build();
         let runtime = runtime.map_err(|e| Failure::Passing(format!("cannot connect: {e}")))?;
-        let region = || {
-            format!(
-                "Amazon S3 in {}",
-                set("AWS_REGION")
-                    .or_else(|| set("AWS_DEFAULT_REGION"))
-                    .unwrap_or("us-east-1".to_owned())
-            )
-        };
-        let endpoint = ENDPOINTS
-            .iter()
-            .find_map(|name| set(name))
-            .unwrap_or_else(region);
         Ok(Client {
             runtime,
             store,
             bucket: bucket.to_owned(),
-            endpoint,
+            endpoint: endpoint(),
             listed: Mutex::default(),
             failures: Mutex::default(),
         })

@@ -73,7 +73,7 @@ impl Reader {
 
     /// Reader of the same object that reads these ranges only.
     #[must_use]
-    pub fn of_stretches(&self, wanted: Vec<Range<u64>>) -> Reader {
+    pub fn of_ranges(&self, wanted: Vec<Range<u64>>) -> Reader {
         let Source {
             client, key, about, ..
         } = &*self.source;

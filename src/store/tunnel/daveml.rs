@@ -21,6 +21,17 @@ enum Variable {
     Third,
 }
 
+/// Names of the angle of attack, without the characters between words.
+const ALPHA_NAMES: [&str; 7] = [
+    "alpha",
+    "alphadeg",
+    "alpharad",
+    "aoa",
+    "angleofattack",
+    "angleofattackdeg",
+    "angleofattackrad",
+];
+
 /// A grid: breakpoints of each variable, values with the last variable fastest.
 struct Grid {
     axes: Vec<(Variable, Vec<f64>)>,
@@ -38,17 +49,8 @@ pub(super) fn rows(
     if let Some((line, what)) = excess(text) {
         return Err((line, what.to_owned()));
     }
-    let options = ParsingOptions {
-        allow_dtd: true,
-        ..ParsingOptions::default()
-    };
-    let document = Document::parse_with_options(text, options).map_err(|e| {
-        (
-            usize::try_from(e.pos().row).ok(),
-            format!("not readable as XML: {e}"),
-        )
-    })?;
-    let file = File::new(&document, text, third);
+    let document = parsed(text)?;
+    let definitions = Definitions::new(&document, text, third);
     if document.root_element().tag_name().name() != "DAVEfunc" {
         return Err((
             Some(1),
@@ -63,10 +65,10 @@ pub(super) fn rows(
             .and_then(|d| d.attribute("varID"))
             .unwrap_or_default();
         if wanted(name) {
-            let line = file.line(function);
-            rows.extend(
-                rows_of(name, &file.grid(function)?, file.unit(name)).map(|row| (line, row)),
-            );
+            let line = definitions.line(function);
+            let grid = definitions.grid(function)?;
+            let of_function = rows_of(name, &grid, definitions.unit(name));
+            rows.extend(of_function.map(|row| (line, row)));
         }
     }
     if rows.is_empty() {
@@ -78,8 +80,20 @@ pub(super) fn rows(
     Ok(rows)
 }
 
-/// The document with its definitions by id.
-struct File<'a, 'input> {
+/// Parses a document.
+fn parsed(text: &str) -> Result<Document<'_>, Wrong> {
+    let options = ParsingOptions {
+        allow_dtd: true,
+        ..ParsingOptions::default()
+    };
+    Document::parse_with_options(text, options).map_err(|e| {
+        let line = usize::try_from(e.pos().row).ok();
+        (line, format!("not readable as XML: {e}"))
+    })
+}
+
+/// Definitions of a document by id.
+struct Definitions<'a, 'input> {
     /// Places at which lines end.
     line_ends: Vec<usize>,
     variables: BTreeMap<&'a str, Node<'a, 'input>>,
@@ -107,8 +121,12 @@ fn plain(name: &str) -> String {
         .collect()
 }
 
-impl<'a, 'input> File<'a, 'input> {
-    fn new(document: &'a Document<'input>, text: &str, third: Option<&'a str>) -> File<'a, 'input> {
+impl<'a, 'input> Definitions<'a, 'input> {
+    fn new(
+        document: &'a Document<'input>,
+        text: &str,
+        third: Option<&'a str>,
+    ) -> Definitions<'a, 'input> {
         let by_id = |name: &'static str, id: &'static str| {
             let nodes = document
                 .descendants()
@@ -117,7 +135,7 @@ impl<'a, 'input> File<'a, 'input> {
                 .filter_map(move |n| Some((n.attribute(id)?, n)))
                 .collect::<BTreeMap<_, _>>()
         };
-        File {
+        Definitions {
             line_ends: text.match_indices('\n').map(|(at, _)| at).collect(),
             variables: by_id("variableDef", "varID"),
             breakpoints: by_id("breakpointDef", "bpID"),
@@ -144,6 +162,7 @@ impl<'a, 'input> File<'a, 'input> {
 
     /// Independent variable of a reference.
     fn variable(&self, reference: Node) -> Result<Variable, Wrong> {
+        self.refuse_interpolation(reference)?;
         let id = reference.attribute("varID").unwrap_or_default();
         let definition = self.variables.get(id);
         let names = [Some(id), definition.and_then(|d| d.attribute("name"))]
@@ -152,24 +171,7 @@ impl<'a, 'input> File<'a, 'input> {
         let is_third = self
             .third
             .is_some_and(|third| names.contains(&plain(third)));
-        if let Some(other) = reference
-            .attribute("interpolate")
-            .filter(|i| *i != "linear")
-        {
-            let what = format!(
-                "`interpolate=\"{other}\"`: tables are read linearly, or as pipeline.yaml states (tunnel: interpolation:)"
-            );
-            return Err(self.wrong(reference, what));
-        }
-        if is(&[
-            "alpha",
-            "alphadeg",
-            "alpharad",
-            "aoa",
-            "angleofattack",
-            "angleofattackdeg",
-            "angleofattackrad",
-        ]) {
+        if is(&ALPHA_NAMES) {
             match self.unit(id) {
                 "deg" => Ok(Variable::Alpha { in_rad: false }),
                 "rad" => Ok(Variable::Alpha { in_rad: true }),
@@ -190,61 +192,82 @@ impl<'a, 'input> File<'a, 'input> {
         }
     }
 
-    fn grid(&self, function: Node<'a, 'input>) -> Result<Grid, Wrong> {
-        let points: Vec<Node> = children(function, "independentVarPts").collect();
-        if let Some(values) = child(function, "dependentVarPts") {
-            let axis = |p: &Node<'a, 'input>| Ok((self.variable(*p)?, self.numbers(*p)?));
-            let axes = points.iter().map(axis).collect::<Result<_, Wrong>>()?;
-            let source = child(function, "description").map(content);
-            return self.whole(
-                function,
-                Grid {
-                    axes,
-                    values: self.numbers(values)?,
-                    uncertainties: None,
-                    source,
-                },
-            );
+    /// Refuses a reference that asks for another than linear interpolation.
+    fn refuse_interpolation(&self, reference: Node) -> Result<(), Wrong> {
+        let stated = reference.attribute("interpolate");
+        match stated.filter(|interpolation| *interpolation != "linear") {
+            None => Ok(()),
+            Some(other) => Err(self.wrong(
+                reference,
+                format!(
+                    "`interpolate=\"{other}\"`: tables are read linearly, or as pipeline.yaml states (tunnel: interpolation:)"
+                ),
+            )),
         }
+    }
+
+    /// Grid of a function: inside it, or in a gridded table.
+    fn grid(&self, function: Node<'a, 'input>) -> Result<Grid, Wrong> {
+        match child(function, "dependentVarPts") {
+            Some(values) => self.inline_grid(function, values),
+            None => self.gridded_table(function),
+        }
+    }
+
+    /// Grid whose points and values are inside the function.
+    fn inline_grid(
+        &self,
+        function: Node<'a, 'input>,
+        values: Node<'a, 'input>,
+    ) -> Result<Grid, Wrong> {
+        let points = children(function, "independentVarPts");
+        let axes = points
+            .map(|points| Ok((self.variable(points)?, self.numbers(points)?)))
+            .collect::<Result<_, Wrong>>()?;
+        let grid = Grid {
+            axes,
+            values: self.numbers(values)?,
+            uncertainties: None,
+            source: child(function, "description").map(content),
+        };
+        self.complete(function, grid)
+    }
+
+    /// Grid of the gridded table that a function refers to.
+    fn gridded_table(&self, function: Node<'a, 'input>) -> Result<Grid, Wrong> {
         let definition = child(function, "functionDefn")
             .ok_or_else(|| self.wrong(function, "no `functionDefn`"))?;
         let table = self.table(definition)?;
         let variables: Vec<Variable> = children(function, "independentVarRef")
-            .map(|r| self.variable(r))
+            .map(|reference| self.variable(reference))
             .collect::<Result<_, _>>()?;
         let breakpoints: Vec<Vec<f64>> = children(table, "breakpointRefs")
             .flat_map(|refs| children(refs, "bpRef"))
             .map(|reference| self.breakpoints(reference))
             .collect::<Result<_, _>>()?;
         if variables.len() != breakpoints.len() {
-            return Err(self.wrong(
-                table,
-                format!(
-                    "{} independent variables and {} breakpoints",
-                    variables.len(),
-                    breakpoints.len()
-                ),
-            ));
+            let what = format!(
+                "{} independent variables and {} breakpoints",
+                variables.len(),
+                breakpoints.len()
+            );
+            return Err(self.wrong(table, what));
         }
         let data = child(table, "dataTable").ok_or_else(|| self.wrong(table, "no `dataTable`"))?;
         let values = self.numbers(data)?;
-        let uncertainties = self.uncertainties(table, values.len())?;
-        let source = child(table, "description")
-            .or(child(function, "description"))
-            .map(content);
-        self.whole(
-            table,
-            Grid {
-                axes: variables.into_iter().zip(breakpoints).collect(),
-                values,
-                uncertainties,
-                source,
-            },
-        )
+        let description = child(table, "description").or(child(function, "description"));
+        let grid = Grid {
+            axes: variables.into_iter().zip(breakpoints).collect(),
+            uncertainties: self.uncertainties(table, values.len())?,
+            values,
+            source: description.map(content),
+        };
+        self.complete(table, grid)
     }
 
-    /// Grid of a gridded table, with exactly as many values as its breakpoints require.
-    fn whole(&self, at: Node, grid: Grid) -> Result<Grid, Wrong> {
+    /// Checks that a grid depends on angle of attack, and has exactly as many values as its ascending
+    /// breakpoints require.
+    fn complete(&self, at: Node, grid: Grid) -> Result<Grid, Wrong> {
         let sizes = grid.axes.iter().map(|(_, points)| points.len());
         let expected = sizes.fold(1, usize::saturating_mul);
         if grid.values.len() != expected || grid.axes.is_empty() {

@@ -38,7 +38,7 @@ type Result<T> = std::result::Result<T, String>;
 /// Variables of a file, in the order of their names.
 ///
 /// # Errors
-/// A sentence that says what is damaged.
+/// A sentence that names the damage.
 pub fn variables(bytes: Vec<u8>) -> Result<Vec<(String, Value)>> {
     let largest = bytes.len().saturating_mul(LARGEST_RATIO);
     let options = OpenOptions::default()
