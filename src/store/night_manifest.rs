@@ -56,7 +56,7 @@ impl Night {
     }
 
     /// This manifest with the fingerprint of its fields.
-    pub fn sealed(mut self) -> Night {
+    pub(super) fn sealed(mut self) -> Night {
         self.seal = String::new();
         let text = serde_json::to_vec(&self).unwrap_or_default();
         Night {

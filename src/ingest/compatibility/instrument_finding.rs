@@ -32,7 +32,7 @@ pub struct InstrumentFinding {
 
 impl InstrumentFinding {
     /// Finding on instrument `i` from the fitted errors; `None` unless it is recorded.
-    pub fn of(
+    pub(super) fn of(
         i: usize,
         errors: Option<&FittedErrors>,
         channels: &BTreeMap<String, Channel>,
@@ -64,12 +64,12 @@ impl InstrumentFinding {
     }
 
     /// `true` if an error of the instrument is a fault.
-    pub fn has_fault(&self) -> bool {
+    pub(super) fn has_fault(&self) -> bool {
         self.estimates.iter().flatten().any(|e| e.fault)
     }
 
     /// Each fault in words.
-    pub fn faults(&self) -> Vec<String> {
+    pub(super) fn faults(&self) -> Vec<String> {
         let fault = |kind: Kind| {
             let e = self.estimates[kind as usize].filter(|e| e.fault)?;
             let words = match kind {
@@ -92,7 +92,7 @@ impl InstrumentFinding {
     }
 
     /// All faults of the instrument with their bounds, as a sentence.
-    pub fn fault_sentence(&self) -> String {
+    pub(super) fn fault_sentence(&self) -> String {
         let bound = |kind: Kind| {
             let e = self.estimates[kind as usize].filter(|e| e.fault)?;
             Some(match kind {
@@ -112,7 +112,7 @@ impl InstrumentFinding {
     }
 
     /// Temperature of the air that explains the scale error of q̄, in words.
-    pub fn air_sentence(&self) -> Option<String> {
+    pub(super) fn air_sentence(&self) -> Option<String> {
         let ratio = self.air_temperature?;
         let scale = self.estimates[Kind::Scale as usize]?;
         Some(format!(
@@ -140,7 +140,7 @@ impl InstrumentFinding {
     }
 
     /// Treatment of the channel with a fault, in words.
-    pub fn consequence(&self) -> &'static str {
+    pub(super) fn consequence(&self) -> &'static str {
         if self
             .estimates
             .iter()
@@ -155,7 +155,7 @@ impl InstrumentFinding {
     }
 
     /// Row of the table `instruments`.
-    pub fn row(&self, flight_id: &str) -> InstrumentRow {
+    pub(super) fn row(&self, flight_id: &str) -> InstrumentRow {
         let of = |kind: Kind| self.estimates[kind as usize];
         let value = |kind: Kind| of(kind).map(|e| e.value);
         let bound = |kind: Kind| of(kind).map(|e| e.bound);

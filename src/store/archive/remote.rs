@@ -132,7 +132,7 @@ fn ranges_of_pages(
     let is_needed = |at: &usize| row(*at) < rows.end && rows.start < row(at + 1);
     let mut needed = (0..pages.len()).filter(is_needed);
     let ranges = needed.next().map(|first| {
-        let last = needed.last().unwrap_or(first);
+        let last = needed.next_back().unwrap_or(first);
         [bytes.start..offset(0), offset(first)..offset(last + 1)]
     });
     ranges.into_iter().flatten()
