@@ -6,29 +6,15 @@
 
 use serde::Serialize;
 
+use super::formula_parser;
+use super::formula_parts::{MOST_OPERANDS, Node};
 use super::linear_table::LinearTable;
-use crate::units::{Conversion, Dimensions, Unit, UnitProduct, name_of};
+use crate::units::{Conversion, Unit, name_of};
+
+pub use super::formula_parts::Operand;
 
 /// Largest number of characters of a formula.
 const LONGEST: usize = 500;
-
-/// Deepest nesting of parentheses and signs.
-const DEEPEST: usize = 30;
-
-/// Largest exponent.
-const LARGEST_EXPONENT: f64 = 8.0;
-
-/// Number without a unit.
-const PURE: Dimensions = [0; 6];
-
-/// Column of a formula with its unit and the recorder's factor.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Operand {
-    pub column: String,
-    pub unit: String,
-    /// Sign and calibration of the recorder.
-    pub factor: f64,
-}
 
 /// Formula, checked for units.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -54,20 +40,6 @@ struct PlacesIn {
     table: LinearTable,
 }
 
-/// Part of a formula.
-#[derive(Clone, Debug, PartialEq)]
-enum Node {
-    Number(f64),
-    Operand(usize),
-    Negative(Box<Node>),
-    Sum(Box<Node>, Box<Node>),
-    Difference(Box<Node>, Box<Node>),
-    Product(Box<Node>, Box<Node>),
-    Quotient(Box<Node>, Box<Node>),
-    Whole(Box<Node>, i32),
-    Power(Box<Node>, f64),
-}
-
 impl Formula {
     /// Parses a formula whose result is in the unit `target`. `operand` returns the unit and factor
     /// of a column.
@@ -82,30 +54,22 @@ impl Formula {
         if text.chars().count() > LONGEST {
             return Err(format!("a formula has at most {LONGEST} characters"));
         }
-        let mut parser = Parser {
-            tokens: tokens(text)?,
-            next: 0,
-            operands: Vec::new(),
-            to_base: Vec::new(),
-            operand: &operand,
-        };
-        let (root, dimensions) = parser.sum(0)?;
-        parser.end()?;
-        if dimensions != target.dimensions() {
+        let parsed = formula_parser::parse(text, &operand)?;
+        if parsed.dimensions != target.dimensions() {
             return Err(format!(
                 "it is in {}, which is no {}",
-                name_of(dimensions),
+                name_of(parsed.dimensions),
                 target.name
             ));
         }
-        if parser.operands.is_empty() {
+        if parsed.operands.is_empty() {
             return Err("it contains no column: give the value under `constants`".to_owned());
         }
         Ok(Formula {
             text: text.to_owned(),
-            operands: parser.operands,
-            to_base: parser.to_base,
-            root,
+            operands: parsed.operands,
+            to_base: parsed.to_base,
+            root: parsed.root,
             of_base: target.of_base(),
             table: None,
         })
@@ -149,292 +113,14 @@ impl Formula {
     #[must_use]
     pub fn value(&self, columns: &[f64]) -> f64 {
         let mut base = [f64::NAN; MOST_OPERANDS];
-        for ((own, value), (operand, to_base)) in base
-            .iter_mut()
-            .zip(columns)
-            .zip(self.operands.iter().zip(&self.to_base))
-        {
-            *own = to_base.of(value * operand.factor);
+        let operands = self.operands.iter().zip(&self.to_base);
+        for ((in_base, value), (operand, to_base)) in base.iter_mut().zip(columns).zip(operands) {
+            *in_base = to_base.of(value * operand.factor);
         }
         let result = self.of_base.of(self.root.value(&base));
         let table = self.table.as_ref();
         table.map_or(result, |places| places.table.value(result))
     }
-}
-
-/// Largest number of different columns of a formula.
-const MOST_OPERANDS: usize = 16;
-
-impl Node {
-    fn value(&self, columns: &[f64]) -> f64 {
-        match self {
-            Node::Number(number) => *number,
-            Node::Operand(index) => columns.get(*index).copied().unwrap_or(f64::NAN),
-            Node::Negative(a) => -a.value(columns),
-            Node::Sum(a, b) => a.value(columns) + b.value(columns),
-            Node::Difference(a, b) => a.value(columns) - b.value(columns),
-            Node::Product(a, b) => a.value(columns) * b.value(columns),
-            Node::Quotient(a, b) => a.value(columns) / b.value(columns),
-            Node::Whole(a, exponent) => a.value(columns).powi(*exponent),
-            Node::Power(a, exponent) => a.value(columns).powf(*exponent),
-        }
-    }
-}
-
-/// Word of a formula.
-#[derive(Clone, Debug, PartialEq)]
-enum Token {
-    Number(f64),
-    /// Unit in brackets.
-    Unit(String),
-    Column(String),
-    Sign(char),
-}
-
-impl Token {
-    fn in_words(&self) -> String {
-        match self {
-            Token::Number(number) => format!("the number {number}"),
-            Token::Unit(unit) => format!("the unit [{unit}]"),
-            Token::Column(name) => format!("`{name}`"),
-            Token::Sign(sign) => format!("`{sign}`"),
-        }
-    }
-}
-
-/// Words of a text. A name with other characters than letters, digits, `_` and `.` stands in backticks.
-fn tokens(text: &str) -> Result<Vec<Token>, String> {
-    let mut tokens = Vec::new();
-    let mut rest = text.trim_start();
-    while let Some(first) = rest.chars().next() {
-        let (token, length) = match first {
-            '+' | '-' | '*' | '/' | '^' | '(' | ')' => (Token::Sign(first), 1),
-            '[' => enclosed(rest, ']').map(|(unit, n)| (Token::Unit(unit), n))?,
-            '`' => enclosed(rest, '`').map(|(name, n)| (Token::Column(name), n))?,
-            '0'..='9' | '.' => number(rest)?,
-            first if is_of_name(first) => {
-                let name: String = rest.chars().take_while(|c| is_of_name(*c)).collect();
-                let length = name.len();
-                (Token::Column(name), length)
-            }
-            other => {
-                return Err(format!(
-                    "`{other}` has no meaning; a formula has numbers, units in [ ], columns, + - * / ^ and ( )"
-                ));
-            }
-        };
-        tokens.push(token);
-        rest = rest.get(length..).unwrap_or_default().trim_start();
-    }
-    Ok(tokens)
-}
-
-fn is_of_name(c: char) -> bool {
-    c.is_alphanumeric() || c == '_' || c == '.'
-}
-
-/// Text up to the closing character, and its length with both.
-fn enclosed(rest: &str, close: char) -> Result<(String, usize), String> {
-    let inside = rest.get(1..).unwrap_or_default();
-    let end = inside
-        .find(close)
-        .ok_or_else(|| format!("`{close}` is missing"))?;
-    Ok((inside[..end].trim().to_owned(), end + 2))
-}
-
-/// Number at the beginning of a text, and its length.
-fn number(rest: &str) -> Result<(Token, usize), String> {
-    let mut length = 0;
-    let mut before = ' ';
-    for c in rest.chars() {
-        let is_exponent_sign = matches!(c, '+' | '-') && matches!(before, 'e' | 'E');
-        if !(c.is_ascii_digit() || matches!(c, '.' | 'e' | 'E') || is_exponent_sign) {
-            break;
-        }
-        length += 1;
-        before = c;
-    }
-    let number = rest[..length].parse::<f64>().ok();
-    let number = number.filter(|n| n.is_finite());
-    let number = number.ok_or_else(|| format!("`{}` is no number", &rest[..length]))?;
-    Ok((Token::Number(number), length))
-}
-
-/// Part of a formula with its dimensions.
-type Typed = (Node, Dimensions);
-
-/// Recursive-descent parser that checks units as it goes.
-struct Parser<'a, F> {
-    tokens: Vec<Token>,
-    next: usize,
-    operands: Vec<Operand>,
-    to_base: Vec<Conversion>,
-    operand: &'a F,
-}
-
-impl<F: Fn(&str) -> Result<Operand, String>> Parser<'_, F> {
-    /// Takes one of these signs, if it is next.
-    fn take(&mut self, signs: &[char]) -> Option<char> {
-        let Some(Token::Sign(sign)) = self.tokens.get(self.next) else {
-            return None;
-        };
-        let sign = *sign;
-        signs.contains(&sign).then(|| {
-            self.next += 1;
-            sign
-        })
-    }
-
-    fn end(&self) -> Result<(), String> {
-        self.tokens.get(self.next).map_or(Ok(()), |token| {
-            let what = token.in_words();
-            Err(format!("{what} stands where an operator is expected"))
-        })
-    }
-
-    fn sum(&mut self, depth: usize) -> Result<Typed, String> {
-        let (mut left, dimensions) = self.product(depth)?;
-        while let Some(sign) = self.take(&['+', '-']) {
-            let (right, own) = self.product(depth)?;
-            if own != dimensions {
-                let (a, b) = (name_of(dimensions), name_of(own));
-                return Err(format!(
-                    "a sum of {a} and {b}: both sides of `{sign}` need the same quantity"
-                ));
-            }
-            let (left_of, right) = (Box::new(left), Box::new(right));
-            left = match sign {
-                '+' => Node::Sum(left_of, right),
-                _ => Node::Difference(left_of, right),
-            };
-        }
-        Ok((left, dimensions))
-    }
-
-    fn product(&mut self, depth: usize) -> Result<Typed, String> {
-        let (mut left, mut dimensions) = self.signed(depth)?;
-        while let Some(sign) = self.take(&['*', '/']) {
-            let (right, own) = self.signed(depth)?;
-            let side = if sign == '*' { 1 } else { -1 };
-            for (sum, own) in dimensions.iter_mut().zip(own) {
-                *sum += side * own;
-            }
-            let (left_of, right) = (Box::new(left), Box::new(right));
-            left = match sign {
-                '*' => Node::Product(left_of, right),
-                _ => Node::Quotient(left_of, right),
-            };
-        }
-        Ok((left, dimensions))
-    }
-
-    fn signed(&mut self, depth: usize) -> Result<Typed, String> {
-        if depth > DEEPEST {
-            return Err(format!("it is nested more than {DEEPEST} deep"));
-        }
-        if self.take(&['-']).is_some() {
-            let (of, dimensions) = self.signed(depth + 1)?;
-            return Ok((Node::Negative(Box::new(of)), dimensions));
-        }
-        let (base, dimensions) = self.atom(depth)?;
-        if self.take(&['^']).is_none() {
-            return Ok((base, dimensions));
-        }
-        let exponent = self.exponent()?;
-        raised(base, dimensions, exponent)
-    }
-
-    fn exponent(&mut self) -> Result<f64, String> {
-        let sign = if self.take(&['-']).is_some() {
-            -1.0
-        } else {
-            1.0
-        };
-        match self.tokens.get(self.next) {
-            Some(Token::Number(number)) if *number <= LARGEST_EXPONENT => {
-                self.next += 1;
-                Ok(sign * number)
-            }
-            _ => Err(format!(
-                "behind `^` stands a number up to {LARGEST_EXPONENT}, such as 2 or 0.5"
-            )),
-        }
-    }
-
-    fn atom(&mut self, depth: usize) -> Result<Typed, String> {
-        let token = self.tokens.get(self.next).cloned();
-        self.next += 1;
-        match token {
-            Some(Token::Number(number)) => self.number(number),
-            Some(Token::Column(name)) => self.column(&name),
-            Some(Token::Sign('(')) => {
-                let inside = self.sum(depth + 1)?;
-                let closed = self.take(&[')']);
-                closed.map(|_| inside).ok_or("`)` is missing".to_owned())
-            }
-            Some(other) => Err(format!(
-                "{} stands where a column, a number or `(` is expected",
-                other.in_words()
-            )),
-            None => Err("it ends where a column, a number or `(` is expected".to_owned()),
-        }
-    }
-
-    /// Number with the unit that may follow it.
-    fn number(&mut self, number: f64) -> Result<Typed, String> {
-        let Some(Token::Unit(unit)) = self.tokens.get(self.next) else {
-            return Ok((Node::Number(number), PURE));
-        };
-        let product = UnitProduct::parse(unit)
-            .ok_or_else(|| format!("`[{unit}]` is no unit and no product of units"))?;
-        self.next += 1;
-        Ok((Node::Number(number * product.factor), product.dimensions))
-    }
-
-    fn column(&mut self, name: &str) -> Result<Typed, String> {
-        let operand = (self.operand)(name)?;
-        let unit = Unit::parse(&operand.unit).map_err(|what| format!("`{name}`: {what}"))?;
-        let known = self.operands.iter().position(|o| o.column == name);
-        let index = known.unwrap_or(self.operands.len());
-        if known.is_none() {
-            if index == MOST_OPERANDS {
-                return Err(format!("it has more than {MOST_OPERANDS} columns"));
-            }
-            self.operands.push(operand);
-            self.to_base.push(unit.to_base());
-        }
-        Ok((Node::Operand(index), unit.dimensions()))
-    }
-}
-
-/// Power of a part. The exponents of its unit must stay whole.
-fn raised(base: Node, dimensions: Dimensions, exponent: f64) -> Result<Typed, String> {
-    let mut raised = PURE;
-    for (own, before) in raised.iter_mut().zip(dimensions) {
-        let product = f64::from(before) * exponent;
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "rounded, and small: both factors are"
-        )]
-        let whole = product.round() as i32;
-        if (product - f64::from(whole)).abs() > 1e-9 {
-            let unit = name_of(dimensions);
-            return Err(format!("{unit} to the power of {exponent} is no unit"));
-        }
-        *own = whole;
-    }
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "not beyond LARGEST_EXPONENT"
-    )]
-    let whole = exponent.round() as i32;
-    let base = Box::new(base);
-    let node = if (exponent - f64::from(whole)).abs() < 1e-12 {
-        Node::Whole(base, whole)
-    } else {
-        Node::Power(base, exponent)
-    };
-    Ok((node, raised))
 }
 
 #[cfg(test)]
