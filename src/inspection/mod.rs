@@ -6,13 +6,18 @@
 //! Mach number from speed and altitude. Angular accelerations determine the signs of surfaces and
 //! controls. A finding that no equation confirms is marked as unsure.
 //!
-//! In the order of use: `recording` (the input), `words` and `vocabulary` (names), `mirror_images`, `quantity`,
-//! `clock`, `grid` (one step for all columns), `plausible` (candidates), `equations`, `signs`, `assignment`
-//! (and its cost), `rotation` and `descent` (the search), `rescaling`, `certainty`, `effects` and `inputs` (surfaces and
-//! controls), `steps` (which of them step), `findings`, and `draft` (YAML).
+//! In the order of use:
+//!
+//! - `recording` (the input), `words` and `vocabulary` (names), `mirror_images`, `quantity`, `clock`,
+//!   `grid` (one step for all columns), `plausible` (candidates);
+//! - `equations`, `signs`, `assignment` (and its cost), `rotation` and `descent` (the search),
+//!   `rescaling`, `certainty`;
+//! - `effects` and `inputs` (surfaces and controls), `steps` (which of them step);
+//! - `findings` (the result), `channels` (by name and unit), `inspect` (all of it), `draft` (YAML).
 
 mod assignment;
 mod certainty;
+mod channels;
 mod clock;
 mod descent;
 pub mod draft;
@@ -21,6 +26,7 @@ mod equations;
 mod findings;
 mod grid;
 mod inputs;
+mod inspect;
 mod mirror_images;
 mod plausible;
 mod quantity;
@@ -34,5 +40,6 @@ mod test_flight;
 mod vocabulary;
 mod words;
 
-pub use findings::{Channel, Inspection, Role, Unused, inspect};
+pub use findings::{Channel, Inspection, Role, Unused};
+pub use inspect::inspect;
 pub use recording::{Column, Recording};
