@@ -4,7 +4,9 @@
 use std::fmt::Write;
 
 use super::scale::Scale;
-use super::strips::{self, MISSING_STYLE, Sizes, Strip, StripColumn, StripDrawing};
+use super::strip::{Sizes, Strip};
+use super::strip_marks::{self, MISSING_STYLE};
+use super::strips::{StripColumn, StripDrawing};
 use super::style::{EXCLUDED_COLOUR, FAINT, INK};
 use super::svg_writer::{Alternative, PathStyle, SvgWriter, TextStyle, coordinate, rectangle};
 
@@ -179,12 +181,12 @@ fn draw_key(svg: &mut SvgWriter, key: Key, x: f64, y: f64) {
         ),
         Key::Event => svg.path(&box_outline, DASHED),
         Key::Bridged => svg.path(
-            &strips::bridged_mark((x + 10.0, x + 12.0), y + 4.0),
+            &strip_marks::bridged_mark((x + 10.0, x + 12.0), y + 4.0),
             excluded,
         ),
-        Key::Despiked => svg.path(&strips::despiked_mark(x + 11.0, y - 4.0), excluded),
+        Key::Despiked => svg.path(&strip_marks::despiked_mark(x + 11.0, y - 4.0), excluded),
         Key::Missing => svg.path(
-            &strips::missing_mark((x + 1.0, x + 19.0), y + 2.0),
+            &strip_marks::missing_mark((x + 1.0, x + 19.0), y + 2.0),
             MISSING_STYLE,
         ),
         Key::Excluded => svg.path(&rectangle((x + 8.0, y - 2.0), (4.0, 4.0)), excluded),
@@ -345,7 +347,7 @@ fn wrapped(lines: &[String], width: f64) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::strips::{FlaggedSpans, StripLine};
+    use super::super::strip::{FlaggedSpans, StripLine};
     use super::*;
 
     fn chart() -> Chart {

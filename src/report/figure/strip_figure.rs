@@ -1,7 +1,8 @@
 //! Strips of the report: one or several columns over one time axis, as a drawing within the page.
 
 use super::scale::Scale;
-use super::strips::{Sizes, Strip, StripColumn, StripDrawing};
+use super::strip::{Sizes, Strip};
+use super::strips::{StripColumn, StripDrawing};
 use super::svg_writer::{Alternative, SvgWriter};
 
 /// A drawing of strips.
@@ -82,7 +83,7 @@ pub fn draw(figure: &StripFigure) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::strips::StripLine;
+    use super::super::strip::StripLine;
     use super::*;
 
     fn figure() -> StripFigure {

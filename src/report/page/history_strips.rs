@@ -2,8 +2,8 @@
 //! as in the paper's Figures 4 and 12.
 
 use crate::report::figure::scale::{Scale, extent};
+use crate::report::figure::strip::{Strip, StripLine};
 use crate::report::figure::strip_figure::{self, StripFigure};
-use crate::report::figure::strips::{Strip, StripLine};
 use crate::report::figure::style::MEASURED_COLOUR;
 use crate::report::history::{is_marked, points, time_scale};
 use crate::report::notation::{angle, without_unit};

@@ -2,8 +2,8 @@
 
 use super::history_strips::scale_of;
 use crate::proof_of_match::Tolerance;
+use crate::report::figure::strip::{OutsideSpans, Strip, StripLine};
 use crate::report::figure::strip_figure::{self, StripFigure};
-use crate::report::figure::strips::{OutsideSpans, Strip, StripLine};
 use crate::report::figure::style::MEASURED_COLOUR;
 use crate::report::history::{points, time_scale};
 use crate::report::notation::{angle, without_unit};

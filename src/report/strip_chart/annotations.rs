@@ -2,7 +2,7 @@
 
 use crate::maneuver::Maneuver;
 use crate::report::figure::annotated_chart::{Key, Window};
-use crate::report::figure::strips::{FlaggedSpans, Strip};
+use crate::report::figure::strip::{FlaggedSpans, Strip};
 use crate::report::figure::style::{INK, MEASURED_COLOUR};
 use crate::report::notation::without_unit;
 use crate::tables::{EventRow, EventVerdict};

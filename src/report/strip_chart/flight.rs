@@ -9,7 +9,7 @@ use crate::error::Problem;
 use crate::flight::{Record, signal};
 use crate::maneuver::{Maneuver, Unknown};
 use crate::report::figure::annotated_chart::{self, Chart, LABEL_PITCH, Lane, LaneBox, Window};
-use crate::report::figure::strips::Strip;
+use crate::report::figure::strip::Strip;
 use crate::report::notation::{count, fixed, number};
 use crate::tables::EventRow;
 

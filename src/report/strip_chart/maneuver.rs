@@ -9,7 +9,7 @@ use crate::flight::Record;
 use crate::maneuver::{Class, Maneuver};
 use crate::report::figure::annotated_chart::{self, Chart, Window};
 use crate::report::figure::scale::extent;
-use crate::report::figure::strips::Strip;
+use crate::report::figure::strip::Strip;
 use crate::report::notation::{angle, fixed, number, outcome_in_words};
 use crate::tables::{FitRow, History};
 use crate::units::Unit;

@@ -6,8 +6,8 @@ use super::signal_strips::{FLAG, FLIGHT_SIGNAL, LEAST_COLUMNS, SignalStrips};
 use crate::flight::record::Series;
 use crate::flight::{Mark, Record};
 use crate::inspection::{Channel, Inspection, Role};
+use crate::report::figure::strip::Strip;
 use crate::report::figure::strip_figure::{self, StripFigure};
-use crate::report::figure::strips::Strip;
 use crate::units::Unit;
 
 /// Width of the drawing.

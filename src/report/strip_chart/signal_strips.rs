@@ -3,7 +3,7 @@
 use super::envelope::{Columns, SampledSignal, envelope, flagged_spans};
 use crate::flight::{Mark, Record};
 use crate::report::figure::scale::{Scale, extent};
-use crate::report::figure::strips::{FlaggedSpans, Strip, StripLine};
+use crate::report::figure::strip::{FlaggedSpans, Strip, StripLine};
 use crate::report::figure::style::{INK, MEASURED_COLOUR};
 use crate::report::notation::without_unit;
 use crate::tables::{History, HistoryOutput};
