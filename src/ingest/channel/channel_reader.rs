@@ -1,8 +1,9 @@
 //! One channel read from its files as a conditioned signal, piece by piece.
 
 use super::channel_plan::ChannelPlan;
+use super::channel_statistics::ChannelStatistics;
 use super::column_samples::ColumnSamples;
-use super::conditioner::{ChannelStatistics, Conditioner};
+use super::conditioner::Conditioner;
 use super::signature::SignatureSamples;
 use crate::flight::Channel;
 use crate::flight::record::Series;

@@ -1,6 +1,6 @@
 //! Refusals and reports of channels whose values cannot be used, in words.
 
-use super::conditioner::{ChannelStatistics, LARGEST};
+use super::channel_statistics::{ChannelStatistics, LARGEST};
 use crate::flight::Channel;
 use crate::ingest::clock::Clock;
 use crate::ingest::refusal::Refusal;

@@ -5,12 +5,13 @@
 //! is decided about a sample depends on its surroundings and on the character of its spell, never
 //! on the pieces.
 
-use std::collections::VecDeque;
 use std::ops::Range;
 
+use super::channel_statistics::{ChannelStatistics, LARGEST};
 use super::character::{Character, SPELL};
 use super::gaps::{Bridge, Reach, bridge_gaps};
 use super::repeats::long_runs;
+use super::spell_characters::Characters;
 use super::spikes;
 use super::unwrap::Unwrapper;
 use super::update_rate::{LONGEST_PERIOD, UpdateRate};
@@ -29,65 +30,6 @@ const MARGIN: usize = SPELL / 4;
 
 /// Samples that are unwrapped at once: they stay in the processor's cache.
 const UNWRAPPED_AT_ONCE: usize = 1 << 10;
-
-/// Largest size of a measurement in any signal's unit: ten times the largest aircraft's moment of
-/// inertia in slug ft². A larger number is no measurement.
-pub const LARGEST: f64 = 1e9;
-
-/// Number of kinds of [`Mark`].
-const MARKS: usize = 6;
-
-/// Repairs and properties of a channel over a whole stretch.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct ChannelStatistics {
-    /// Number of samples with each mark, by the mark's code.
-    pub marks: [usize; MARKS],
-    pub wraps: usize,
-    /// Finest quantisation step of all spells.
-    pub quantisation: Option<f64>,
-    /// Median of the spells' noise, in the signal's unit.
-    pub noise: Option<f64>,
-    /// Samples of the record from one recorded value to the next: the median of the spells.
-    pub period: usize,
-    /// Intervals of samples in which the channel is stuck.
-    pub stuck: Vec<(usize, usize)>,
-    /// Number of missing samples for which the recording has no number. Repeated values that count as no
-    /// measurement are not among them.
-    pub absent: usize,
-    /// Number of samples beyond [`LARGEST`], which count as missing, and the first of these
-    /// samples.
-    pub beyond: usize,
-    pub first_beyond: Option<usize>,
-}
-
-impl ChannelStatistics {
-    #[must_use]
-    pub fn count(&self, mark: Mark) -> usize {
-        self.marks[mark as usize]
-    }
-
-    /// Counts the marks of the samples from `first` on.
-    fn add(&mut self, first: usize, marks: &[Mark]) {
-        let measured = marks.iter().filter(|mark| **mark == Mark::Measured).count();
-        if measured == marks.len() {
-            self.marks[Mark::Measured as usize] += measured;
-            return;
-        }
-        for (k, mark) in marks.iter().enumerate() {
-            self.marks[*mark as usize] += 1;
-            if *mark == Mark::Stuck {
-                self.add_stuck(first + k);
-            }
-        }
-    }
-
-    fn add_stuck(&mut self, sample: usize) {
-        match self.stuck.last_mut() {
-            Some((_, end)) if *end == sample => *end = sample + 1,
-            _ => self.stuck.push((sample, sample + 1)),
-        }
-    }
-}
 
 /// Conditioning state of one channel between its pieces.
 #[derive(Clone, Debug)]
@@ -108,68 +50,6 @@ pub struct Conditioner {
     settled: usize,
     characters: Characters,
     statistics: ChannelStatistics,
-}
-
-/// Characters of the spells that samples still depend on.
-#[derive(Clone, Debug)]
-struct Characters {
-    /// Characters from spell `first_spell` on.
-    kept: VecDeque<Character>,
-    first_spell: usize,
-    latest: Character,
-    /// Noises and periods of all spells, for the statistics.
-    noises: Vec<f64>,
-    periods: Vec<usize>,
-}
-
-impl Characters {
-    fn none() -> Characters {
-        Characters {
-            kept: VecDeque::new(),
-            first_spell: 0,
-            latest: Character::UNKNOWN,
-            noises: Vec::new(),
-            periods: Vec::new(),
-        }
-    }
-
-    /// Number of the next spell to be characterised.
-    fn next_spell(&self) -> usize {
-        self.first_spell + self.kept.len()
-    }
-
-    fn push(&mut self, character: Character) {
-        if character.noise.is_finite() {
-            self.noises.push(character.noise);
-        }
-        self.periods.push(character.rate.period);
-        self.latest = character;
-        self.kept.push_back(character);
-    }
-
-    /// Character of the spell of a sample.
-    fn at(&self, sample: usize) -> &Character {
-        let spell = (sample / SPELL).saturating_sub(self.first_spell);
-        self.kept.get(spell).unwrap_or(&Character::UNKNOWN)
-    }
-
-    /// Parts of a range of samples that have one character, as offsets from `from`.
-    fn parts(&self, from: usize, length: usize) -> Vec<(Range<usize>, Character)> {
-        let to = from + length;
-        let cut = |spell: usize| (spell * SPELL).clamp(from, to) - from;
-        let spells = from / SPELL..to.div_ceil(SPELL);
-        spells
-            .map(|spell| (cut(spell)..cut(spell + 1), *self.at(spell * SPELL)))
-            .collect()
-    }
-
-    /// Drops the spells before a sample's.
-    fn drop_before(&mut self, sample: usize) {
-        while self.first_spell < sample / SPELL && !self.kept.is_empty() {
-            self.kept.pop_front();
-            self.first_spell += 1;
-        }
-    }
 }
 
 impl Conditioner {

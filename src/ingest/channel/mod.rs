@@ -3,6 +3,7 @@
 mod channel_plan;
 mod channel_reader;
 mod channel_refusals;
+mod channel_statistics;
 mod character;
 mod column_samples;
 mod conditioner;
@@ -10,6 +11,7 @@ mod gaps;
 mod quantisation;
 mod repeats;
 mod signature;
+mod spell_characters;
 mod spikes;
 mod unwrap;
 mod update_rate;
@@ -19,5 +21,5 @@ pub use channel_reader::{ChannelReader, ConditionedChannel};
 pub(in crate::ingest) use channel_refusals::{
     channel_with_gaps, empty_channel, sparse_channel, stuck_channel, values_beyond,
 };
-pub(in crate::ingest) use conditioner::ChannelStatistics;
+pub(in crate::ingest) use channel_statistics::ChannelStatistics;
 pub use signature::{Overlap, Signature};

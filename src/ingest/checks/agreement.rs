@@ -3,34 +3,19 @@
 use std::collections::BTreeSet;
 
 use super::block_means::BlockMeans;
+use super::disturbance::{Disturbance, disturbance};
 use super::gusts::Gusts;
+use super::line_fit::{LineFit, fit};
 use super::relations::{self, GustEffect, Relation, Selection};
+use super::window_selection::{find_jumps, select_excited};
 use super::windows::{WindowPair, relation_pairs};
 use crate::aircraft::Aircraft;
 use crate::ingest::settings::Checks;
-use crate::numerics::order_statistics::{SIGMA_PER_MAD, upper_median, weighted_median};
 use crate::tables::{CheckRow, CheckVerdict};
-
-/// Number of windows that are selected in a short flight, for relations that select the largest, as
-/// a multiple of the least number for a verdict. They suffice for the slope of a relation whose
-/// noise reaches its level.
-const LEAST_SELECTED: usize = 5;
-
-/// Distance of a window from the line through all windows, in robust standard deviations, above
-/// which the window contains a jump of the record: far beyond noise, gusts and turbulence.
-const JUMP_DEVIATIONS: f64 = 10.0;
-
-/// Distance of a window, in standard deviations, above which it contains the motion of a control, for a relation
-/// that only gusts excite. Normal gusts exceed it in one window of 370, which are lost for the slope.
-const MANEUVER_DEVIATIONS: f64 = 3.0;
 
 /// Least change of the gusts' velocity at which a relation that gusts excite is checked, ft/s²:
 /// that of turbulence of 1 ft/s, ten times the value that still air seems to have.
 const LEAST_GUST_FT_S2: f64 = 0.75;
-
-/// Number of standard deviations that gusts reach in one of many windows: normal gusts in one of 370, about as
-/// many as a flight has.
-const GUST_DEVIATIONS: f64 = 3.0;
 
 /// Error of a relation that biases may cause, as a share of the level above which it counts as
 /// excited. The levels of [`crate::ingest::Excitation`] are twice that error.
@@ -60,19 +45,6 @@ impl Check {
             verdict: self.verdict,
         }
     }
-}
-
-/// Least-squares line through the origin, measured over predicted.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LineFit {
-    pub slope: f64,
-    pub standard_error: f64,
-    pub correlation: f64,
-    /// Root mean square of the predicted side.
-    pub predicted_rms: f64,
-    /// Root mean square of measured minus predicted, over that of the larger side. Windows in
-    /// which the record jumps count.
-    pub misfit: f64,
 }
 
 /// Checks all relations whose signals the record has, with the gusts that disturb them.
@@ -114,43 +86,6 @@ struct RelationWindows {
     /// Numbers of the windows in which the record jumps.
     jumps: Vec<usize>,
     disturbance: Disturbance,
-}
-
-/// Disturbance of a relation by gusts, in the unit of its sides.
-#[derive(Clone, Copy, Debug, Default)]
-struct Disturbance {
-    /// Root mean square of the gusts on the measured side.
-    gust: f64,
-    /// Root mean square of the predicted side that may be the aircraft's response to gusts.
-    response: f64,
-}
-
-impl Disturbance {
-    /// Error of a slope that gusts may cause. The response correlates with the gust, at most
-    /// entirely (Cauchy and Schwarz), and no number of windows averages it out.
-    fn slope_error(self, predicted_rms: f64) -> f64 {
-        self.gust * self.response.min(predicted_rms) / (predicted_rms * predicted_rms)
-    }
-
-    /// Least correlation that a right relation has in gusts, where windows are selected by a level.
-    ///
-    /// The measured side is the predicted one, p, and the gust, g. With a mean c of −p g the correlation is
-    /// (p² − c)/(p √(p² − 2 c + g²)), which is least at c = g². Gusts that reach the level select the
-    /// windows in which they do.
-    fn least_correlation(self, predicted_rms: f64, level: f64) -> f64 {
-        let gust = if GUST_DEVIATIONS * self.gust > level {
-            self.gust.max(level)
-        } else {
-            self.gust
-        };
-        let square = predicted_rms * predicted_rms;
-        let common = gust * self.response.min(predicted_rms).min(gust);
-        if common < square {
-            (square - common) / (square * (square - 2.0 * common + gust * gust)).sqrt()
-        } else {
-            0.0
-        }
-    }
 }
 
 impl RelationWindows {
@@ -212,125 +147,6 @@ impl RelationWindows {
             jumps: self.jumps.len(),
         }
     }
-}
-
-/// Disturbance of a relation by the gusts of a flight; `pairs` are all its windows.
-///
-/// Most windows are quiet, so in them the predicted side moves as the aircraft responds to gusts.
-/// If the largest windows are selected, they may be those of the strongest gusts: all of their
-/// motion counts as response.
-fn disturbance(relation: &Relation, pairs: &[WindowPair], gusts: &Gusts) -> Disturbance {
-    let Some((_, per_ft_s2)) = relation.disturbed_by_gusts() else {
-        return Disturbance::default();
-    };
-    let response = match relation.selection {
-        Selection::Above(_) => robust_deviation(pairs.iter().map(|p| p.predicted)),
-        Selection::Largest { .. } => f64::INFINITY,
-    };
-    Disturbance {
-        gust: per_ft_s2 * gusts.largest_change_ft_s2(),
-        response,
-    }
-}
-
-/// Robust standard deviation.
-fn robust_deviation(values: impl Iterator<Item = f64> + Clone) -> f64 {
-    let middle = upper_median(values.clone()).unwrap_or_default();
-    SIGMA_PER_MAD * upper_median(values.map(|v| (v - middle).abs())).unwrap_or_default()
-}
-
-/// Selects the windows in which a relation is excited. If they are the largest of the predicted
-/// side, both sides first lose their medians: otherwise a bias would be the largest of all.
-fn select_excited(
-    relation: &Relation,
-    mut pairs: Vec<WindowPair>,
-    settings: &Checks,
-) -> Vec<WindowPair> {
-    match relation.selection {
-        Selection::Above(level) => {
-            pairs.retain(|p| p.predicted.abs().max(p.measured.abs()) > level);
-        }
-        Selection::Largest { share, .. } => {
-            let predicted = upper_median(pairs.iter().map(|p| p.predicted)).unwrap_or_default();
-            let measured = upper_median(pairs.iter().map(|p| p.measured)).unwrap_or_default();
-            for pair in &mut pairs {
-                pair.predicted -= predicted;
-                pair.measured -= measured;
-            }
-            pairs.sort_by(|a, b| b.predicted.abs().total_cmp(&a.predicted.abs()));
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "a share of the length"
-            )]
-            let count = (pairs.len() as f64 * share).ceil().max(0.0) as usize;
-            pairs.truncate(count.max(LEAST_SELECTED * settings.least_windows));
-        }
-    }
-    pairs
-}
-
-/// Finds the windows that contain a jump of the record: frames lost without a trace, or parts that
-/// were joined. A wrong channel is wrong in every window, so if too many windows are off the line
-/// none contains a jump.
-fn find_jumps(relation: &Relation, pairs: &[WindowPair], settings: &Checks) -> Vec<usize> {
-    let slope = median_slope(pairs);
-    let distance =
-        |p: &WindowPair| (p.measured - slope * p.predicted).abs() / (1.0 + slope * slope).sqrt();
-    let deviation = SIGMA_PER_MAD * upper_median(pairs.iter().map(distance)).unwrap_or_default();
-    let limit = match relation.gusts {
-        GustEffect::Excite => MANEUVER_DEVIATIONS * deviation,
-        GustEffect::Slight | GustEffect::Disturb { .. } => {
-            (JUMP_DEVIATIONS * deviation).max(relation.selection.level())
-        }
-    };
-    let jumps: Vec<usize> = pairs
-        .iter()
-        .filter(|p| distance(p) > limit)
-        .map(|p| p.window)
-        .collect();
-    let are_few = jumps.len() as f64 <= settings.jumps_share * pairs.len() as f64;
-    if slope.is_finite() && are_few {
-        jumps
-    } else {
-        Vec::new()
-    }
-}
-
-/// Median of the windows' slopes, weighted with their predicted sides. No weight exceeds the median
-/// of the predicted sides: a jump of the predicted side would otherwise decide alone.
-fn median_slope(pairs: &[WindowPair]) -> f64 {
-    let most = upper_median(pairs.iter().map(|p| p.predicted.abs())).unwrap_or_default();
-    let moved = pairs.iter().filter(|p| p.predicted != 0.0);
-    let slopes = moved.map(|p| (p.measured / p.predicted, p.predicted.abs().min(most)));
-    weighted_median(slopes.collect()).unwrap_or(f64::NAN)
-}
-
-/// Fits the windows without jumps; the misfit is that of `all` windows. `None` if a side is zero
-/// throughout.
-fn fit(pairs: &[WindowPair], all: &[WindowPair]) -> Option<LineFit> {
-    let (xx, yy) = (sum(pairs, |x, _| x * x), sum(pairs, |_, y| y * y));
-    let xy = sum(pairs, |x, y| x * y);
-    let slope = xy / xx;
-    let residual = sum(pairs, |x, y| (y - slope * x).powi(2));
-    let (all_xx, all_yy) = (sum(all, |x, _| x * x), sum(all, |_, y| y * y));
-    let difference = sum(all, |x, y| (y - x).powi(2));
-    let fit = LineFit {
-        slope,
-        standard_error: (residual / (pairs.len() - 1) as f64 / xx).sqrt(),
-        correlation: xy / (xx * yy).sqrt(),
-        predicted_rms: (xx / pairs.len() as f64).sqrt(),
-        misfit: (difference / all_xx.max(all_yy)).sqrt(),
-    };
-    [fit.slope, fit.standard_error, fit.correlation, fit.misfit]
-        .iter()
-        .all(|v| v.is_finite())
-        .then_some(fit)
-}
-
-/// Sum over windows of a term of the predicted and the measured side.
-fn sum(pairs: &[WindowPair], term: impl Fn(f64, f64) -> f64) -> f64 {
-    pairs.iter().map(|p| term(p.predicted, p.measured)).sum()
 }
 
 /// Verdict on a fit. The relation fails if the slope is wrong by several standard errors, and by

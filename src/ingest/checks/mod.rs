@@ -3,13 +3,16 @@
 mod agreement;
 mod block_means;
 mod block_motion;
+mod disturbance;
 mod engine;
 mod fault_isolation;
 mod gusts;
+mod line_fit;
 mod mass_properties;
 mod relations;
 mod thermometer;
 mod time_scale;
+mod window_selection;
 mod windows;
 
 pub(in crate::ingest) use agreement::{Check, check_relations, confirmed_signals};

@@ -4,6 +4,7 @@ mod duplicates;
 mod merge;
 mod pieces;
 mod sample_clock;
+mod stream;
 mod survey;
 mod time_channels;
 

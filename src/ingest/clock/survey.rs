@@ -6,13 +6,13 @@
 //! stream with the most values per second is the main stream and gives the record its clock. The
 //! channels of the other streams are interpolated to that clock.
 
-use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::duplicates::are_same_rows;
 use super::merge::{MergedPieces, PiecePart, PieceSequence, merge_pieces};
 use super::pieces::{Piece, PieceScanner, ScannedFile, UnusableRows};
 use super::sample_clock::{Clock, ClockBuilder};
+use super::stream::Stream;
 use super::time_channels::TimeChannels;
 use crate::error::Problem;
 use crate::flight::{Channel, signal::TIME};
@@ -81,70 +81,12 @@ pub fn survey(
         .map_err(|refusal| refusal.into_problem(source.flight_id()))
 }
 
+/// Survey of a flight in the making.
 struct Surveyor<'a, S: ColumnSource + ?Sized> {
     times: TimeChannels<'a, S>,
     channels: &'a BTreeMap<String, Channel>,
     settings: &'a Settings,
     problems: Vec<Problem>,
-}
-
-/// Files that hold the same channels.
-struct Stream {
-    columns: BTreeSet<String>,
-    files: Vec<ScannedFile>,
-    merged: MergedPieces,
-}
-
-impl Stream {
-    /// `true` if a file holds at least half of the stream's columns, or the stream at least half of
-    /// the file's.
-    fn shares_half(&self, columns: &BTreeSet<String>) -> bool {
-        let common = self.columns.intersection(columns).count();
-        2 * common >= self.columns.len().min(columns.len())
-    }
-
-    fn step_s(&self) -> f64 {
-        self.files.first().map_or(f64::INFINITY, |f| f.step_s)
-    }
-
-    /// Order of streams: the most values per second first, then the most channels. The clock of a
-    /// few fast rates thus precedes that of many slow engine channels.
-    fn by_size(a: &Stream, b: &Stream) -> Ordering {
-        let values_per_s = b.values_per_s().total_cmp(&a.values_per_s());
-        values_per_s.then(b.columns.len().cmp(&a.columns.len()))
-    }
-
-    fn values_per_s(&self) -> f64 {
-        let per_s = self.columns.len() as f64 / self.step_s();
-        if per_s.is_finite() { per_s } else { 0.0 }
-    }
-
-    fn rows(&self) -> usize {
-        self.files.iter().map(|f| f.rows).sum()
-    }
-
-    /// Rows whose time is no number or fits nowhere.
-    fn unreadable(&self) -> UnusableRows {
-        let mut unreadable = UnusableRows::default();
-        for file in &self.files {
-            unreadable.merge(&file.unreadable);
-        }
-        for piece in &self.merged.strays {
-            for row in piece.row..piece.row + piece.rows {
-                unreadable.add(piece.file, row);
-            }
-        }
-        unreadable
-    }
-
-    /// Rows whose time is that of the row before.
-    fn repeated(&self) -> UnusableRows {
-        let mut repeated = UnusableRows::default();
-        for file in &self.files {
-            repeated.merge(&file.repeated);
-        }
-        repeated
-    }
 }
 
 impl<S: ColumnSource + ?Sized> Surveyor<'_, S> {

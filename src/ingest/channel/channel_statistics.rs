@@ -1,0 +1,63 @@
+//! Repairs and properties of a channel over a whole stretch.
+
+use crate::flight::Mark;
+
+/// Largest size of a measurement in any signal's unit: ten times the largest aircraft's moment of
+/// inertia in slug ft². A larger number is no measurement.
+pub const LARGEST: f64 = 1e9;
+
+/// Number of kinds of [`Mark`].
+const MARKS: usize = 6;
+
+/// Repairs and properties of a channel over a whole stretch.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ChannelStatistics {
+    /// Number of samples with each mark, by the mark's code.
+    pub marks: [usize; MARKS],
+    pub wraps: usize,
+    /// Finest quantisation step of all spells.
+    pub quantisation: Option<f64>,
+    /// Median of the spells' noise, in the signal's unit.
+    pub noise: Option<f64>,
+    /// Samples of the record from one recorded value to the next: the median of the spells.
+    pub period: usize,
+    /// Intervals of samples in which the channel is stuck.
+    pub stuck: Vec<(usize, usize)>,
+    /// Number of missing samples for which the recording has no number. Repeated values that count as no
+    /// measurement are not among them.
+    pub absent: usize,
+    /// Number of samples beyond [`LARGEST`], which count as missing, and the first of these
+    /// samples.
+    pub beyond: usize,
+    pub first_beyond: Option<usize>,
+}
+
+impl ChannelStatistics {
+    /// Number of samples with a mark.
+    #[must_use]
+    pub fn count(&self, mark: Mark) -> usize {
+        self.marks[mark as usize]
+    }
+
+    /// Counts the marks of the samples from `first` on.
+    pub fn add(&mut self, first: usize, marks: &[Mark]) {
+        let measured = marks.iter().filter(|mark| **mark == Mark::Measured).count();
+        if measured == marks.len() {
+            self.marks[Mark::Measured as usize] += measured;
+            return;
+        }
+        for (k, mark) in marks.iter().enumerate() {
+            self.marks[*mark as usize] += 1;
+            if *mark == Mark::Stuck {
+                self.add_stuck(first + k);
+            }
+        }
+    }
+
+    fn add_stuck(&mut self, sample: usize) {
+        match self.stuck.last_mut() {
+            Some((_, end)) if *end == sample => *end = sample + 1,
+            _ => self.stuck.push((sample, sample + 1)),
+        }
+    }
+}
