@@ -46,16 +46,14 @@ impl<'a> ConditionedStretch<'a> {
         let (mut channels, mut problems, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
         let mut block_means = BTreeMap::new();
         let mut signature_samples = Vec::new();
-        let mut unread = unread_channels(&conditioned, clock, context).into_iter();
-        for one in conditioned {
+        let unread = unread_channels(&conditioned, clock, context);
+        for (one, unread) in conditioned.into_iter().zip(unread) {
             let (name, channel, statistics) = (one.name, one.channel, one.statistics);
-            if let Some(channel) = unread.next().flatten() {
-                left_out.push(channel);
+            if let Some(unread) = unread {
+                left_out.push(unread);
             } else {
-                let stuck = stuck_channel(name, &statistics, clock);
-                let beyond = values_beyond(name, channel, &statistics, clock);
-                let named = stuck.into_iter().chain(beyond);
-                problems.extend(named.map(|refusal| refusal.into_problem(flight_id)));
+                let repairs = reported_repairs(name, channel, &statistics, clock);
+                problems.extend(repairs.map(|refusal| refusal.into_problem(flight_id)));
                 block_means.extend(one.block_means.map(|means| (channel.signal.clone(), means)));
                 // The turns of an unwrapped angle depend on where the record begins.
                 if statistics.wraps == 0 && channel.wraps_at.is_none() {
@@ -91,6 +89,18 @@ impl<'a> ConditionedStretch<'a> {
             signature: Signature::of(signature_samples.into_iter()),
         })
     }
+}
+
+/// Reports of stuck values and of values beyond any measurement.
+fn reported_repairs(
+    name: &str,
+    channel: &Channel,
+    statistics: &ChannelStatistics,
+    clock: &Clock,
+) -> impl Iterator<Item = Refusal> + use<> {
+    let stuck = stuck_channel(name, statistics, clock);
+    let beyond = values_beyond(name, channel, statistics, clock);
+    stuck.into_iter().chain(beyond)
 }
 
 /// For each channel, the reason to leave it out before any check, if there is one: it has no value, or

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::assignment::{Assignment, HOLDS, Search, with};
-use super::descent::Found;
+use super::descent::SearchResult;
 use super::equations::Equation;
 use super::quantity::Quantity;
 use super::rescaling::rescalings;
@@ -37,7 +37,7 @@ pub struct Verdict {
 
 /// Certainty of each quantity that has a column.
 #[must_use]
-pub fn verdicts(search: &Search, found: &Found) -> BTreeMap<Quantity, Verdict> {
+pub fn verdicts(search: &Search, found: &SearchResult) -> BTreeMap<Quantity, Verdict> {
     let assignment = &found.assignment;
     let examination = Examination {
         search,
@@ -302,7 +302,7 @@ mod tests {
             grid: &grid,
             candidates: &candidates,
         };
-        let found = Found {
+        let found = SearchResult {
             assignment: assigned(columns),
             proposed: BTreeSet::new(),
         };

@@ -37,7 +37,7 @@ const ROUNDS: usize = 60;
 
 /// Result of a search.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Found {
+pub struct SearchResult {
     pub assignment: Assignment,
     /// Quantities with the best of several columns without telling names that fit nearly as well.
     pub proposed: BTreeSet<Quantity>,
@@ -48,14 +48,14 @@ impl Search<'_> {
     /// angles or rates in the other unit. Columns without a telling name are added afterwards, if
     /// only one of them fits.
     #[must_use]
-    pub fn best(&self) -> Found {
+    pub fn best(&self) -> SearchResult {
         let mut assignment = self.best_start();
         self.descend(&mut assignment, true);
         let proposed = self.seed_rotation(&mut assignment);
         loop {
             self.descend(&mut assignment, true);
             if !self.complete(&mut assignment) {
-                return Found {
+                return SearchResult {
                     assignment,
                     proposed,
                 };
@@ -329,7 +329,7 @@ mod tests {
     type Motion = (&'static str, fn(f64) -> f64);
 
     /// Result of a search over one recording.
-    fn search(recording: &Recording) -> Found {
+    fn search(recording: &Recording) -> SearchResult {
         let (grid, candidates) = searched(recording);
         let search = Search {
             grid: &grid,
@@ -378,7 +378,7 @@ mod tests {
     }
 
     /// Columns that a search gives to quantities, from a flight with columns of opaque names.
-    fn found(columns: &[(&'static str, Quantity, &'static str)]) -> Found {
+    fn found(columns: &[(&'static str, Quantity, &'static str)]) -> SearchResult {
         search(&TestFlight::default().recording(columns))
     }
 

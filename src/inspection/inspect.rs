@@ -9,7 +9,7 @@ use super::channels::{
     time_channel, unless_shared, unless_unknown_unit,
 };
 use super::clock::find_clock;
-use super::descent::Found;
+use super::descent::SearchResult;
 use super::findings::{Channel, Inspection, Role, Unused};
 use super::grid::Grid;
 use super::inputs::{InputColumn, inputs, kind_of, rate};
@@ -67,35 +67,33 @@ fn inspect_columns(recordings: &[Recording]) -> Result<Inspection, String> {
         grid,
         candidates: &candidates,
     };
-    let found = search(&coarse).best();
-    let assignment = &found.assignment;
-    let mut found_channels = ChannelSearch {
+    let result = search(&coarse).best();
+    let assignment = &result.assignment;
+    let mut channels = FoundChannels {
         facts: &facts,
         channels: vec![time_channel(&clock, &facts)],
     };
-    found_channels.add_motion(&search(&fine), &found);
+    channels.add_motion(&search(&fine), &result);
     let inputs = inputs((&fine, &grid), assignment, &facts);
-    found_channels.add_inputs(&inputs, &grid);
-    found_channels.add_constants();
-    found_channels.doubt_inertias();
-    found_channels.add_flags(recordings);
-    let unused = found_channels.unused(&candidates, assignment);
-    let channels = found_channels.channels;
+    channels.add_inputs(&inputs, &grid);
+    channels.add_constants();
+    channels.mark_unsure_inertias();
+    channels.add_flags(recordings);
     Ok(Inspection {
-        channels,
-        unused,
+        unused: channels.unused(&candidates, assignment),
+        channels: channels.channels,
         grid,
         step_s: clock.step_s,
     })
 }
 
 /// Channels found so far.
-struct ChannelSearch<'a> {
+struct FoundChannels<'a> {
     facts: &'a [ColumnFacts],
     channels: Vec<Channel>,
 }
 
-impl ChannelSearch<'_> {
+impl FoundChannels<'_> {
     fn is_free(&self, facts: &ColumnFacts) -> bool {
         !self
             .channels
@@ -103,9 +101,10 @@ impl ChannelSearch<'_> {
             .any(|channel| channel.column == facts.name)
     }
 
-    fn add_motion(&mut self, search: &Search, found: &Found) {
-        let mut verdicts = verdicts(search, found);
-        for (quantity, choice) in &found.assignment {
+    /// Adds the channels of the motion from the result of the search.
+    fn add_motion(&mut self, search: &Search, result: &SearchResult) {
+        let mut verdicts = verdicts(search, result);
+        for (quantity, choice) in &result.assignment {
             let Some(facts) = self.facts.iter().find(|c| c.name == choice.column) else {
                 continue;
             };
@@ -127,6 +126,7 @@ impl ChannelSearch<'_> {
         }
     }
 
+    /// Adds surfaces and pilot controls.
     fn add_inputs(&mut self, inputs: &[InputColumn], grid: &Grid) {
         let free = inputs.iter().filter_map(|input| {
             let own = self.facts.iter().find(|c| c.name == input.column);
@@ -197,7 +197,7 @@ impl ChannelSearch<'_> {
             .unwrap_or_default()
     }
 
-    /// Signals that names and units alone give.
+    /// Adds signals that names and units alone give.
     fn add_constants(&mut self) {
         let others = signal::REQUIRED
             .iter()
@@ -236,7 +236,7 @@ impl ChannelSearch<'_> {
 
     /// Marks the moments of inertia as unsure unless that about z is the largest, as in every
     /// aircraft: recorders differ in the order of the axes.
-    fn doubt_inertias(&mut self) {
+    fn mark_unsure_inertias(&mut self) {
         let largest = |signal: &str| {
             let own = self.channels.iter().find(|c| c.signal == signal)?;
             let unit = Unit::parse(&own.unit).ok()?;
@@ -244,31 +244,27 @@ impl ChannelSearch<'_> {
         };
         let [x, y, z] = [signal::IX, signal::IY, signal::IZ].map(largest);
         let is_largest = z.is_none_or(|z| [x, y].into_iter().flatten().all(|other| other < z));
+        if is_largest {
+            return;
+        }
         let of_inertia =
             |c: &&mut Channel| [signal::IX, signal::IY, signal::IZ].contains(&&*c.signal);
-        for channel in self
-            .channels
-            .iter_mut()
-            .filter(of_inertia)
-            .filter(|_| !is_largest)
-        {
+        for channel in self.channels.iter_mut().filter(of_inertia) {
             channel.is_sure = false;
             channel.evidence +=
                 "; but the largest moment of inertia of an aircraft is that about z";
         }
     }
 
+    /// Adds columns with no values but zero and one.
     fn add_flags(&mut self, recordings: &[Recording]) {
         for facts in self.facts {
             let values = || {
-                recordings
-                    .iter()
-                    .filter_map(|r| r.column(&facts.name))
-                    .flat_map(|c| &c.values)
+                let columns = recordings.iter().filter_map(|r| r.column(&facts.name));
+                columns.flat_map(|column| &column.values)
             };
-            let is_number = facts
-                .unit
-                .is_none_or(|u| u.quantity == units::Quantity::Number);
+            let unit = facts.unit;
+            let is_number = unit.is_none_or(|u| u.quantity == units::Quantity::Number);
             #[expect(clippy::float_cmp, reason = "flags are exactly 0 or 1")]
             let is_flag = values().all(|v| v.is_nan() || *v == 0.0 || *v == 1.0)
                 && [0.0, 1.0].iter().all(|level| values().any(|v| v == level));

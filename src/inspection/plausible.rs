@@ -84,7 +84,7 @@ fn is_switch(values: impl Iterator<Item = f64>) -> bool {
 }
 
 /// Unit that a name ends with, unless the rest of the name means quantities that have other units: the `m` of `alpha_m`
-/// says that it is measured.
+/// means measured.
 fn spelled_unit(spelling: &Spelling) -> Option<Unit> {
     let unit = spelling.unit?;
     let meanings = meanings(spelling);

@@ -30,8 +30,8 @@ struct EquationCosts {
     costs: Vec<f64>,
 }
 
-/// For each quantity, the smallest set of quantities, this one included, that fits nearly as well in other
-/// units: its cost grows by less than `least_growth` against the best fit that leaves the quantity's unit.
+/// For each quantity, the smallest set of quantities with this one that fits nearly as well in other units.
+/// The cost of such a set grows by less than `least_growth` against the best fit with the quantity's unit.
 #[must_use]
 pub fn rescalings(
     search: &Search,

@@ -86,29 +86,27 @@ impl CoefficientPosterior {
                 let Some(shares) = local_shares(term, condition, is_mach_slope) else {
                     continue;
                 };
+                let kind = match term.slope {
+                    Some(_) => LocalKind::Sum,
+                    None => LocalKind::Derivative,
+                };
                 values.push(LocalValue {
                     coefficient,
                     derivative: term.derivative.clone(),
-                    kind: if term.slope.is_some() {
-                        LocalKind::Sum
-                    } else {
-                        LocalKind::Derivative
-                    },
+                    kind,
                     is_mach_slope,
                 });
-                let known = shares.iter().map(|(node, w)| w * term.prior.mean[*node]);
-                tunnel.push(known.sum::<f64>());
+                let at_nodes = shares.iter().map(|(node, w)| w * term.prior.mean[*node]);
+                tunnel.push(at_nodes.sum::<f64>());
                 let of_unknowns = shares.iter().map(|(node, w)| (start + node, *w));
                 rows.push(of_unknowns.collect());
             }
         }
         let Gaussian { mean, covariance } = &self.gaussian;
-        let both = tunnel.iter().zip(&rows);
+        let with_rows = tunnel.iter().zip(&rows);
+        let means = with_rows.map(|(tunnel, row)| tunnel + weighted_sum(row, mean));
         LocalPosterior {
-            mean: DVector::from_iterator(
-                rows.len(),
-                both.map(|(t, row)| t + weighted_sum(row, mean)),
-            ),
+            mean: DVector::from_iterator(rows.len(), means),
             covariance: DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
                 covariance_between(&rows[i], &rows[j], covariance)
             }),

@@ -121,7 +121,7 @@ impl CoefficientPosterior {
         let covariance = self.covariance(&data, evidence.len())?;
         let unknowns = &data.unknowns;
         let mut rows: Vec<SparseRow> = vec![];
-        let mut own = Vec::with_capacity(observed.len());
+        let mut planned_rows = Vec::with_capacity(observed.len());
         for observation in &observed {
             let placed = observation.as_ref().map(|(class, observation)| {
                 let first = rows.len();
@@ -131,24 +131,25 @@ impl CoefficientPosterior {
                     noise: self.noise(observation),
                 }
             });
-            own.push(placed);
+            planned_rows.push(placed);
         }
         let of_planned = rows.len();
-        let asked = points.iter().enumerate();
-        let asked: Vec<(usize, SparseRow)> = asked
-            .filter_map(|(i, point)| Some((i, self.row(point, unknowns)?)))
-            .collect();
-        rows.extend(asked.iter().map(|(_, row)| row.clone()));
+        let mut point_rows = Vec::new();
+        for (i, point) in points.iter().enumerate() {
+            if let Some(row) = self.row(point, unknowns) {
+                point_rows.push((i, rows.len()));
+                rows.push(row);
+            }
+        }
         let mut joint = DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
             covariance_between(&rows[i], &rows[j], &covariance)
         });
         let mut calibrated = joint.view_mut((0, 0), (of_planned, of_planned));
-        calibrated += calibration(&observed, &own, of_planned);
-        let of_points = asked.iter().enumerate();
+        calibrated += calibration(&observed, &planned_rows, of_planned);
         Some(Outlook {
             covariance: joint,
-            planned: own,
-            points: of_points.map(|(k, (i, _))| (*i, of_planned + k)).collect(),
+            planned: planned_rows,
+            points: point_rows,
         })
     }
 

@@ -4,7 +4,7 @@
 //! The systematic error of a class is, for each derivative that it estimates, a function of α in
 //! units of the bounds of a maneuver. Its variance is ω², and its correlation fades over 10°.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, DVector};
 
@@ -58,31 +58,27 @@ impl Unknowns {
             count - length
         };
         let starts = terms.iter().map(|t| next(t.prior.grid.len())).collect();
+        let differences = next(0);
         let mut ranges: BTreeMap<(usize, usize), (f64, f64)> = BTreeMap::new();
-        let mut campaign = BTreeMap::new();
+        let mut shared = BTreeSet::new();
         for (class, observation) in observations {
             let alpha = observation.condition.alpha_deg;
             for term in &observation.terms {
                 let range = ranges.entry((*class, *term)).or_insert((alpha, alpha));
                 *range = (range.0.min(alpha), range.1.max(alpha));
             }
-            let shared = observation.calibration.iter().map(|(error, _)| error);
-            for error in shared.filter(|e| is_of_campaign(e)) {
-                campaign.insert(error.clone(), 0);
-            }
+            let errors = observation.calibration.iter().map(|(error, _)| error);
+            shared.extend(errors.filter(|e| is_of_campaign(e)).cloned());
         }
-        let differences = next(0);
-        let classes = ranges
-            .into_iter()
-            .map(|(key, range)| {
-                let grid = class_grid(range);
-                let start = next(grid.len());
-                (key, ClassError { start, grid })
-            })
-            .collect();
-        for place in campaign.values_mut() {
-            *place = next(1);
-        }
+        let mut class_error_of = |range| {
+            let grid = class_grid(range);
+            let start = next(grid.len());
+            ClassError { start, grid }
+        };
+        let classes = ranges.into_iter();
+        let classes = classes.map(|(key, range)| (key, class_error_of(range)));
+        let classes = classes.collect();
+        let campaign = shared.into_iter().map(|error| (error, next(1))).collect();
         Unknowns {
             starts,
             differences,

@@ -61,14 +61,11 @@ fn publish_segment(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
 /// Publishes the rows of the maneuvers, then the rows of joint estimates.
 fn publish_estimate(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
     let joined = || campaign.joined.iter().map(|j| &j.estimated);
-    let joint_fits = joined().map(|e| &e.fit);
-    let fits: Vec<FitRow> = campaign.fits.iter().chain(joint_fits).cloned().collect();
+    let fits: Vec<FitRow> = followed_by(&campaign.fits, joined().map(|e| &e.fit));
     let joint_estimates = joined().flat_map(|e| &e.estimates);
-    let estimates = campaign.estimates.iter().chain(joint_estimates);
-    let estimates: Vec<EstimateRow> = estimates.cloned().collect();
+    let estimates: Vec<EstimateRow> = followed_by(&campaign.estimates, joint_estimates);
     let joint_sums = joined().flat_map(|e| &e.combined);
-    let sums = campaign.combined.iter().chain(joint_sums);
-    let sums: Vec<EstimateRow> = sums.cloned().collect();
+    let sums: Vec<EstimateRow> = followed_by(&campaign.combined, joint_sums);
     let predicted = campaign.predicted.iter().map(|p| p.summary.clone());
     let predicted: Vec<PredictedRow> = predicted.collect();
     let members = campaign.joined.iter().flat_map(|j| &j.members);
@@ -81,6 +78,13 @@ fn publish_estimate(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
     table::publish_as(shelf, "combined", &sums)?;
     table::publish(shelf, &members)?;
     table::publish(shelf, &campaign.predictions())
+}
+
+/// Rows followed by others.
+fn followed_by<'a, T: Clone + 'a>(rows: &[T], others: impl Iterator<Item = &'a T>) -> Vec<T> {
+    let mut all = rows.to_vec();
+    all.extend(others.cloned());
+    all
 }
 
 fn publish_trend(shelf: &Shelf, campaign: &Campaign) -> Result<()> {

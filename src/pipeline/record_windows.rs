@@ -91,21 +91,24 @@ fn find_in_window(
         samples.start.saturating_sub(beyond)..samples.end + beyond,
     )?;
     let time_s = |sample: usize| header.start_s + sample as f64 * header.step_s;
-    let (first, last) = (samples.start == 0, samples.end >= header.samples);
-    let own = |t: f64| (first || t >= time_s(samples.start)) && (last || t < time_s(samples.end));
+    let (is_first, is_last) = (samples.start == 0, samples.end >= header.samples);
+    let (start_s, end_s) = (time_s(samples.start), time_s(samples.end));
+    let begins_here = |t: f64| (is_first || t >= start_s) && (is_last || t < end_s);
     let mut found = segment::maneuvers(&record, &config.classes, &config.aircraft, &config.segment);
-    found.maneuvers.retain(|m| own(m.start_s));
-    found.unknown.retain(|u| own(u.start_s));
-    found.problems.retain(|p| stated_time_s(p).is_none_or(own));
-    let events: Vec<Event> = events.iter().filter(|e| own(e.start_s)).cloned().collect();
-    let limits = &config.segment.quality;
+    found.maneuvers.retain(|m| begins_here(m.start_s));
+    found.unknown.retain(|u| begins_here(u.start_s));
+    found
+        .problems
+        .retain(|p| stated_time_s(p).is_none_or(begins_here));
+    let mut events = events.to_vec();
+    events.retain(|event| begins_here(event.start_s));
     let (found, events) = segment::with_events(
         found,
         &record,
         &events,
         &config.classes,
         &config.aircraft,
-        limits,
+        &config.segment.quality,
     );
     let Segmented {
         maneuvers,
@@ -125,6 +128,7 @@ fn surroundings(header: &RecordHeader) -> usize {
     samples(SURROUNDINGS_S, header.step_s)
 }
 
+/// Number of samples that contain a time, at least one.
 fn samples(time_s: f64, step_s: f64) -> usize {
     #[expect(
         clippy::cast_possible_truncation,

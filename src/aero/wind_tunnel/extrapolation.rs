@@ -38,13 +38,11 @@ impl WindTunnel {
     ) -> Vec<ExtrapolatedReading> {
         let table = self.table(derivative);
         let third = self.third_at(condition);
-        let mut beyond = Vec::new();
-        let mut note = |variable: &str, read_at: f64, (from, to): (f64, f64)| {
-            let known = beyond
-                .iter()
-                .any(|b: &ExtrapolatedReading| b.variable == variable);
-            if !known && !(from..=to).contains(&read_at) {
-                beyond.push(ExtrapolatedReading {
+        let mut extrapolated: Vec<ExtrapolatedReading> = Vec::new();
+        let mut compare = |variable: &str, read_at: f64, (from, to): (f64, f64)| {
+            let is_listed = extrapolated.iter().any(|one| one.variable == variable);
+            if !is_listed && !(from..=to).contains(&read_at) {
+                extrapolated.push(ExtrapolatedReading {
                     variable: variable.to_owned(),
                     read_at,
                     from,
@@ -53,25 +51,22 @@ impl WindTunnel {
             }
         };
         let thirds = breakpoints(table, |e| e.third);
-        if let (Some(range), Some(name)) = (
-            ends(&thirds),
-            self.settings.third.as_ref().map(|t| t.name.as_str()),
-        ) {
-            note(name, third, range);
+        if let (Some(range), Some(variable)) = (ends(&thirds), &self.settings.third) {
+            compare(&variable.name, third, range);
         }
         let blocks: Vec<&[Entry]> = table.chunk_by(|a, b| a.third == b.third).collect();
         for block in either_side(&blocks, |b| b[0].third.unwrap_or(0.0), third) {
             if let Some(range) = ends(&breakpoints(block, |e| e.point.mach)) {
-                note("mach", condition.mach, range);
+                compare("mach", condition.mach, range);
             }
             let rows = rows_of_mach(block);
             for row in either_side(&rows, |r| r[0].point.mach.unwrap_or(0.0), condition.mach) {
                 if let Some(range) = ends(&breakpoints(row, |e| Some(e.point.alpha_deg))) {
-                    note("alpha_deg", condition.alpha_deg, range);
+                    compare("alpha_deg", condition.alpha_deg, range);
                 }
             }
         }
-        beyond
+        extrapolated
     }
 }
 

@@ -100,6 +100,7 @@ pub fn fit(
     let mut bounds = state.bounds(windows)?;
     let doubtful = doubtful(&state, &posterior.values, &bounds.total);
     if !doubtful.is_empty() {
+        // Doubtful errors get the prior of healthy instruments.
         for j in doubtful {
             state.prior[j] = settings.ordinary.of_parameter(j);
         }

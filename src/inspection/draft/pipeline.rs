@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::contents::{Draft, scalar};
-use crate::inspection::findings::Role;
+use crate::inspection::findings::{Channel, Role};
 
 /// Words by which the flag of an on-board excitation system is known.
 const EXCITATION: [&str; 6] = ["obes", "excitation", "excit", "fti", "pti", "inject"];
@@ -33,6 +33,24 @@ trend:
     )
 }
 
+/// Line of the flag of an on-board excitation system.
+fn excitation_flag(draft: &Draft) -> String {
+    let is_flag = |c: &&Channel| c.role == Role::Flag;
+    let flags = draft.inspection.channels.iter().filter(is_flag);
+    let flag = flags
+        .map(|c| c.signal.as_str())
+        .find(|signal| EXCITATION.iter().any(|word| signal.contains(word)));
+    match flag {
+        Some(flag) => format!(
+            "  excitation_flag: {flag} # up while the on-board system moves the surfaces: is it this one?\n"
+        ),
+        None => {
+            "  # excitation_flag: … # flag that is up while an on-board system moves the surfaces\n"
+                .to_owned()
+        }
+    }
+}
+
 /// Search for maneuvers: flag, pilot controls, sizes of steps.
 fn segment(draft: &Draft) -> String {
     let mut text = "\
@@ -42,25 +60,7 @@ fn segment(draft: &Draft) -> String {
 segment:
 "
     .to_owned();
-    let flags = draft
-        .inspection
-        .channels
-        .iter()
-        .filter(|c| c.role == Role::Flag);
-    let flag = flags
-        .map(|c| c.signal.as_str())
-        .find(|signal| EXCITATION.iter().any(|word| signal.contains(word)));
-    match flag {
-        Some(flag) => {
-            let _ = writeln!(
-                text,
-                "  excitation_flag: {flag} # up while the on-board system moves the surfaces: is it this one?"
-            );
-        }
-        None => {
-            text += "  # excitation_flag: … # flag that is up while an on-board system moves the surfaces\n";
-        }
-    }
+    text += &excitation_flag(draft);
     let steps: Vec<_> = draft
         .inputs()
         .filter_map(|(c, i)| Some((c, i, c.step?)))

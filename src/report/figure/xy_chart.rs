@@ -23,6 +23,18 @@ pub struct ChartPoint {
     pub outline: Vec<(f64, f64)>,
 }
 
+impl ChartPoint {
+    /// A point without an outline.
+    #[must_use]
+    pub fn new(at: (f64, f64), label: String) -> ChartPoint {
+        ChartPoint {
+            at,
+            label,
+            outline: vec![],
+        }
+    }
+}
+
 /// Box of a level; an open side reaches the frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LevelBox {

@@ -143,15 +143,11 @@ impl<'a> DerivativeRows<'a, '_> {
         failed_fits: &BTreeSet<&str>,
         axes: &BTreeMap<&str, Axis>,
     ) -> DerivativeResults<'a> {
-        let estimated: Vec<&EstimateRow> = self
-            .estimates
-            .iter()
-            .copied()
-            .filter(|e| e.status == Status::Estimated && e.value.is_some())
-            .collect();
-        let (unconverged, sound): (Vec<&EstimateRow>, Vec<&EstimateRow>) = estimated
-            .iter()
-            .partition(|e| failed_fits.contains(e.maneuver_id.as_str()));
+        let mut estimated = self.estimates.to_vec();
+        estimated.retain(|e| e.status == Status::Estimated && e.value.is_some());
+        let is_unconverged = |e: &&&EstimateRow| failed_fits.contains(e.maneuver_id.as_str());
+        let (unconverged, sound): (Vec<&EstimateRow>, Vec<&EstimateRow>) =
+            estimated.iter().partition(is_unconverged);
         let points: Vec<EstimatePoint> = sound.iter().filter_map(|e| point(e)).collect();
         let coefficient = coefficient_of(name);
         let axis_of_class = || {
@@ -159,11 +155,8 @@ impl<'a> DerivativeRows<'a, '_> {
             axes.get(first.class.as_str()).copied()
         };
         let group = self.group();
-        let trend = self
-            .trends
-            .iter()
-            .copied()
-            .filter(|t| Some(t.group.as_str()) == group);
+        let trends = self.trends.iter().copied();
+        let trend = trends.filter(|row| Some(row.group.as_str()) == group);
         DerivativeResults {
             name,
             unit: self.unit(),

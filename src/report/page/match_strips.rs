@@ -79,19 +79,8 @@ fn strip(history: &History, output: &HistoryOutput, rows: &[&MatchRow]) -> Optio
             (*time_s, value - width, value + width)
         })
         .collect();
-    // A simulation that departed has no value: it is outside.
-    let excess: Vec<f64> = output
-        .measured
-        .iter()
-        .zip(&output.computed)
-        .map(|(measured, computed)| match (computed - measured).abs() {
-            distance if distance.is_finite() => distance - tolerance.width(*measured),
-            _ if measured.is_finite() => f64::MAX,
-            _ => f64::NAN,
-        })
-        .collect();
     let outside = OutsideSpans {
-        spans: spans_outside(&points(history, &excess)),
+        spans: spans_outside(&points(history, &excess(output, &tolerance))),
         is_excused: is_excused(row, rows),
     };
     let limits: Vec<(f64, f64)> = tube
@@ -110,6 +99,18 @@ fn strip(history: &History, output: &HistoryOutput, rows: &[&MatchRow]) -> Optio
         outside,
         ..Strip::of_lines(name, &output.unit, HEIGHT, scale, lines)
     })
+}
+
+/// Distance of each sample from its tolerance, positive outside. A simulation that departed has no value:
+/// it is outside.
+fn excess(output: &HistoryOutput, tolerance: &Tolerance) -> Vec<f64> {
+    let pairs = output.measured.iter().zip(&output.computed);
+    let excess = pairs.map(|(measured, computed)| match (computed - measured).abs() {
+        distance if distance.is_finite() => distance - tolerance.width(*measured),
+        _ if measured.is_finite() => f64::MAX,
+        _ => f64::NAN,
+    });
+    excess.collect()
 }
 
 /// `true` if the requirement of a tolerance is met: by this quantity, or by an alternative of the same requirement.

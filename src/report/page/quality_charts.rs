@@ -148,14 +148,10 @@ fn level_lines(levels: &[&LevelRow]) -> Vec<ChartSeries> {
     let shares = LevelShares::new(levels);
     let line = |line: usize| {
         let (label, labelled) = shares.label(line);
-        let point = |(i, row): (usize, &&LevelRow)| ChartPoint {
-            at: (row.alpha_deg, shares.of_line[line][i]),
-            label: if Some(i) == labelled {
-                label.clone()
-            } else {
-                String::new()
-            },
-            outline: vec![],
+        let point = |(i, row): (usize, &&LevelRow)| {
+            let is_labelled = Some(i) == labelled;
+            let label = if is_labelled { label.as_str() } else { "" };
+            ChartPoint::new((row.alpha_deg, shares.of_line[line][i]), label.to_owned())
         };
         ChartSeries {
             colour: LEVEL_LINES[line].colour,
@@ -373,14 +369,10 @@ fn locus(roots: &[&RootRow], axis: Axis, airframe: Airframe) -> Option<QualityCh
         angle(alphas.0),
         angle(alphas.1)
     );
-    let point = |root: &&&RootRow| ChartPoint {
-        at: (root.real, root.imaginary),
-        label: if (root.alpha_deg - alphas.0).abs() < 1e-9 {
-            angle(root.alpha_deg)
-        } else {
-            String::new()
-        },
-        outline: vec![],
+    let point = |root: &&&RootRow| {
+        let is_labelled = (root.alpha_deg - alphas.0).abs() < 1e-9;
+        let label = is_labelled.then(|| angle(root.alpha_deg));
+        ChartPoint::new((root.real, root.imaginary), label.unwrap_or_default())
     };
     Some(QualityChart::from_chart(&XyChart {
         id: &id,

@@ -300,16 +300,12 @@ fn chart(
     let caption = "Standard deviation of each derivative over that before flight, the least known named, and the \
                    medians of both axes. From 100 % flights gave nothing; above it, they leave the size of the \
                    tunnel's error uncertain, which counts after flight.";
-    let marks = rows.iter().map(|(row, pct)| ChartPoint {
-        at: (row.alpha_deg, *pct),
-        label: String::new(),
-        outline: vec![],
-    });
-    let named = most_uncertain.iter().map(|(row, pct)| ChartPoint {
-        at: (row.alpha_deg, *pct),
-        label: row.derivative.clone(),
-        outline: vec![],
-    });
+    let marks = rows
+        .iter()
+        .map(|(row, pct)| ChartPoint::new((row.alpha_deg, *pct), String::new()));
+    let named = most_uncertain
+        .iter()
+        .map(|(row, pct)| ChartPoint::new((row.alpha_deg, *pct), row.derivative.clone()));
     let named = ChartSeries {
         colour: INK,
         points: named.collect(),
@@ -340,10 +336,9 @@ fn chart(
 impl AxisMedians {
     fn series(&self) -> ChartSeries {
         let labelled = self.label_at * self.medians.len() / 5;
-        let point = |(i, at): (usize, &(f64, f64))| ChartPoint {
-            at: *at,
-            label: if i == labelled { self.label } else { "" }.to_owned(),
-            outline: vec![],
+        let point = |(i, at): (usize, &(f64, f64))| {
+            let label = if i == labelled { self.label } else { "" };
+            ChartPoint::new(*at, label.to_owned())
         };
         ChartSeries {
             colour: self.colour,

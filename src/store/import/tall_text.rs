@@ -12,7 +12,7 @@ use parquet::arrow::ArrowWriter;
 
 use super::calendar_time::CalendarTime;
 use super::delimited::{
-    Delimiter, Failures, HEAD_ROWS, fields, is_missing, name_and_unit, next_line, number,
+    Delimiter, Dialect, Failures, HEAD_ROWS, fields, is_missing, name_and_unit, next_line, number,
 };
 use super::imported_contents::{ImportedContents, of_scratch, refused, scratch_in, unwritable};
 use super::tall::{self, Role, Tall};
@@ -29,8 +29,7 @@ const TALL_SHARE: f64 = 0.9;
 /// Layout of a tall text.
 #[derive(Debug, PartialEq)]
 pub struct TallLayout {
-    delimiter: Delimiter,
-    decimal_comma: bool,
+    dialect: Dialect,
     /// Lines before the first row.
     skipped: usize,
     time: (usize, String),
@@ -61,8 +60,10 @@ impl TallLayout {
         let (time, name, value) = (find(Role::Time)?, find(Role::Name)?, find(Role::Value)?);
         let (time_name, own_unit) = heads[time].clone();
         let mut layout = TallLayout {
-            delimiter,
-            decimal_comma: false,
+            dialect: Dialect {
+                delimiter,
+                decimal_comma: false,
+            },
             skipped: at + 1,
             time: (time, time_name),
             time_unit: own_unit,
@@ -84,14 +85,12 @@ impl TallLayout {
             rows.next();
         }
         let rows: Vec<Vec<String>> = rows.collect();
-        let numbers = |comma: bool| {
-            let values = rows.iter().flat_map(|row| [row.get(time), row.get(value)]);
-            values
-                .flatten()
-                .filter(|f| number(f, comma).is_some())
-                .count()
+        let fields = || {
+            let fields = rows.iter().flat_map(|row| [row.get(time), row.get(value)]);
+            fields.flatten()
         };
-        layout.decimal_comma = numbers(true) > numbers(false);
+        let numbers = |comma: bool| fields().filter(|f| number(f, comma).is_some()).count();
+        layout.dialect.decimal_comma = numbers(true) > numbers(false);
         let times = rows.iter().filter_map(|row| row.get(time));
         layout.origin = times.clone().find_map(|time| CalendarTime::parse(time));
         if layout.origin.is_some() {
@@ -109,7 +108,7 @@ impl TallLayout {
         let field = row.get(self.time.0)?;
         match self.origin {
             Some(origin) => CalendarTime::parse(field).map(|time| time.since(origin)),
-            None => number(field, self.decimal_comma),
+            None => self.dialect.number(field),
         }
     }
 
@@ -171,7 +170,7 @@ impl TallLayout {
 
     /// Appends a row. A row without a time is left out, and a value that is no number is missing.
     fn append(&self, text: &str, line: usize, rows: &mut TallRows, failures: &mut Failures) {
-        let row = fields(text, self.delimiter);
+        let row = self.dialect.fields(text);
         let Some(name) = row.get(self.name).filter(|name| !name.is_empty()) else {
             failures.short_rows += 1;
             return;
@@ -181,7 +180,7 @@ impl TallLayout {
             return;
         };
         let field = row.get(self.value).map_or("", String::as_str);
-        let value = number(field, self.decimal_comma);
+        let value = self.dialect.number(field);
         if value.is_none() && !is_missing(field) {
             failures.add(line, field);
         }
@@ -239,7 +238,7 @@ mod tests {
         );
         let german = layout("Zeit [s];Kanal;Wert;Einheit\n0,1;q;1,5;Grad/s\n0,1;de;2;Grad\n");
         let german = german.unwrap();
-        assert!(german.decimal_comma && german.unit == Some(3));
+        assert!(german.dialect.decimal_comma && german.unit == Some(3));
         assert_eq!(german.time_unit.as_deref(), Some("s"));
         let units = layout("time\tsignal\tvalue\nms\t\t\n0\tq\t1\n20\tq\t2\n").unwrap();
         assert_eq!((units.skipped, units.time_unit.as_deref()), (2, Some("ms")));

@@ -81,40 +81,60 @@ fn of_parquet(path: &Path, third: Option<&str>) -> Result<Vec<(usize, TunnelRow)
         path,
         frame: &frame,
     };
-    let [derivative, unit, source] = ["derivative", "unit", "source"].map(|name| table.words(name));
-    let numbers = |name: &str| table.numbers(name);
-    let [alpha, mach, value, uncertainty] =
-        ["alpha_deg", "mach", "value", "uncertainty"].map(numbers);
-    let third = third.map_or(Ok(None), numbers)?;
-    let (derivative, unit, source) = (derivative?, unit?, source?);
-    let (alpha, mach, value, uncertainty) = (alpha?, mach?, value?, uncertainty?);
-    let row = |i: usize| {
+    let columns = TunnelColumns::of(&table, third)?;
+    (0..frame.height())
+        .map(|i| Ok((i + 1, columns.row(i, path)?)))
+        .collect()
+}
+
+/// Columns of a Parquet table; `None` for a column that it lacks.
+struct TunnelColumns {
+    derivative: Option<Vec<Option<String>>>,
+    unit: Option<Vec<Option<String>>>,
+    source: Option<Vec<Option<String>>>,
+    alpha_deg: Option<Vec<Option<f64>>>,
+    mach: Option<Vec<Option<f64>>>,
+    value: Option<Vec<Option<f64>>>,
+    uncertainty: Option<Vec<Option<f64>>>,
+    third: Option<Vec<Option<f64>>>,
+}
+
+impl TunnelColumns {
+    fn of(table: &Frame, third: Option<&str>) -> Result<TunnelColumns> {
+        Ok(TunnelColumns {
+            third: third.map_or(Ok(None), |name| table.numbers(name))?,
+            derivative: table.words("derivative")?,
+            unit: table.words("unit")?,
+            source: table.words("source")?,
+            alpha_deg: table.numbers("alpha_deg")?,
+            mach: table.numbers("mach")?,
+            value: table.numbers("value")?,
+            uncertainty: table.numbers("uncertainty")?,
+        })
+    }
+
+    /// Row `i` of the table.
+    fn row(&self, i: usize, path: &Path) -> Result<TunnelRow> {
         let lacks = |name: &str| {
-            Error::config(
-                path,
-                Some(i + 1),
-                format!("column `{name}` has no value here, or is missing"),
-            )
+            let what = format!("column `{name}` has no value here, or is missing");
+            Error::config(path, Some(i + 1), what)
         };
-        let at = |column: &Option<Vec<Option<f64>>>| {
-            column.as_ref().and_then(|c| c.get(i).copied().flatten())
-        };
-        let word = |column: &Option<Vec<Option<String>>>| {
-            column.as_ref().and_then(|c| c.get(i).cloned().flatten())
-        };
-        let row = TunnelRow {
-            derivative: word(&derivative).ok_or_else(|| lacks("derivative"))?,
-            alpha_deg: at(&alpha).ok_or_else(|| lacks("alpha_deg"))?,
-            mach: at(&mach),
-            value: at(&value).ok_or_else(|| lacks("value"))?,
-            unit: word(&unit).ok_or_else(|| lacks("unit"))?,
-            uncertainty: at(&uncertainty),
-            source: word(&source),
-            third: at(&third),
-        };
-        Ok((i + 1, row))
-    };
-    (0..frame.height()).map(row).collect()
+        Ok(TunnelRow {
+            derivative: at(self.derivative.as_ref(), i).ok_or_else(|| lacks("derivative"))?,
+            alpha_deg: at(self.alpha_deg.as_ref(), i).ok_or_else(|| lacks("alpha_deg"))?,
+            mach: at(self.mach.as_ref(), i),
+            value: at(self.value.as_ref(), i).ok_or_else(|| lacks("value"))?,
+            unit: at(self.unit.as_ref(), i).ok_or_else(|| lacks("unit"))?,
+            uncertainty: at(self.uncertainty.as_ref(), i),
+            source: at(self.source.as_ref(), i),
+            third: at(self.third.as_ref(), i),
+        })
+    }
+}
+
+/// Value of a column in a row; `None` for a column that the table lacks.
+fn at<T: Clone>(column: Option<&Vec<Option<T>>>, row: usize) -> Option<T> {
+    column?.get(row).cloned().flatten()
 }
 
 /// Rows of a Parquet table.
