@@ -2,9 +2,12 @@
 //! with the slopes of Fritsch and Butland (1984), which never overshoots the points on either side.
 //!
 //! On an interval of length h with the values y₀, y₁ and the slopes d₀, d₁ the cubic is Hermite's.
-//! A slope at a point between the chords δ₋ (length h₋) and δ₊ (length h₊) is their weighted
-//! harmonic mean, zero where they differ in sign: 1/d = (w₁/δ₋ + w₂/δ₊)/(w₁ + w₂), w₁ = 2h₊ + h₋,
-//! w₂ = h₊ + 2h₋. At an end it is the three-point slope, kept monotone.
+//! The slope d at a point is the weighted harmonic mean of the chords on either side, with slopes δ₋
+//! and δ₊ and lengths h₋ and h₊:
+//!
+//! 1/d = (w₁/δ₋ + w₂/δ₊)/(w₁ + w₂), w₁ = 2h₊ + h₋, w₂ = h₊ + 2h₋.
+//!
+//! It is zero where the chords differ in sign. At an end it is the three-point slope, kept monotone.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,9 +1,15 @@
 //! Configuration: YAML as written, checked whole before any flight is opened, as checked types.
 //!
-//! A pipeline is a folder: `pipeline.yaml` (archive, store, reports, settings of the stages),
-//! `aircraft.yaml` (geometry, sensors, channel map, errors of instruments), `model.yaml` (the
-//! build-up), `maneuvers/*.yaml` (one class per file) and, where flying qualities and the match of a simulator
-//! are judged, `qualities.yaml` and `match.yaml`.
+//! A pipeline is a folder:
+//!
+//! | file | content |
+//! |---|---|
+//! | `pipeline.yaml` | archive, store, reports, settings of the stages |
+//! | `aircraft.yaml` | geometry, sensors, channel map, errors of instruments |
+//! | `model.yaml` | build-up |
+//! | `maneuvers/*.yaml` | one class per file |
+//! | `qualities.yaml` | requirements on flying qualities, where these are judged |
+//! | `match.yaml` | tolerances of a simulator, where its match is judged |
 
 mod absences;
 mod channel_map;

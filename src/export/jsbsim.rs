@@ -2,9 +2,11 @@
 //!
 //! JSBSim's axes NORMAL (up), AXIAL (aft) and SIDE (right) are the axes of CN, CA and CY: its body
 //! forces are −AXIAL, SIDE, −NORMAL. ROLL, PITCH and YAW are moments right wing down, nose up, nose
-//! right, as Cl, Cm, Cn. α and β are read in degrees, rates as `aero/bi2vel` p and r, `aero/ci2vel`
-//! q, which are p b/2V, r b/2V and q c̄/2V in radians. Vanes are forces in lbf and moments in ft
-//! lbf and are not multiplied by q̄S.
+//! right, as Cl, Cm, Cn.
+//!
+//! α and β are read in degrees. The rates are p b/2V, r b/2V and q c̄/2V in radians: `aero/bi2vel`
+//! times p or r, `aero/ci2vel` times q. Vanes are forces in lbf and moments in ft lbf, and are not
+//! multiplied by q̄S.
 
 use super::export_contents::{COEFFICIENTS, ExportContents, terms};
 use super::export_table::ExportTable;

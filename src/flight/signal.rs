@@ -1,8 +1,10 @@
 //! Signals in the equations of motion. The analyst names surfaces and pilot controls.
 //!
-//! Signs (the paper's, and those of every formula of the program): rates and attitudes as usual in body
-//! axes, normal acceleration positive up, axial forward, lateral right; c.g. positions positive
-//! aft, right and above of the reference point.
+//! Signs, as in the paper and in every formula of the program:
+//!
+//! - rates and attitudes as usual in body axes;
+//! - normal acceleration positive up, axial forward, lateral right;
+//! - c.g. positions positive aft, right and above of the reference point.
 
 /// The recorder's clock.
 pub const TIME: &str = "time_s";

@@ -36,9 +36,11 @@ pub struct Ingested {
 /// Ingests the first stretch of a flight that is in memory.
 ///
 /// # Errors
-/// A problem that refuses this flight and no other: a clock that cannot be followed, a unit in the
-/// file that is not the channel map's, a required channel that is missing, or one that the
-/// kinematic relations prove wrong.
+/// A problem that refuses this flight and no other:
+///
+/// - a clock that cannot be followed,
+/// - a unit in the file other than the channel map's,
+/// - a required channel that is missing, or that the kinematic relations prove wrong.
 pub fn record(
     raw: &RawFlight,
     channels: &BTreeMap<String, Channel>,

@@ -13,9 +13,13 @@ use crate::output_error::error_effect::SharedError;
 
 /// Evidence of a flight, y = A z + K u + e.
 ///
-/// z are the unknowns of the coefficient and A the rows of the estimates over z. u are the
-/// calibration errors of the flight, each with unit variance, and K their effects. e are the
-/// remaining errors.
+/// | symbol | quantity |
+/// |---|---|
+/// | z | unknowns of the coefficient |
+/// | A | rows of the estimates over z |
+/// | u | calibration errors of the flight, each with unit variance |
+/// | K | effects of the calibration errors |
+/// | e | remaining errors |
 #[derive(Clone, Debug)]
 pub struct FlightData {
     /// Index of each maneuver in the evidence, and its rows.

@@ -1,9 +1,12 @@
 //! The night: a run's results, published together with everything that decided them, and commands
 //! that inspect it the next morning.
 //!
-//! [`run()`] publishes a night. [`status`] reports the artefacts that a run would make, [`diff`]
-//! the changes since the night before, [`explain`] everything about one maneuver, [`verify`]
-//! whether a published night is still valid; [`gc`] removes what no night needs.
+//! - [`run()`] publishes a night.
+//! - [`status`] reports the artefacts that a run would make.
+//! - [`diff`] reports the changes since the night before.
+//! - [`explain`] reports everything about one maneuver.
+//! - [`verify`] checks that a published night is still valid.
+//! - [`gc`] removes artefacts that no night needs.
 
 mod campaign_lineage;
 mod changes;

@@ -1,8 +1,8 @@
 //! Random effects: one quantity, observed several times with known errors and an unknown scatter.
 //!
 //! y_i = x_iᵀ β + u_i + e_i with e_i of the known variance s_i² and u_i of the common variance τ².
-//! With weights w_i = 1/(s_i² + τ²) the coefficients β are those of weighted least squares, and τ²
-//! solves the moment equation of Paule and Mandel, Σ w_i (y_i − x_iᵀ β)² = n − p; it is zero where
+//! With weights w_i = 1/(s_i² + τ²) the coefficients β are those of weighted least squares. τ²
+//! solves the moment equation of Paule and Mandel, Σ w_i (y_i − x_iᵀ β)² = n − p. τ² is zero where
 //! the left side is below n − p without scatter. For equal s_i this is restricted maximum
 //! likelihood. (R. C. Paule, J. Mandel, J. Res. NBS 87 (1982) 377; R. DerSimonian, R. Kacker,
 //! Contemp. Clin. Trials 28 (2007) 105.) The trends solve the same equation for residuals of a given fit, with

@@ -1,4 +1,4 @@
-//! Draft of a pipeline for a recorder that harvest has not seen, from its recordings.
+//! Draft of a pipeline for a recorder without a description, from its recordings.
 
 use std::path::{Path, PathBuf};
 

@@ -3,11 +3,14 @@
 //! To first order the outputs of a repeat flight differ from a model's by four parts: the mean
 //! difference, the effects of the derivatives' deviations, the effects of the start's errors, and
 //! the sensors' noise. At one sample the difference is therefore normal, and its nearest limit is a
-//! number of standard deviations away. The decisive difference is found in three steps:  1. of an
-//! alternative: at the sample with the smallest distance; 2. of a requirement: that of the
-//! alternative with the largest distance; 3. of the maneuver: that of the requirement with the
-//! smallest distance.  A requirement on the Dutch roll has one value only, whose noise is the error
-//! of the repeat flight's estimates.
+//! number of standard deviations away: its distance. The decisive difference is
+//!
+//! 1. of an alternative: the difference at the sample with the smallest distance;
+//! 2. of a requirement: the one of the alternative with the largest distance;
+//! 3. of the maneuver: the one of the requirement with the smallest distance.
+//!
+//! A requirement on the Dutch roll has one value only, whose noise is the error of the repeat
+//! flight's estimates.
 
 use nalgebra::{DMatrix, DVector};
 

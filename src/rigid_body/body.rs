@@ -1,10 +1,11 @@
-//! The rigid body: m (v̇ + ω × v) = F + m g and I ω̇ = M − ω × (I ω + h), with velocity u v w and
-//! rates p q r in body axes, the attitude as a quaternion, and the engines' angular momentum h
-//! along +x.
+//! The rigid body: m (v̇ + ω × v) = F + m g and I ω̇ = M − ω × (I ω + h).
 //!
-//! Written from the laws of Newton and Euler in vector form, independently of the estimator's
-//! equations in α, β and V, so that each checks the other. Flat, non-rotating earth; gravity from
+//! v are the velocities u v w and ω the rates p q r in body axes. h is the engines' angular momentum
+//! along +x. The attitude is a quaternion. The earth is flat and does not rotate; gravity is
 //! [`crate::earth::gravity_ft_s2`].
+//!
+//! The equations are the laws of Newton and Euler in vector form, independent of the estimator's
+//! equations in α, β and V. So each checks the other.
 
 use nalgebra::{Matrix3, Quaternion, SVector, UnitQuaternion, Vector3};
 

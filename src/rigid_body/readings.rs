@@ -1,7 +1,7 @@
 //! Readings of perfect instruments at their positions.
 //!
-//! An accelerometer at r from the c.g. measures f + ω̇ × r + ω × (ω × r); a vane measures the local
-//! flow, which turns about the c.g. with the aircraft's rates relative to the air.
+//! An accelerometer at r from the c.g. measures f + ω̇ × r + ω × (ω × r). A vane measures the local
+//! flow, which the aircraft's rates relative to the air turn about the c.g.
 #![expect(
     clippy::inline_always,
     reason = "compiled into free runs for the processor at hand"

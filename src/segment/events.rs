@@ -18,13 +18,15 @@ const AGREEMENT_S: f64 = 1.0;
 /// axis. Neighbouring windows share the time between them, which is less than half of either.
 const REPLACING_SHARE: f64 = 0.5;
 
-/// Replaces maneuvers by the events given for this flight that cover more than half of one, lie in one
-/// by more than half, or have samples between the first and the last input of one of their axis;
-/// compares the two.
+/// Replaces maneuvers by the events given for this flight, and compares the two. An event replaces a
+/// maneuver if it
+///
+/// - covers more than half of it,
+/// - lies in it by more than half, or
+/// - is of its axis and has samples between its first and its last input.
 ///
 /// An event of an unknown class, outside the record, or with samples of an earlier event of its axis
-/// becomes a problem and replaces nothing.
-/// Without events for any flight there is no comparison.
+/// becomes a problem and replaces nothing. Without events for any flight there is no comparison.
 #[must_use]
 pub fn with_events(
     segmented: Segmented,

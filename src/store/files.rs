@@ -82,7 +82,7 @@ pub fn working_folder() -> Result<std::path::PathBuf> {
     std::env::current_dir().map_err(Error::io(Path::new("."), "there is no current folder"))
 }
 
-/// A folder for files that nobody keeps, removed when it is dropped.
+/// Temporary folder, removed when it is dropped.
 ///
 /// # Errors
 /// [`Error::Io`]: it cannot be created.

@@ -1,10 +1,10 @@
 //! Delays of the surfaces from the evidence of many maneuvers.
 //!
 //! A recorder delays all its channels alike, or each bus by its own delay. The delay of a surface s
-//! is τ_s = μ + d_s, with a common part μ and its own part d_s. μ and d_s are normal with standard
-//! deviations that the data determine, from well below a millisecond to the tens of milliseconds of
-//! a bus. A surface that hardly moves thus gets the delay of the others, with a bound as wide as
-//! the difference between surfaces.
+//! is τ_s = μ + d_s, with a common part μ and its own part d_s. Both are normal. The data determine
+//! their standard deviations, from well below a millisecond to the tens of milliseconds of a bus. A
+//! surface that hardly moves thus gets the delay of the others, with a bound as wide as the
+//! difference between surfaces.
 //!
 //! Maneuvers are weighted by Student's t, since a model that does not fit a maneuver biases its
 //! delays. The bound is the larger of the posterior's and the jackknife's, and at least the error

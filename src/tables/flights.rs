@@ -326,7 +326,7 @@ impl InstrumentVerdict {
         !matches!(self, Fault(_) | WrongInEveryFlight)
     }
 
-    /// True where nothing is known of the instrument.
+    /// True where the flight determines no error of the instrument.
     #[must_use]
     pub fn is_unknown(&self) -> bool {
         matches!(

@@ -156,7 +156,7 @@ table! {
     /// Check of the posterior without truth: each flight as the other flights predict it, each
     /// class as the other classes predict it.
     ///
-    /// An error that all flights share cannot be seen so.
+    /// This check cannot find an error that all flights share.
     pub struct SelfCheckRow in "self_check" per "flight or class left out, and coefficient" {
         /// Kind of what is left out.
         pub left_out: LeftOutKind,

@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use crate::numerics::sample_count::nearest;
 
-/// Half the length of the local straight line whose slope is the derivative: short against the
-/// airframe's modes, and long enough to keep the gyros' noise, at the accelerometers' arms, below that
-/// of the accelerometers.
+/// Half the length of the local straight line whose slope is the derivative. It is short against the
+/// airframe's modes. It is long enough to keep the gyros' noise, times the accelerometers' arms, below
+/// the accelerometers' noise.
 const SLOPE_REACH_S: f64 = 0.1;
 
 /// Samples on each side of the local straight line whose slope is the derivative, at least one.

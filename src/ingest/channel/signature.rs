@@ -32,7 +32,7 @@ pub struct SignatureSamples {
     step_s: f64,
     /// The sample of the next time.
     next: usize,
-    /// Samples seen.
+    /// Number of samples so far.
     seen: usize,
     /// Bits by time, in intervals.
     bits: BTreeMap<i64, u64>,

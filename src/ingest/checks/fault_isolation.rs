@@ -339,8 +339,8 @@ fn squared_misfit(checks: &[Check]) -> f64 {
         .sum()
 }
 
-/// The best trial, and the best trial of each other channel that explains the failure as well: with
-/// as small a misfit, and with as few windows in which the record would have to jump.
+/// The best trial, and the best trial of each other channel that explains the failure equally well. Such a trial
+/// has as small a misfit, and as few windows in which the record would have to jump.
 fn equally_good(best: &Trial, trials: &[Trial]) -> Vec<FaultyChannel> {
     let mut chosen: Vec<&Trial> = Vec::new();
     for trial in trials {

@@ -21,7 +21,7 @@ use crate::numerics::order_statistics::quantile;
 use crate::numerics::sample_count::whole_steps;
 
 /// Share of the second differences below the one from which their variance is computed. Maneuvers
-/// disturb fewer than a quarter; gusts in a quarter of the flight are seen.
+/// disturb fewer than a quarter; gusts in a quarter of the flight are detected.
 const SHARE: f64 = 0.75;
 
 /// Standard deviations of a normal distribution in its magnitude at [`SHARE`]: Φ⁻¹(⅞).

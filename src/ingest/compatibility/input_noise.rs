@@ -193,8 +193,8 @@ fn add_scaled(sums: &mut [f64], values: &[f64], factor: f64) {
 }
 
 /// Changes of the initial state that act like the noise of a block, for each block and input:
-/// Φ(t, 0)⁻¹ B(t) h σ √N at the block's middle t, with σ the noise's standard deviation and N the
-/// number of samples. `None` if Φ is singular.
+/// Φ(t, 0)⁻¹ B(t) h σ √N at the block's middle t. σ is the noise's standard deviation, N the number of
+/// samples. `None` if Φ is singular.
 fn moves_of_start(window: &Window, linearised: &LinearisedWindow) -> Option<Vec<DMatrix<f64>>> {
     let (length, spacing) = (block_length(window), window.samples_per_node());
     let slopes = &linearised.sensitivities;

@@ -2,11 +2,12 @@
 //! sensitivities.
 //!
 //! The *inputs* are the rates and accelerations, which drive the equations; the *outputs* are the
-//! other instruments, which the reconstructed motion predicts. With y(t) the recorded and x(t) the
-//! true value of an input, in rad/s or ft/s², and bias (same unit), scale (a ratio) and delay (s) the
-//! errors of its instrument,
+//! other instruments, which the reconstructed motion predicts. The true value x of an input follows
+//! from the recorded value y, both in rad/s or ft/s²:
 //!
 //! x(t) = (y(t + delay) − bias)/(1 + scale).
+//!
+//! Bias (same unit), scale (a ratio) and delay (s) are the errors of its instrument.
 //!
 //! Two grids of time are used:
 //!

@@ -14,6 +14,7 @@ const LABEL_GAP: f64 = 4.0;
 
 /// Distances of a label from its point; the first at which it is free counts.
 pub const LABEL_GAPS: [f64; 5] = [3.0, 6.0, 12.0, 20.0, 30.0];
+
 /// Left, top, right and bottom of an area.
 pub type Area = [f64; 4];
 
