@@ -11,6 +11,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::numerics::cubic_curve::hermite;
+
 /// Interpolation between the points of a table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -80,13 +82,8 @@ pub(super) fn monotone(
             inner_slope(length(i - 1), length(i), chord(i - 1), chord(i))
         }
     };
-    let (h, t) = (length(low), fraction);
-    let (d0, d1) = (slope(low), slope(high));
-    let (t2, t3) = (t * t, t * t * t);
-    (2.0 * t3 - 3.0 * t2 + 1.0) * y0
-        + (t3 - 2.0 * t2 + t) * h * d0
-        + (3.0 * t2 - 2.0 * t3) * y1
-        + (t3 - t2) * h * d1
+    let slopes = [slope(low), slope(high)];
+    hermite(length(low), fraction, [y0, y1], slopes).0
 }
 
 fn inner_slope(h0: f64, h1: f64, chord0: f64, chord1: f64) -> f64 {

@@ -142,6 +142,7 @@ fn pipeline_file(source: &Source) -> Result<PipelineFile> {
 fn share_keys(pipeline: &mut PipelineFile, errors: &BTreeMap<String, InstrumentErrors>) {
     pipeline.ingest.share();
     pipeline.model.tunnel_uncertainty_pct = pipeline.estimate.held_uncertainty_pct;
+    pipeline.estimate.tunnel_error_length_deg = pipeline.model.length_deg;
     let compatibility = &mut pipeline.ingest.compatibility;
     for (signal, instrument) in errors {
         if let Some(size) = compatibility.ordinary.of_signal(signal) {

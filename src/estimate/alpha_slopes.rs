@@ -1,142 +1,60 @@
 //! Change of the derivatives over the angles of attack that a maneuver sweeps.
 //!
-//! The build-up has one value of each derivative in a maneuver. In the wind tunnel's tables t(α) it
-//! changes: the maneuver has the further term s (t(α) − t(ᾱ)) r along a derivative's regressor r. Along α
-//! itself it is s (T(α) − T(ᾱ) − t(ᾱ) (α − ᾱ)), T the tabulated sum of constant and α t, or without one the
-//! integral of t. A derivative that is held changes likewise. The slopes s are 1 where flight changes
-//! as the tunnel, 0 where it is constant. Filter error estimates them
+//! The build-up has one value of each derivative in a maneuver. In the wind tunnel's tables t(α) it changes:
+//! along a derivative's regressor r the coefficient has the further term (t(α) − t(ᾱ)) r, along α itself the
+//! term T(α) − T(ᾱ) − T'(ᾱ) (α − ᾱ). T is the tabulated sum of constant and α t with the slope t at its points, or
+//! without such a sum the integral of t. Held derivatives change as estimated ones do.
+//!
+//! Slopes of two kinds act in a maneuver:
+//!
+//! | slope | acts along | prior for the common share λ |
+//! |---|---|---|
+//! | of a coefficient | the sum of its derivatives' changes in the tunnel | λ |
+//! | of a derivative | σ (α − ᾱ) r; along α itself σ (α − ᾱ)²/2 | mean 0, standard deviation λ |
+//!
+//! The share is 1 where flight changes as the tunnel does, and 0 where the derivatives are constant. σ is the
+//! standard uncertainty of a derivative's change per degree. Filter error estimates the slopes
 //! ([`filter_error::slopes`](crate::filter_error::slopes)).
 
 use super::task::Task;
-use crate::aero::{Condition, Derivative, Regressor};
+use super::tunnel_change::{AlphaRange, TunnelChange};
+use crate::aero::{Coefficient, Derivative, Regressor};
 use crate::dynamics::Equations;
 use crate::dynamics::motion::Window;
-use crate::numerics::trapezoid::running_integral;
+use crate::filter_error::bounds::WidePass;
+use crate::filter_error::slopes::SlopePrior;
+use crate::numerics::mean::mean;
 use crate::output_error::{Case, Model};
 use crate::units::DEG;
-
-/// Intervals of the swept angles of attack, in each of which the tunnel's change is linear.
-const INTERVALS: usize = 200;
 
 /// Slopes over α that act in a maneuver, with its window.
 #[derive(Clone)]
 pub(super) struct AlphaSlopes {
-    /// Derivatives along the tunnel's changes, which are signals of the window.
-    pub derivatives: Vec<Derivative>,
+    pub slopes: Vec<AlphaSlope>,
+    /// Derivatives along α and constants, one pair per coefficient, that take the slopes' lines.
+    lines: Vec<[Derivative; 2]>,
+    /// Window of the maneuver, with the signals of the slopes.
     pub window: Window,
 }
 
-/// Range of a maneuver's angles of attack, deg.
-struct AlphaRange {
-    mean: f64,
-    lowest: f64,
-    /// Length of an interval.
-    step: f64,
-    /// Interval of each sample, and the sample's fractional position in it.
-    samples: Vec<(usize, f64)>,
+/// Slope of a coefficient or derivative.
+#[derive(Clone)]
+pub(super) struct AlphaSlope {
+    /// Derivative along the change less its line, which is a signal of the window.
+    pub term: Derivative,
+    pub prior: SlopePrior,
+    /// Line through the change: slope over α, per deg, and value at α = 0.
+    line: [f64; 2],
 }
 
-/// Tunnel's derivatives over the angles of attack of a maneuver.
-struct TunnelChange<'t, 'a> {
-    task: &'t Task<'a>,
-    range: &'t AlphaRange,
-}
-
-impl TunnelChange<'_, '_> {
-    /// Change of a derivative's term over α at the swept angles, per unit of its regressor; along
-    /// α itself, change of the coefficient. `None` without a table.
-    fn change_of_term(&self, derivative: &Derivative) -> Option<Vec<f64>> {
-        match derivative.regressor {
-            Regressor::Alpha => self.change_along_alpha(&derivative.name),
-            _ => self.change_from_mean(&derivative.name),
-        }
-    }
-
-    /// Tunnel's change of a derivative, or tabulated sum, from the mean angle of attack to those swept.
-    /// `None` without a table.
-    fn change_from_mean(&self, name: &str) -> Option<Vec<f64>> {
-        let table = self.table(name);
-        let mean = table(self.range.mean)?;
-        let at = |alpha_deg| Some(table(alpha_deg)? - mean);
-        self.range.angles().map(at).collect()
-    }
-
-    /// Tunnel's change of a coefficient beyond that by its slope along α at the mean.
-    fn change_along_alpha(&self, slope: &str) -> Option<Vec<f64>> {
-        let range = self.range;
-        let sums = &self.task.context.buildup.combined;
-        let sum = sums.iter().find(|sum| sum.slope == slope);
-        let Some(change) = sum.and_then(|sum| self.change_from_mean(&sum.name)) else {
-            return Some(range.integrate_from_mean(&self.change_from_mean(slope)?));
-        };
-        let mean = self.table(slope)(range.mean)?;
-        let both = change.iter().zip(range.angles());
-        let beyond = both.map(|(c, alpha)| c - mean * (alpha - range.mean));
-        Some(beyond.collect())
-    }
-
-    /// Tunnel's table of a derivative over α in deg, at the maneuver's condition.
-    fn table(&self, name: &str) -> impl Fn(f64) -> Option<f64> {
-        let tunnel = self.task.context.tunnel;
-        let flown = self.task.maneuver.condition(tunnel);
-        let table = tunnel.reader(name);
-        move |alpha_deg| {
-            let condition = Condition { alpha_deg, ..flown };
-            table.as_ref()?.at(&condition).map(|v| v.value)
-        }
-    }
-}
-
-impl AlphaRange {
-    /// Range of the samples' angles, deg.
-    fn from_samples(alphas: &[f64]) -> AlphaRange {
-        let mean = alphas.iter().sum::<f64>() / alphas.len().max(1) as f64;
-        let lowest = alphas.iter().copied().fold(mean, f64::min);
-        let highest = alphas.iter().copied().fold(mean, f64::max);
-        let mut range = AlphaRange {
-            mean,
-            lowest,
-            step: ((highest - lowest) / INTERVALS as f64).max(f64::MIN_POSITIVE),
-            samples: vec![],
-        };
-        range.samples = alphas.iter().map(|alpha| range.locate(*alpha)).collect();
-        range
-    }
-
-    /// Angles from the lowest to the highest.
-    fn angles(&self) -> impl Iterator<Item = f64> {
-        (0..=INTERVALS).map(|i| self.lowest + self.step * i as f64)
-    }
-
-    /// Values at the samples of a quantity that is linear between the angles.
-    fn interpolate_at_samples(&self, quantity: &[f64]) -> Vec<f64> {
-        let samples = self.samples.iter();
-        samples.map(|place| interpolate(quantity, *place)).collect()
-    }
-
-    /// Interval of an angle, and the angle's fractional position in it.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "the number of an interval"
-    )]
-    fn locate(&self, alpha: f64) -> (usize, f64) {
-        let place = ((alpha - self.lowest) / self.step).clamp(0.0, INTERVALS as f64);
-        let low = (place as usize).min(INTERVALS - 1);
-        (low, place - low as f64)
-    }
-
-    /// Integral over α from the mean.
-    fn integrate_from_mean(&self, quantity: &[f64]) -> Vec<f64> {
-        let integral = running_integral(quantity, self.step);
-        let at_mean = interpolate(&integral, self.locate(self.mean));
-        integral.iter().map(|value| value - at_mean).collect()
-    }
-}
-
-/// Value of a quantity at a place between two angles.
-fn interpolate(quantity: &[f64], (low, share): (usize, f64)) -> f64 {
-    quantity[low] + share * (quantity[low + 1] - quantity[low])
+/// Change of a coefficient along a maneuver.
+struct CoefficientChange {
+    name: String,
+    coefficient: Coefficient,
+    /// Values at the samples.
+    values: Vec<f64>,
+    /// Slope of the values over α, per deg, where the regressors are at their means.
+    slope: f64,
 }
 
 impl AlphaSlopes {
@@ -148,29 +66,13 @@ impl AlphaSlopes {
     ) -> AlphaSlopes {
         let motion = window.motion(task.context.aircraft);
         let alphas: Vec<f64> = motion.points().step_by(2).map(|m| DEG * m.alpha).collect();
-        let range = &AlphaRange::from_samples(&alphas);
-        let tunnel = TunnelChange { task, range };
         let mut slopes = AlphaSlopes {
-            derivatives: vec![],
+            slopes: vec![],
+            lines: lines::<NX, E>(),
             window: window.clone(),
         };
-        for (j, name) in wide.names.iter().take(wide.derivatives()).enumerate() {
-            let derivative = task.context.buildup.derivative(name);
-            let Some(derivative) = derivative.filter(|d| d.regressor != Regressor::Constant) else {
-                continue;
-            };
-            let change = tunnel.change_of_term(derivative);
-            let Some(change) = change.filter(|c| c.iter().any(|c| *c != 0.0)) else {
-                continue;
-            };
-            let mut values = range.interpolate_at_samples(&change);
-            if derivative.regressor != Regressor::Alpha {
-                let regressor = wide.measured_regressor(j);
-                for (value, r) in values.iter_mut().zip(&regressor) {
-                    *value *= r;
-                }
-            }
-            slopes.add_slope(derivative, &values);
+        for (change, prior) in changes(task, &alphas, wide) {
+            slopes.add(&change, prior, &alphas);
         }
         slopes
     }
@@ -178,29 +80,175 @@ impl AlphaSlopes {
     /// Model with the slopes held at these values, in their order.
     pub fn held_in<'s>(&'s self, model: &Model<'s>, values: &[f64]) -> Model<'s> {
         let mut held = model.clone();
-        let both = self.derivatives.iter().zip(values);
+        let both = || self.slopes.iter().zip(values);
         held.held
-            .extend(both.map(|(derivative, value)| (derivative, *value)));
+            .extend(both().map(|(slope, value)| (&slope.term, *value)));
+        for (part, derivative) in self.parts_of_lines() {
+            let of_line = both().filter(|(slope, _)| slope.has_line_in(derivative));
+            let value = of_line.map(|(slope, value)| slope.line[part] * value).sum();
+            held.held.push((derivative, value));
+        }
         held
     }
 
     /// Model with the slopes free as well.
     pub fn added_to<'s>(&'s self, model: &Model<'s>) -> Model<'s> {
         let mut wide = model.clone();
-        wide.free.extend(&self.derivatives);
+        wide.free
+            .extend(self.slopes.iter().map(|slope| &slope.term));
+        wide.free
+            .extend(self.parts_of_lines().map(|(_, derivative)| derivative));
         wide
     }
 
-    /// Adds the slope of a derivative; `values` is its regressor at the samples.
-    fn add_slope(&mut self, derivative: &Derivative, values: &[f64]) {
-        let name = format!("{} over alpha", derivative.name);
-        self.window = self.window.with_samples(&name, values);
-        self.derivatives.push(Derivative {
-            regressor: Regressor::Surface(name.clone()),
-            name,
-            coefficient: derivative.coefficient,
-        });
+    /// Pass whose parameters of the slopes move their lines as well.
+    pub fn with_lines(&self, mut pass: WidePass) -> WidePass {
+        for (part, derivative) in self.parts_of_lines() {
+            let own = self.slopes.iter().filter(|s| s.has_line_in(derivative));
+            for slope in own {
+                pass.add_column(&derivative.name, slope.line[part], &slope.term.name);
+            }
+        }
+        pass
     }
+
+    /// Derivatives of the lines, each with its place in [`AlphaSlope::line`].
+    fn parts_of_lines(&self) -> impl Iterator<Item = (usize, &Derivative)> {
+        self.lines.iter().flat_map(|pair| pair.iter().enumerate())
+    }
+
+    /// Adds the slope of a change, unless nothing changes.
+    ///
+    /// The change's line acts along the angle of attack of the computed motion. Along the measured one, the
+    /// vane's noise would bias the slope to zero.
+    fn add(&mut self, change: &CoefficientChange, prior: SlopePrior, alphas: &[f64]) {
+        if change.values.iter().all(|v| *v == 0.0) {
+            return;
+        }
+        let along = if self.lines.is_empty() {
+            0.0
+        } else {
+            change.slope
+        };
+        let line = [along, -along * mean(alphas.iter().copied())];
+        let both = change.values.iter().zip(alphas);
+        let rest: Vec<f64> = both
+            .map(|(value, alpha)| value - line[0] * alpha - line[1])
+            .collect();
+        self.window = self.window.with_samples(&change.name, &rest);
+        let term = Derivative {
+            regressor: Regressor::Surface(change.name.clone()),
+            name: change.name.clone(),
+            coefficient: change.coefficient,
+        };
+        self.slopes.push(AlphaSlope { term, prior, line });
+    }
+}
+
+impl CoefficientChange {
+    /// No change, at as many samples as there are angles of attack.
+    fn none(of: &str, coefficient: Coefficient, alphas: &[f64]) -> CoefficientChange {
+        CoefficientChange {
+            name: format!("{of} over alpha"),
+            coefficient,
+            values: vec![0.0; alphas.len()],
+            slope: 0.0,
+        }
+    }
+
+    /// Adds the changes of a derivative, per unit of its regressor; along α itself those of the coefficient.
+    fn add(&mut self, changes: &[f64], alphas: &[f64], regressor: Option<&[f64]>) {
+        let Some(regressor) = regressor else {
+            let both = self.values.iter_mut().zip(changes);
+            return both.for_each(|(value, change)| *value += change);
+        };
+        for ((value, change), r) in self.values.iter_mut().zip(changes).zip(regressor) {
+            *value += change * r;
+        }
+        self.slope += mean(regressor.iter().copied()) * slope_of_line(alphas, changes);
+    }
+}
+
+impl AlphaSlope {
+    /// Returns true if the derivative belongs to the lines of the slope's coefficient.
+    fn has_line_in(&self, derivative: &Derivative) -> bool {
+        self.term.coefficient == derivative.coefficient
+    }
+}
+
+/// Changes of the coefficients over α by the derivatives that are free in `wide`: one standard deviation of each
+/// derivative's own change, then the changes in the tunnel.
+fn changes<const NX: usize, E: Equations<NX>>(
+    task: &Task,
+    alphas: &[f64],
+    wide: &Case<NX, E>,
+) -> Vec<(CoefficientChange, SlopePrior)> {
+    let range = &AlphaRange::from_samples(alphas);
+    let tunnel = TunnelChange { task, range };
+    let mut changes = vec![];
+    let mut in_tunnel = E::AXIS.coefficients().map(|coefficient| {
+        CoefficientChange::none(&format!("{coefficient:?}"), coefficient, alphas)
+    });
+    for (j, name) in wide.names.iter().take(wide.derivatives()).enumerate() {
+        let derivative = task.context.buildup.derivative(name);
+        let Some(derivative) = derivative.filter(|d| d.regressor != Regressor::Constant) else {
+            continue;
+        };
+        let is_alpha = derivative.regressor == Regressor::Alpha;
+        let regressor = (!is_alpha).then(|| wide.measured_regressor(j));
+        if let Some(changes) = tunnel.at_samples(derivative) {
+            let sum = &mut in_tunnel[derivative.coefficient.index()];
+            sum.add(&changes, alphas, regressor.as_deref());
+        }
+        let own = own_change(task, derivative, alphas);
+        let mut change = CoefficientChange::none(name, derivative.coefficient, alphas);
+        change.add(&own, alphas, regressor.as_deref());
+        changes.push((change, SlopePrior::DEVIATION));
+    }
+    changes.extend(in_tunnel.map(|change| (change, SlopePrior::SHARE)));
+    changes
+}
+
+/// One standard deviation of a derivative's own change at the samples; along α itself, of the coefficient's.
+///
+/// The error of the table has the standard uncertainty u, and fades over the length ℓ as in the posterior of
+/// the campaign: over a small distance d it changes by √3 u d/ℓ.
+fn own_change(task: &Task, derivative: &Derivative, alphas: &[f64]) -> Vec<f64> {
+    let length = task.context.settings.tunnel_error_length_deg;
+    let slope = 3f64.sqrt() * task.held_uncertainty(derivative) / length;
+    let at = mean(alphas.iter().copied());
+    let change = |alpha: &f64| match derivative.regressor {
+        Regressor::Alpha => 0.5 * slope * (alpha - at).powi(2),
+        _ => slope * (alpha - at),
+    };
+    alphas.iter().map(change).collect()
+}
+
+/// Derivatives of the lines of an axis; none where α is no state.
+fn lines<const NX: usize, E: Equations<NX>>() -> Vec<[Derivative; 2]> {
+    if E::state_of(&Regressor::Alpha).is_none() {
+        return vec![];
+    }
+    let parts = |coefficient: Coefficient| {
+        [
+            (Regressor::Alpha, "line"),
+            (Regressor::Constant, "constant"),
+        ]
+        .map(|(regressor, part)| Derivative {
+            name: format!("{coefficient:?} over alpha, {part}"),
+            regressor,
+            coefficient,
+        })
+    };
+    E::AXIS.coefficients().map(parts).to_vec()
+}
+
+/// Slope of the least-squares line of `y` over `x`; zero if `x` is constant.
+fn slope_of_line(x: &[f64], y: &[f64]) -> f64 {
+    let mean = mean(x.iter().copied());
+    let square: f64 = x.iter().map(|x| (x - mean).powi(2)).sum();
+    let product: f64 = x.iter().zip(y).map(|(x, y)| (x - mean) * y).sum();
+    if square > 0.0 { product / square } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -209,18 +257,10 @@ mod tests {
     use approx::assert_relative_eq;
 
     #[test]
-    fn a_quantity_is_read_between_the_angles_and_integrated_from_the_mean() {
-        let alphas = [9.9, 12.0, 14.1];
-        let range = AlphaRange::from_samples(&alphas);
-        // t(α) − t(ᾱ) = 3 (α − 12): its integral is 1.5 (α − 12)².
-        let changes: Vec<f64> = range.angles().map(|a| 3.0 * (a - 12.0)).collect();
-        for (value, alpha) in range.interpolate_at_samples(&changes).iter().zip(&alphas) {
-            assert_relative_eq!(*value, 3.0 * (alpha - 12.0), epsilon = 1e-12);
-        }
-        let integral = range.interpolate_at_samples(&range.integrate_from_mean(&changes));
-        for (value, alpha) in integral.iter().zip(&alphas) {
-            assert_relative_eq!(*value, 1.5 * (alpha - 12.0f64).powi(2), epsilon = 1e-3);
-        }
-        assert_relative_eq!(integral[1], 0.0);
+    fn the_slope_of_a_line_is_that_of_least_squares() {
+        assert_relative_eq!(slope_of_line(&[1.0, 2.0, 4.0], &[5.0, 7.0, 11.0]), 2.0);
+        // Points off the line by +1, −2, +1 at −1, 0, 1 leave its slope.
+        assert_relative_eq!(slope_of_line(&[-1.0, 0.0, 1.0], &[-2.0, -2.0, 4.0]), 3.0);
+        assert_relative_eq!(slope_of_line(&[2.0, 2.0], &[1.0, 3.0]), 0.0);
     }
 }

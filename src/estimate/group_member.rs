@@ -86,7 +86,8 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
         let wide = self.filter(&all, Some(filter));
         let own = &parameters[..filter.first_noise()];
         let values = values_by_name(&model, filter.names(), own);
-        WidePass::pass_at_fit(filter, parameters, &wide, &values)
+        let pass = WidePass::pass_at_fit(filter, parameters, &wide, &values)?;
+        Some(self.slopes.with_lines(pass))
     }
 
     /// Changes of the gradient by calibration errors.

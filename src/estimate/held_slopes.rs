@@ -4,7 +4,7 @@ use nalgebra::DVector;
 
 use super::alpha_slopes::AlphaSlopes;
 use crate::filter_error::bounds::{FilterBounds, WidePass};
-use crate::filter_error::slopes::SlopeEffect;
+use crate::filter_error::slopes::{SlopeEffect, SlopePrior};
 
 /// Slopes of the derivatives over α, and the values at which a fit holds them. Slopes of one name are
 /// common to the maneuvers.
@@ -12,19 +12,25 @@ use crate::filter_error::slopes::SlopeEffect;
 pub(super) struct HeldSlopes {
     names: Vec<String>,
     values: Vec<f64>,
+    priors: Vec<SlopePrior>,
 }
 
 impl HeldSlopes {
     /// Derivatives that do not change over α.
     pub fn constant<'s>(members: impl Iterator<Item = &'s AlphaSlopes>) -> Self {
-        let mut names: Vec<String> = vec![];
-        for derivative in members.flat_map(|slopes| &slopes.derivatives) {
-            if !names.contains(&derivative.name) {
-                names.push(derivative.name.clone());
+        let (mut names, mut priors) = (vec![], vec![]);
+        for slope in members.flat_map(|member| &member.slopes) {
+            if !names.contains(&slope.term.name) {
+                names.push(slope.term.name.clone());
+                priors.push(slope.prior);
             }
         }
         let values = vec![0.0; names.len()];
-        HeldSlopes { names, values }
+        HeldSlopes {
+            names,
+            values,
+            priors,
+        }
     }
 
     /// The slopes moved by a fraction of the way to other values.
@@ -33,13 +39,14 @@ impl HeldSlopes {
         HeldSlopes {
             names: self.names.clone(),
             values: both.map(|(from, to)| from + share * (to - from)).collect(),
+            priors: self.priors.clone(),
         }
     }
 
     /// Effect on the estimates of a fit if the slopes are estimated and not held; `None` without
     /// slopes.
     pub fn effect(&self, pass: &WidePass, bounds: &FilterBounds) -> Option<SlopeEffect> {
-        pass.slope_effect(bounds, &self.names, &self.values)
+        pass.slope_effect(bounds, &self.names, &self.values, &self.priors)
     }
 
     /// True if no derivative changes over α.
@@ -53,7 +60,7 @@ impl HeldSlopes {
             let place = self.names.iter().position(|n| n == name);
             place.map_or(0.0, |place| self.values[place])
         };
-        let derivatives = slopes.derivatives.iter();
-        derivatives.map(|d| value(&d.name)).collect()
+        let names = slopes.slopes.iter().map(|slope| &slope.term.name);
+        names.map(|name| value(name)).collect()
     }
 }

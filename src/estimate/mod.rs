@@ -7,6 +7,7 @@ mod settings;
 mod context;
 mod estimated;
 mod task;
+mod tunnel_change;
 mod absent_outputs;
 mod prepared_case;
 mod fitting;

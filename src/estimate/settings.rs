@@ -182,6 +182,8 @@ settings! {
         /// Largest share of marked samples over the outputs together, and in each surface:
         /// `segment: quality: marked_share`.
         pub max_marked_share: f64 = 0.2,
+        /// Angle of attack over which an error of the tunnel changes, deg: `model: length_deg`.
+        pub tunnel_error_length_deg: f64 = 15.0,
     }
 }
 single_values!(Weights, Method, InitialState, MassProperties, InactiveSurfaces, Start, Hold, HeldValues, Doubtful, BTreeMap<Output, f64>);

@@ -14,7 +14,7 @@ use super::filter::Filter;
 use super::joint_filter::JointFilter;
 use super::response::FilterResponse;
 use super::scoring::Scored;
-use super::slopes::{SlopeEffect, SlopeInformation};
+use super::slopes::{SlopeEffect, SlopeInformation, SlopePrior};
 use crate::dynamics::{InGusts, OUTPUTS};
 use crate::numerics::matrix::AlignedMatrix;
 use crate::numerics::symmetric;
@@ -192,6 +192,19 @@ impl WidePass {
         })
     }
 
+    /// Makes the parameter `to` also move the parameter `from`, by a factor.
+    pub fn add_column(&mut self, from: &str, factor: f64, to: &str) {
+        let (Some(from), Some(to)) = (self.index_of(from), self.index_of(to)) else {
+            return;
+        };
+        let information = &mut self.information;
+        let column = information.column(from) * factor;
+        information.set_column(to, &(information.column(to) + column));
+        let row = information.row(from) * factor;
+        information.set_row(to, &(information.row(to) + row));
+        self.gradient[to] += factor * self.gradient[from];
+    }
+
     /// Joins the passes of maneuvers; `own` places their own parameters in the joint fit. Held
     /// derivatives and slopes of one name are common to the maneuvers.
     #[must_use]
@@ -254,14 +267,14 @@ impl WidePass {
         uncertainties.iter().map(shift).collect()
     }
 
-    /// Effect on the estimates of slopes over α with these prior sizes. `values` has the slopes at
-    /// which the fit held them.
+    /// Effect on the estimates of slopes over α. `values` has the slopes at which the fit held them.
     #[must_use]
     pub fn slope_effect(
         &self,
         bounds: &FilterBounds,
         slopes: &[String],
         values: &[f64],
+        priors: &[SlopePrior],
     ) -> Option<SlopeEffect> {
         let places: Vec<usize> = slopes
             .iter()
@@ -278,6 +291,7 @@ impl WidePass {
             slopes: DMatrix::from_fn(n, n, |i, j| self.information[(places[i], places[j])]),
             gradient: DVector::from_iterator(n, places.iter().map(|p| self.gradient[*p])),
             held_at: DVector::from_column_slice(values),
+            priors: priors.to_vec(),
         };
         information.effect()
     }

@@ -9,8 +9,8 @@
 //! | s₀ | slopes at which the fit held them |
 //! | H_ff, H_fs, H_ss | blocks of the information at the fit |
 //! | g_s | gradient of −J along s at the fit, plus V s₀ |
-//! | λ, w | common share, and standard deviation of a slope about it over λ |
-//! | m = λ 1, D = λ w 1 | prior mean of the slopes, and diagonal of their prior standard deviations |
+//! | λ, w | common share, and standard deviation of each slope about it over λ |
+//! | m = λ 1, D = λ diag(w) | prior mean of the slopes, and their prior standard deviations |
 //! | V = H_ss − H_sf H_ff⁻¹ H_fs | information on the slopes with f eliminated |
 //! | G = H_ff⁻¹ H_fs | change of the estimates with the slopes, with reversed sign |
 //!
@@ -29,10 +29,6 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// Shares λ: from 0, constant derivatives, to 1.5, changes half as large again as the tunnel's.
 const SHARES: [f64; 7] = [0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5];
-
-/// Standard deviation w of a slope about the common share, over that share. A table with errors of
-/// 20 % is not only scaled; it also has another shape over α.
-const SCATTER: f64 = 0.5;
 
 /// Effect of the slopes on the estimates.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,6 +49,26 @@ impl SlopeEffect {
     }
 }
 
+/// Prior of a slope, over the common share: mean and standard deviation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SlopePrior {
+    mean: f64,
+    deviation: f64,
+}
+
+impl SlopePrior {
+    /// Prior of a slope along the tunnel's change: the common share itself.
+    pub const SHARE: SlopePrior = SlopePrior {
+        mean: 1.0,
+        deviation: 0.0,
+    };
+    /// Prior of a slope along one standard deviation from the tunnel's change.
+    pub const DEVIATION: SlopePrior = SlopePrior {
+        mean: 0.0,
+        deviation: 1.0,
+    };
+}
+
 /// Blocks of the information on own parameters and slopes, with the slopes' gradient.
 #[derive(Clone, Debug)]
 pub struct SlopeInformation {
@@ -66,6 +82,7 @@ pub struct SlopeInformation {
     pub gradient: DVector<f64>,
     /// Value s₀ at which the fit held each slope.
     pub held_at: DVector<f64>,
+    pub priors: Vec<SlopePrior>,
 }
 
 /// Slopes and their effect for one share λ.
@@ -98,17 +115,20 @@ impl SlopeInformation {
         by_slopes: &DMatrix<f64>,
     ) -> Option<ShareEstimate> {
         let n = gradient.len();
-        let deviation = SCATTER * share;
-        let expected = DVector::from_element(n, share);
+        let of_priors = |part: fn(&SlopePrior) -> f64| {
+            DVector::from_iterator(n, self.priors.iter().map(|prior| share * part(prior)))
+        };
+        let deviations = DMatrix::from_diagonal(&of_priors(|prior| prior.deviation));
+        let expected = of_priors(|prior| prior.mean);
         let along = left * &expected;
-        let scaled = left * (deviation * deviation);
+        let scaled = &deviations * left * &deviations;
         let root = Cholesky::new(DMatrix::identity(n, n) + scaled)?;
-        let beyond = (gradient - &along) * deviation;
+        let beyond = &deviations * (gradient - &along);
         let unit = root.solve(&beyond);
         let log_determinant: f64 = 2.0 * root.l_dirty().diagonal().map(f64::ln).sum();
         let by_expected = expected.dot(gradient) - 0.5 * expected.dot(&along);
-        let slopes = expected + &unit * deviation;
-        let scaled_effect = by_slopes * deviation;
+        let slopes = expected + &deviations * &unit;
+        let scaled_effect = by_slopes * &deviations;
         Some(ShareEstimate {
             log_likelihood: by_expected + 0.5 * (beyond.dot(&unit) - log_determinant),
             change: by_slopes * (&self.held_at - &slopes),
@@ -152,6 +172,12 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
+    /// Prior of a slope that scatters by half of the common share about it.
+    const LINE: SlopePrior = SlopePrior {
+        mean: 1.0,
+        deviation: 0.5,
+    };
+
     /// One own parameter and one slope: y = f + s t x with x = ±1 at 100 and 50 samples of unit noise.
     fn line(gradient: f64, tunnel: f64) -> SlopeInformation {
         let scalar = |v: f64| DMatrix::from_element(1, 1, v);
@@ -161,6 +187,7 @@ mod tests {
             slopes: scalar(150.0 * tunnel * tunnel),
             gradient: DVector::from_element(1, gradient * tunnel),
             held_at: DVector::zeros(1),
+            priors: vec![LINE],
         }
     }
 
@@ -203,7 +230,7 @@ mod tests {
         assert_relative_eq!(effect.slopes[0], mean, max_relative = 1e-6);
         let gain = 1e-6 / 150.0;
         assert_relative_eq!(effect.change[0], -gain * mean, max_relative = 1e-6);
-        let variance = gain * gain * (square - mean * mean + SCATTER * SCATTER * square);
+        let variance = gain * gain * (square - mean * mean + LINE.deviation.powi(2) * square);
         assert_relative_eq!(effect.covariance[(0, 0)], variance, max_relative = 1e-6);
     }
 
@@ -218,6 +245,7 @@ mod tests {
                 slopes: DMatrix::from_diagonal(&own),
                 gradient: DVector::from_vec(vec![4e4 * first, 0.0]),
                 held_at: DVector::zeros(2),
+                priors: vec![LINE; 2],
             };
             information.effect().unwrap().slopes
         };

@@ -130,6 +130,8 @@ impl Flown {
         );
         let settings = Settings {
             hold,
+            // An error of the tunnel is the same at all angles of attack.
+            tunnel_error_length_deg: f64::INFINITY,
             ..Settings::default()
         };
         let context = Context::new(&aircraft, &buildup, tunnel, &settings);

@@ -2,6 +2,7 @@
 
 mod absent_outputs;
 mod absent_surfaces;
+mod alpha_slopes;
 mod calibration;
 mod doubt;
 mod evidence;

@@ -1,0 +1,155 @@
+//! Change of the wind tunnel's derivatives over the angles of attack that a maneuver sweeps.
+
+use super::task::Task;
+use crate::aero::{Condition, Derivative, Regressor};
+use crate::numerics::cubic_curve::CubicCurve;
+use crate::numerics::trapezoid::running_integral;
+
+/// Intervals of the swept angles of attack, in each of which the tunnel's change is linear.
+const INTERVALS: usize = 200;
+
+/// Range of a maneuver's angles of attack, deg.
+pub(super) struct AlphaRange {
+    mean: f64,
+    lowest: f64,
+    /// Length of an interval.
+    step: f64,
+    /// Interval of each sample, and the sample's fractional position in it.
+    samples: Vec<(usize, f64)>,
+}
+
+/// Tunnel's derivatives over the angles of attack of a maneuver.
+pub(super) struct TunnelChange<'t, 'a> {
+    pub task: &'t Task<'a>,
+    pub range: &'t AlphaRange,
+}
+
+impl TunnelChange<'_, '_> {
+    /// Change of a derivative's term at the samples, per unit of its regressor; along α itself, change of
+    /// the coefficient. `None` without a table.
+    pub fn at_samples(&self, derivative: &Derivative) -> Option<Vec<f64>> {
+        let change = match derivative.regressor {
+            Regressor::Alpha => self.change_along_alpha(&derivative.name),
+            _ => self.change_from_mean(&derivative.name),
+        };
+        Some(self.range.interpolate_at_samples(&change?))
+    }
+
+    /// Tunnel's change of a derivative, or tabulated sum, from the mean angle of attack to those swept.
+    /// `None` without a table.
+    fn change_from_mean(&self, name: &str) -> Option<Vec<f64>> {
+        let table = self.table(name);
+        let mean = table(self.range.mean)?;
+        let at = |alpha_deg| Some(table(alpha_deg)? - mean);
+        self.range.angles().map(at).collect()
+    }
+
+    /// Tunnel's change of a coefficient beyond that by its slope along α at the mean.
+    fn change_along_alpha(&self, slope: &str) -> Option<Vec<f64>> {
+        let range = self.range;
+        let sums = &self.task.context.buildup.combined;
+        let sum = sums.iter().find(|sum| sum.slope == slope);
+        let Some(curve) = sum.and_then(|sum| self.tabulated_sum(&sum.name, slope)) else {
+            return Some(range.integrate_from_mean(&self.change_from_mean(slope)?));
+        };
+        let (mean, slope) = curve.at(range.mean);
+        let beyond = range.angles().map(|alpha| {
+            let (value, _) = curve.at(alpha);
+            value - mean - slope * (alpha - range.mean)
+        });
+        Some(beyond.collect())
+    }
+
+    /// Tabulated sum over α, with its slope. `None` without both tables.
+    fn tabulated_sum(&self, sum: &str, slope: &str) -> Option<CubicCurve> {
+        let (value, slope_at) = (self.table(sum), self.table(slope));
+        let points = self.task.context.tunnel.alphas_deg(sum).into_iter();
+        let knots = points.map(|alpha| Some((alpha, value(alpha)?, slope_at(alpha)?)));
+        CubicCurve::through(knots.collect::<Option<_>>()?)
+    }
+
+    /// Tunnel's table of a derivative over α in deg, at the maneuver's condition.
+    fn table(&self, name: &str) -> impl Fn(f64) -> Option<f64> {
+        let tunnel = self.task.context.tunnel;
+        let flown = self.task.maneuver.condition(tunnel);
+        let table = tunnel.reader(name);
+        move |alpha_deg| {
+            let condition = Condition { alpha_deg, ..flown };
+            table.as_ref()?.at(&condition).map(|v| v.value)
+        }
+    }
+}
+
+impl AlphaRange {
+    /// Range of the samples' angles, deg.
+    pub fn from_samples(alphas: &[f64]) -> AlphaRange {
+        let mean = alphas.iter().sum::<f64>() / alphas.len().max(1) as f64;
+        let lowest = alphas.iter().copied().fold(mean, f64::min);
+        let highest = alphas.iter().copied().fold(mean, f64::max);
+        let mut range = AlphaRange {
+            mean,
+            lowest,
+            step: ((highest - lowest) / INTERVALS as f64).max(f64::MIN_POSITIVE),
+            samples: vec![],
+        };
+        range.samples = alphas.iter().map(|alpha| range.locate(*alpha)).collect();
+        range
+    }
+
+    /// Angles from the lowest to the highest.
+    fn angles(&self) -> impl Iterator<Item = f64> {
+        (0..=INTERVALS).map(|i| self.lowest + self.step * i as f64)
+    }
+
+    /// Values at the samples of a quantity that is linear between the angles.
+    fn interpolate_at_samples(&self, quantity: &[f64]) -> Vec<f64> {
+        let samples = self.samples.iter();
+        samples.map(|place| interpolate(quantity, *place)).collect()
+    }
+
+    /// Interval of an angle, and the angle's fractional position in it.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "the number of an interval"
+    )]
+    fn locate(&self, alpha: f64) -> (usize, f64) {
+        let place = ((alpha - self.lowest) / self.step).clamp(0.0, INTERVALS as f64);
+        let low = (place as usize).min(INTERVALS - 1);
+        (low, place - low as f64)
+    }
+
+    /// Integral over α from the mean.
+    fn integrate_from_mean(&self, quantity: &[f64]) -> Vec<f64> {
+        let integral = running_integral(quantity, self.step);
+        let at_mean = interpolate(&integral, self.locate(self.mean));
+        integral.iter().map(|value| value - at_mean).collect()
+    }
+}
+
+/// Value of a quantity at a place between two angles.
+fn interpolate(quantity: &[f64], (low, share): (usize, f64)) -> f64 {
+    quantity[low] + share * (quantity[low + 1] - quantity[low])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn a_quantity_is_read_between_the_angles_and_integrated_from_the_mean() {
+        let alphas = [9.9, 12.0, 14.1];
+        let range = AlphaRange::from_samples(&alphas);
+        // t(α) − t(ᾱ) = 3 (α − 12): its integral is 1.5 (α − 12)².
+        let changes: Vec<f64> = range.angles().map(|a| 3.0 * (a - 12.0)).collect();
+        for (value, alpha) in range.interpolate_at_samples(&changes).iter().zip(&alphas) {
+            assert_relative_eq!(*value, 3.0 * (alpha - 12.0), epsilon = 1e-12);
+        }
+        let integral = range.interpolate_at_samples(&range.integrate_from_mean(&changes));
+        for (value, alpha) in integral.iter().zip(&alphas) {
+            assert_relative_eq!(*value, 1.5 * (alpha - 12.0f64).powi(2), epsilon = 1e-3);
+        }
+        assert_relative_eq!(integral[1], 0.0);
+    }
+}
