@@ -5,9 +5,10 @@
 
 use nalgebra::Vector3;
 
-use crate::aero::{Buildup, Coefficient, Derivative, Regressor, WindTunnel};
+use crate::aero::{Buildup, Coefficient, Combined, Derivative, Regressor, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::flight::signal;
+use crate::numerics::cubic_curve::CubicCurve;
 use crate::rigid_body::AirData;
 use crate::units::DEG;
 
@@ -55,14 +56,41 @@ impl Aerodynamics {
     }
 
     /// Values of the derivatives at an angle of attack, deg, and a Mach number.
+    ///
+    /// Between the points of its table a derivative is linear. A sum of constant and slope times α is the cubic through
+    /// its points with the tabulated slopes, so that the slope is the coefficient's derivative along α.
     #[must_use]
     pub fn values(&self, alpha_deg: f64, mach: f64) -> Vec<f64> {
-        let value = |d: &Derivative| {
-            self.truth
-                .value(&d.name, alpha_deg, mach)
-                .map_or(0.0, |v| v.value)
+        let derivatives = &self.buildup.derivatives;
+        let value = |d: &Derivative| self.tabulated(&d.name, alpha_deg, mach);
+        let mut values: Vec<f64> = derivatives.iter().map(value).collect();
+        for sum in &self.buildup.combined {
+            let place = |name: &str| derivatives.iter().position(|d| d.name == name);
+            if let (Some(constant), Some(slope)) = (place(&sum.constant), place(&sum.slope)) {
+                let (at, along) = self.sum(sum, alpha_deg, mach);
+                (values[constant], values[slope]) = (at - along * alpha_deg, along);
+            }
+        }
+        values
+    }
+
+    /// Sum of constant and slope times α, and its derivative along α.
+    fn sum(&self, sum: &Combined, alpha_deg: f64, mach: f64) -> (f64, f64) {
+        let points = self.truth.alphas_deg(&sum.slope);
+        let above = points.partition_point(|point| *point <= alpha_deg);
+        let around = above.saturating_sub(1)..(above + 1).min(points.len());
+        let knot = |alpha: &f64| {
+            let slope = self.tabulated(&sum.slope, *alpha, mach);
+            let constant = self.tabulated(&sum.constant, *alpha, mach);
+            (*alpha, constant + slope * alpha, slope)
         };
-        self.buildup.derivatives.iter().map(value).collect()
+        let curve = CubicCurve::through(points[around].iter().map(knot).collect());
+        curve.map_or((0.0, 0.0), |curve| curve.at(alpha_deg))
+    }
+
+    fn tabulated(&self, name: &str, alpha_deg: f64, mach: f64) -> f64 {
+        let value = self.truth.value(name, alpha_deg, mach);
+        value.map_or(0.0, |v| v.value)
     }
 
     /// True if the loads depend on the rate of the angle of attack.

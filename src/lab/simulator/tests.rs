@@ -208,6 +208,27 @@ fn the_equations_of_simulator_and_estimator_agree_to_twelve_digits() {
 }
 
 #[test]
+fn the_true_slopes_over_alpha_are_the_derivatives_of_the_coefficients() {
+    let campaign = shipped_campaign();
+    let aerodynamics = &campaign.simulator.plant.aerodynamics;
+    let sums = &campaign.config.buildup.combined;
+    assert!(!sums.is_empty());
+    let value = |name: &str, alpha_deg: f64| {
+        let mut derivatives = aerodynamics.derivatives().iter();
+        let place = derivatives.position(|d| d.name == name).unwrap();
+        aerodynamics.values(alpha_deg, 0.4)[place]
+    };
+    for sum in sums {
+        let total = |alpha: f64| value(&sum.constant, alpha) + value(&sum.slope, alpha) * alpha;
+        // At a point of the table, between two, and beyond both ends.
+        for alpha_deg in [20.0, 21.7, 33.1, 3.0, 63.0] {
+            let difference = (total(alpha_deg + 1e-4) - total(alpha_deg - 1e-4)) / 2e-4;
+            assert_relative_eq!(difference, value(&sum.slope, alpha_deg), epsilon = 1e-6);
+        }
+    }
+}
+
+#[test]
 fn every_surface_turns_the_aircraft_in_the_direction_of_its_sign() {
     let campaign = shipped_campaign();
     let settings = campaign.simulator.settings();
