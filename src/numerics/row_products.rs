@@ -151,6 +151,7 @@ impl StridedRows<'_> {
         interleaved: &mut impl Interleaved,
     ) {
         let mut sums = [[simd.splat_f64s(0.0); C]; T];
+        let end = (first + T).max(lane + C * S::F64_LANES);
         let matrix =
             &mut matrix[first * width + lane..(first + T - 1) * width + lane + C * S::F64_LANES];
         for t in 0..T {
@@ -161,7 +162,8 @@ impl StridedRows<'_> {
             if k % ROWS_BETWEEN == 0 {
                 interleaved.advance();
             }
-            let row = &self.values[k * self.stride..];
+            // Rows of one length, so that their bounds are checked once.
+            let row = &self.values[k * self.stride..][..end];
             let mut s = [simd.splat_f64s(0.0); C];
             s.copy_from_slice(S::as_simd_f64s(&row[lane..][..C * S::F64_LANES]).0);
             let factors = &row[first..first + T];

@@ -121,8 +121,8 @@ impl<const NX: usize> Propagators<NX> {
                         m[i][j] = simd.mul_add_f64s(reach, product[i][j], own);
                     }
                 }
-                product = times_a::<S, NX, E>(simd, &m, history, stage, at);
-                self.set_gammas::<S, E>(simd, &m, history, stage, at);
+                product = times_a(simd, &m, history, stage, at);
+                self.set_gammas(simd, &m, history, stage, at);
                 for i in 0..NX {
                     for j in 0..NX {
                         phi[i][j] = simd.add_f64s(phi[i][j], product[i][j]);
@@ -140,7 +140,7 @@ impl<const NX: usize> Propagators<NX> {
 
     /// Computes Γ = M B of a stage.
     #[inline(always)]
-    fn set_gammas<S: Simd, E: Equations<NX>>(
+    fn set_gammas<S: Simd>(
         &mut self,
         simd: S,
         m: &[[S::f64s; NX]; NX],
@@ -150,15 +150,11 @@ impl<const NX: usize> Propagators<NX> {
     ) {
         for k in 0..COEFFICIENTS {
             let mut gamma = [simd.splat_f64s(0.0); NX];
-            for &(l, c) in E::RATES_BY_COEFFICIENT {
-                if c == k {
-                    let b = load::<S>(&history.b[stage][l][c], at);
-                    for i in 0..NX {
-                        gamma[i] = simd.mul_add_f64s(m[i][l], b, gamma[i]);
-                    }
-                }
-            }
             for i in 0..NX {
+                for l in 0..NX {
+                    let b = load::<S>(&history.b[stage][l][k], at);
+                    gamma[i] = simd.mul_add_f64s(m[i][l], b, gamma[i]);
+                }
                 store::<S>(&mut self.gamma[stage][k][i], at, gamma[i]);
             }
         }
@@ -167,7 +163,7 @@ impl<const NX: usize> Propagators<NX> {
 
 /// Product M A of a stage.
 #[inline(always)]
-fn times_a<S: Simd, const NX: usize, E: Equations<NX>>(
+fn times_a<S: Simd, const NX: usize>(
     simd: S,
     m: &[[S::f64s; NX]; NX],
     history: &StageHistory<NX>,
@@ -175,10 +171,12 @@ fn times_a<S: Simd, const NX: usize, E: Equations<NX>>(
     at: usize,
 ) -> [[S::f64s; NX]; NX] {
     let mut product = [[simd.splat_f64s(0.0); NX]; NX];
-    for &(l, j) in E::RATES_BY_STATE {
-        let a = load::<S>(&history.a[stage][l][j], at);
-        for i in 0..NX {
-            product[i][j] = simd.mul_add_f64s(m[i][l], a, product[i][j]);
+    for i in 0..NX {
+        for j in 0..NX {
+            for l in 0..NX {
+                let a = load::<S>(&history.a[stage][l][j], at);
+                product[i][j] = simd.mul_add_f64s(m[i][l], a, product[i][j]);
+            }
         }
     }
     product

@@ -184,8 +184,11 @@ impl<const NX: usize, E: Equations<NX>> Interleaved for Trajectory<'_, NX, E> {
             &rates.by_coefficient,
             E::RATES_BY_COEFFICIENT,
         );
-        for &(i, j) in E::RATES_BY_STATE {
-            history.a[stage][i][j][sample] = a[(i, j)];
+        // All entries: a list of those that can differ from zero would be read from memory.
+        for i in 0..NX {
+            for j in 0..NX {
+                history.a[stage][i][j][sample] = a[(i, j)];
+            }
         }
         if stage + 1 < STAGES {
             let mut at = self.x;
