@@ -1,8 +1,11 @@
 //! Output error from two starting values.
 
+use std::collections::BTreeMap;
+
 use super::settings::Start;
 use super::task::Task;
 use crate::dynamics::Equations;
+use crate::output_error::equation_error::Regression;
 use crate::output_error::{Case, Fit, Outcome, equation_error, estimation};
 
 /// Starting values of a maneuver.
@@ -23,12 +26,28 @@ impl StartingPoints {
         task: &Task,
         case: &Case<NX, E>,
     ) -> Result<Self, String> {
+        Self::from_regression(
+            task,
+            case,
+            &equation_error::regression(case, case, &BTreeMap::new()),
+        )
+    }
+
+    /// Starting values of a maneuver whose equation error is known.
+    ///
+    /// # Errors
+    /// Nothing is free to be estimated.
+    pub fn from_regression<const NX: usize, E: Equations<NX>>(
+        task: &Task,
+        case: &Case<NX, E>,
+        regression: &Regression,
+    ) -> Result<Self, String> {
         if case.parameters() == 0 {
             return Err("nothing is free to be estimated".to_owned());
         }
         let tunnel = start_from_tunnel(task, case);
         Ok(StartingPoints {
-            implied: equation_error::start(case, &tunnel),
+            implied: equation_error::start_from(case, &tunnel, regression),
             tunnel,
         })
     }

@@ -103,10 +103,10 @@ fn estimate<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
     task: &Task,
 ) -> Result<Estimated, String> {
     let prepared = PreparedCase::<NX, E>::new(task, task.class_model()?)?;
-    let starts = StartingPoints::new(task, &prepared.case)?;
-    let (mut fit, start) = fit_output_error(task, &prepared.case, &starts)?;
     let single = SingleEstimation::new(task, prepared);
     let SingleEstimation { prepared, wide, .. } = &single;
+    let starts = StartingPoints::from_regression(task, &prepared.case, &single.second_opinion)?;
+    let (mut fit, start) = fit_output_error(task, &prepared.case, &starts)?;
     let measurements = &prepared.case.measurements;
     if needs_filter(task.context.settings.method, measurements, &fit) {
         match Air::estimate::<NX, E, NG, G>(task, prepared, wide, starts.implied, &fit) {

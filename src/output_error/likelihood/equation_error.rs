@@ -47,8 +47,17 @@ const STILL: f64 = 1e-9;
 /// determine stay near `prior`, as do biases and initial states.
 #[must_use]
 pub fn start<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>, prior: &[f64]) -> Vec<f64> {
+    start_from(case, prior, &regression(case, case, &BTreeMap::new()))
+}
+
+/// Starting values as [`start`] returns them, from a [`regression`] of the case that exists already.
+#[must_use]
+pub fn start_from<const NX: usize, E: Equations<NX>>(
+    case: &Case<NX, E>,
+    prior: &[f64],
+    regression: &Regression,
+) -> Vec<f64> {
     let mut values = prior.to_vec();
-    let regression = regression(case, case, &BTreeMap::new());
     for k in 0..COEFFICIENTS {
         let range = case.ranges[k].clone();
         if !is_measured(case, k) {
