@@ -80,19 +80,18 @@ impl<const NX: usize> Linearised<NX> {
         let held = case.held.at(2 * sample);
         let mut whole = unit.still;
         for (k, value) in held.coefficients(x).into_iter().enumerate() {
-            whole.add(&unit.along_coefficient(k), value);
+            whole.add(&unit.changes[k], value);
             for i in 0..NX {
-                whole.add(&unit.through_coefficient(k, i), held.slope[k][i]);
+                unit.add_through_coefficient(k, i, held.slope[k][i], &mut whole);
             }
         }
         self.held.add(&whole, share);
         for (term, sum) in case.terms.iter().zip(&mut self.free) {
             let column = case.columns[term.column][2 * sample];
             let regressor = column * term.state.map_or(1.0, |i| x[i]);
-            sum.add(&unit.along_coefficient(term.coefficient), share * regressor);
+            sum.add(&unit.changes[term.coefficient], share * regressor);
             if let Some(state) = term.state {
-                let through = unit.through_coefficient(term.coefficient, state);
-                sum.add(&through, share * column);
+                unit.add_through_coefficient(term.coefficient, state, share * column, sum);
             }
         }
     }
@@ -143,7 +142,7 @@ impl<const NX: usize> DiscreteSystem<'_, NX> {
 struct UnitSlopes<const NX: usize> {
     /// Slopes at zero coefficients.
     still: StateSlopes<NX>,
-    /// Changes of the slopes at constant coefficients, per unit of each coefficient.
+    /// Changes of the slopes per unit of each coefficient that does not depend on the state.
     changes: [StateSlopes<NX>; COEFFICIENTS],
     rates: SMatrix<f64, NX, COEFFICIENTS>,
     outputs: SMatrix<f64, OUTPUTS, COEFFICIENTS>,
@@ -175,23 +174,20 @@ impl<const NX: usize> UnitSlopes<NX> {
         }
     }
 
-    /// Slopes per unit of a coefficient that does not depend on the state.
-    fn along_coefficient(&self, k: usize) -> StateSlopes<NX> {
-        self.changes[k]
-    }
-
-    /// Slopes per unit of a coefficient's slope along a state.
-    fn through_coefficient(&self, k: usize, state: usize) -> StateSlopes<NX> {
-        let mut slopes = StateSlopes::<NX>::zeros();
-        slopes
-            .rates
-            .column_mut(state)
-            .copy_from(&self.rates.column(k));
-        slopes
-            .outputs
-            .column_mut(state)
-            .copy_from(&self.outputs.column(k));
-        slopes
+    /// Adds the slopes by a coefficient's slope along a state: one column.
+    fn add_through_coefficient(
+        &self,
+        k: usize,
+        state: usize,
+        slope: f64,
+        sum: &mut StateSlopes<NX>,
+    ) {
+        for i in 0..NX {
+            sum.rates[(i, state)] += self.rates[(i, k)] * slope;
+        }
+        for o in 0..OUTPUTS {
+            sum.outputs[(o, state)] += self.outputs[(o, k)] * slope;
+        }
     }
 }
 

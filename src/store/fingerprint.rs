@@ -61,7 +61,7 @@ impl Digest {
     /// The reader fails.
     pub fn of(reader: &mut impl Read) -> std::io::Result<Digest> {
         let mut hasher = blake3::Hasher::new();
-        let mut buffer = vec![0; 1 << 20];
+        let mut buffer = vec![0; 1 << 16];
         loop {
             let n = reader.read(&mut buffer)?;
             if n == 0 {
