@@ -138,14 +138,14 @@ impl Scored {
         information: &DMatrix<f64>,
         damping: &mut f64,
     ) -> bool {
-        let mut failed = false;
+        // A damped step may fail: its cost alone is cheap.
+        let mut may_fail = *damping > 0.0;
         while *damping < MOST_DAMPING {
             if let Some(step) = step(information, gradient, *damping) {
                 let next =
                     stepped_parameters(&self.parameters, &step, floors, filter.first_noise());
                 let lowers = |response: &JointResponse| response.cost < self.response.cost;
-                // A step after one that failed may fail as well: its cost alone is cheap.
-                let may_lower = !failed || filter.innovations(&next).is_ok_and(|r| lowers(&r));
+                let may_lower = !may_fail || filter.innovations(&next).is_ok_and(|r| lowers(&r));
                 if may_lower
                     && let Ok(response) = filter.respond(&next)
                     && lowers(&response)
@@ -157,7 +157,7 @@ impl Scored {
                     return true;
                 }
             }
-            failed = true;
+            may_fail = true;
             *damping = (*damping * 10.0).max(FIRST_DAMPING);
         }
         false
