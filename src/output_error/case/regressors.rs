@@ -195,9 +195,7 @@ impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
     fn state_factor(&self, regressor: &Regressor) -> Vec<f64> {
         let velocity = self.window.signal(signal::VELOCITY).iter();
         let factor = |v: &f64| E::state_regressor(self.aircraft, *v, regressor);
-        velocity
-            .map(|v| factor(v).map_or(0.0, |(_, factor)| factor))
-            .collect()
+        column_of(velocity.map(|v| factor(v).map_or(0.0, |(_, factor)| factor)))
     }
 
     /// Measured values of a regressor at every point; a vane's values are in deg.
@@ -208,10 +206,12 @@ impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
             Regressor::PitchRate => self.reduced_rate(signal::Q, aircraft.chord_ft),
             Regressor::YawRate => self.reduced_rate(signal::R, aircraft.span_ft),
             Regressor::AlphaRate => self.reduced_alpha_rate(),
-            Regressor::Constant => vec![1.0; self.window.len()],
-            Regressor::Alpha => motion.flow.iter().map(|[alpha, _]| alpha * DEG).collect(),
-            Regressor::Beta => motion.flow.iter().map(|[_, beta]| beta * DEG).collect(),
-            Regressor::Surface(name) | Regressor::Vane(name) => self.window.signal(name).to_vec(),
+            Regressor::Constant => column_of((0..self.window.len()).map(|_| 1.0)),
+            Regressor::Alpha => column_of(motion.flow.iter().map(|[alpha, _]| alpha * DEG)),
+            Regressor::Beta => column_of(motion.flow.iter().map(|[_, beta]| beta * DEG)),
+            Regressor::Surface(name) | Regressor::Vane(name) => {
+                column_of(self.window.signal(name).iter().copied())
+            }
             Regressor::Magnitude(of) => {
                 let values = self.measured(of, motion);
                 values.into_iter().map(f64::abs).collect()
@@ -236,9 +236,15 @@ impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
     fn reduced_rate(&self, rate: &str, length_ft: f64) -> Vec<f64> {
         let rate = self.window.signal(rate).iter();
         let both = rate.zip(self.window.signal(signal::VELOCITY));
-        both.map(|(rate, v)| rate / DEG * length_ft / (2.0 * v))
-            .collect()
+        column_of(both.map(|(rate, v)| rate / DEG * length_ft / (2.0 * v)))
     }
+}
+
+/// Values with room for the zero points that follow them.
+fn column_of(values: impl ExactSizeIterator<Item = f64>) -> Vec<f64> {
+    let mut column = Vec::with_capacity(values.len() + ZERO_POINTS);
+    column.extend(values);
+    column
 }
 
 fn product(mut first: Vec<f64>, second: &[f64]) -> Vec<f64> {
