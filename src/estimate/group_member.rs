@@ -11,8 +11,9 @@ use super::task::{Task, values_by_name};
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
 use crate::filter_error::bounds::WidePass;
 use crate::filter_error::filter::Filter;
+use crate::filter_error::misread::Recorded;
 use crate::output_error::calibration_errors::Misreading;
-use crate::output_error::{Case, Diverged, Measurements, Model, equation_error};
+use crate::output_error::{Case, Diverged, Model, equation_error};
 
 /// Maneuver of a group.
 pub(super) struct GroupMember<'g, 'a, const NX: usize, E: Equations<NX>> {
@@ -99,14 +100,12 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
         parameters: &[f64],
     ) -> Result<Vec<DVector<f64>>, Diverged> {
         let model = self.model_with_slopes(held);
-        let window = &self.slopes.window;
-        let cases = errors.iter().map(|error| {
-            let misread_window = error.of_window(window);
-            let measured = misread(&self.prepared.case, error);
-            let windows = [window, &misread_window];
-            filter.as_recorded(self.task.context.aircraft, windows, measured, &model)
-        });
-        filter.gradient_shifts(parameters, cases)
+        let recorded = Recorded {
+            aircraft: self.task.context.aircraft,
+            window: &self.slopes.window,
+            model: &model,
+        };
+        filter.gradient_shifts(parameters, &recorded, errors)
     }
 
     /// Starting values by equation error with the slopes held.
@@ -124,19 +123,4 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
         };
         (!held.is_constant()).then(|| regression(&self.case_with(&all_free(&model))))
     }
-}
-
-/// Measurements as an instrument in error would have recorded them.
-fn misread<const NX: usize, E: Equations<NX>>(
-    case: &Case<NX, E>,
-    error: &Misreading,
-) -> Measurements {
-    let mut measured = case.measurements.clone();
-    let outputs = E::AXIS.outputs();
-    if let Some(o) = outputs.iter().position(|o| o.signal() == error.signal) {
-        for values in &mut measured.values {
-            values[o] += error.scale * values[o] + error.bias;
-        }
-    }
-    measured
 }

@@ -7,7 +7,7 @@
 
 use std::marker::PhantomData;
 
-use nalgebra::{DVector, SVector};
+use nalgebra::SVector;
 use pulp::Arch;
 
 use super::gains::{Pattern, PatternGain, patterns};
@@ -15,9 +15,7 @@ use super::gains_at::GainsAt;
 use super::input_noise::InputNoise;
 use super::linearised::Linearised;
 use super::noise::{Noise, NoiseParameter, NoisePrior};
-use super::pass::{
-    Corrections, FilterPass, LaneBlocks, LaneGain, PassOutputs, RecordedRows, RowSink,
-};
+use super::pass::{Corrections, FilterPass, LaneBlocks, LaneGain, PassOutputs, RowSink};
 use super::response::FilterResponse;
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
@@ -220,7 +218,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         Ok(response.predicted)
     }
 
-    fn run<K: RowSink>(
+    pub(super) fn run<K: RowSink<NX>>(
         &self,
         parameters: &[f64],
         gains: &[PatternGain<NX>],
@@ -232,7 +230,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     }
 
     /// Runs a pass on a case of the same maneuver, whose instruments may be in error.
-    fn run_on<K: RowSink>(
+    pub(super) fn run_on<K: RowSink<NX>>(
         &self,
         case: &Case<NX, E>,
         parameters: &[f64],
@@ -256,7 +254,11 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         })
     }
 
-    fn corrections(&self, parameters: &[f64], gains: &[PatternGain<NX>]) -> Corrections<'_, NX> {
+    pub(super) fn corrections(
+        &self,
+        parameters: &[f64],
+        gains: &[PatternGain<NX>],
+    ) -> Corrections<'_, NX> {
         let noise = self.noise(parameters);
         let lane_gain = |gain: &PatternGain<NX>| LaneGain::new(gain, &self.layout);
         Corrections {
@@ -270,61 +272,6 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         }
     }
 
-    /// Changes of the gradient of the filter's own parameters when the maneuver is recorded as in
-    /// each of these cases, at the same gain.
-    ///
-    /// # Errors
-    /// [`Diverged`] when the state of a case leaves its bounds.
-    pub fn gradient_shifts(
-        &self,
-        parameters: &[f64],
-        cases: impl Iterator<Item = Case<NX, E>>,
-    ) -> Result<Vec<DVector<f64>>, Diverged> {
-        let gains = self.gains(parameters)?;
-        let corrections = self.corrections(parameters, &gains);
-        let mut rows = RecordedRows::new(self.samples(), self.layout.width());
-        let (mut exact, mut misread) = (
-            FilterResponse::empty(self.samples(), self.parameters()),
-            FilterResponse::empty(self.samples(), self.parameters()),
-        );
-        self.run_on(
-            &self.case,
-            parameters,
-            &corrections,
-            &mut exact,
-            Some(&mut rows),
-        )?;
-        let mut shifts = Vec::new();
-        for case in cases {
-            let no_rows = None::<&mut RecordedRows>;
-            self.run_on(&case, parameters, &corrections, &mut misread, no_rows)?;
-            for (u, exact) in misread.whitened.iter_mut().zip(&exact.whitened) {
-                for o in 0..OUTPUTS {
-                    u[o] -= exact[o];
-                }
-            }
-            let lanes = rows.weighted_sum(&misread.whitened);
-            let own = (0..self.first_noise()).map(|j| lanes[self.lane(j)]);
-            shifts.push(DVector::from_iterator(self.first_noise(), own));
-        }
-        Ok(shifts)
-    }
-
-    /// Case of this maneuver as other instruments would have recorded it. `windows` are the window
-    /// of this filter and the window that the other instruments recorded.
-    #[must_use]
-    pub fn as_recorded(
-        &self,
-        aircraft: &Aircraft,
-        windows: [&Window; 2],
-        measurements: Measurements,
-        model: &Model,
-    ) -> Case<NX, E> {
-        let model = without_own(model);
-        self.case
-            .as_recorded(aircraft, windows, measurements, &model)
-    }
-
     pub(super) fn biases(&self, parameters: &[f64]) -> [f64; OUTPUTS] {
         let mut biases = [0.0; OUTPUTS];
         let values = &parameters[self.case.derivatives()..];
@@ -334,8 +281,18 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         biases
     }
 
+    /// Number of lanes.
+    pub(super) fn lanes(&self) -> usize {
+        self.layout.width()
+    }
+
+    /// Patterns of outputs that count, and the pattern of each sample.
+    pub(super) fn patterns(&self) -> (&[Pattern], &[u8]) {
+        (&self.patterns, &self.pattern_of)
+    }
+
     /// Lane of a parameter.
-    fn lane(&self, parameter: usize) -> usize {
+    pub(super) fn lane(&self, parameter: usize) -> usize {
         self.layout.parameter_lanes[parameter]
     }
 
@@ -388,7 +345,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     }
 
     /// Gains of all patterns with their slopes.
-    fn gains(&self, parameters: &[f64]) -> Result<Vec<PatternGain<NX>>, Diverged> {
+    pub(super) fn gains(&self, parameters: &[f64]) -> Result<Vec<PatternGain<NX>>, Diverged> {
         self.gains_at(parameters, true)
     }
 

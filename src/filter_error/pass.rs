@@ -15,11 +15,12 @@
     reason = "plain indices become straight code for the vectors"
 )]
 
-use nalgebra::SVector;
-use pulp::{Arch, Simd, WithSimd};
+use nalgebra::{SMatrix, SVector};
+use pulp::{Simd, WithSimd};
 
 use super::gains::{Gain, Outputs, Pattern, PatternGain};
 use crate::dynamics::{InGusts, OUTPUTS};
+use crate::numerics::matrix::AlignedMatrix;
 use crate::numerics::row_products::Idle;
 use crate::numerics::simd::{AlignedBuffer, VECTOR, load};
 use crate::output_error::case::Case;
@@ -131,8 +132,11 @@ pub(super) struct PassOutputs<'a> {
     pub whitened: &'a mut [[f64; OUTPUTS]],
 }
 
-/// Consumer of the rows of whitened sensitivities.
-pub(super) trait RowSink {
+/// Consumer of the steps and of the rows of whitened sensitivities.
+pub(super) trait RowSink<const NX: usize> {
+    /// Takes the steps of some samples of a chunk, before their rows.
+    fn take_steps(&mut self, history: &StageHistory<NX>, steps: &Propagators<NX>, samples: usize);
+
     /// Takes the rows of a chunk that begins at the sample `first`: sample by sample, output by
     /// output. `white` has the whitened innovations, and `used` the outputs that count.
     fn take<'a, S: Simd>(
@@ -145,7 +149,10 @@ pub(super) trait RowSink {
     );
 }
 
-impl RowSink for NormalSums {
+impl<const NX: usize> RowSink<NX> for NormalSums {
+    #[inline(always)]
+    fn take_steps(&mut self, _: &StageHistory<NX>, _: &Propagators<NX>, _: usize) {}
+
     #[inline(always)]
     fn take<'a, S: Simd>(
         &mut self,
@@ -161,62 +168,55 @@ impl RowSink for NormalSums {
     }
 }
 
-/// Rows of all samples; zero where an output does not count.
-pub(super) struct RecordedRows {
-    rows: AlignedBuffer,
-    width: usize,
+/// One step of a filter along its own trajectory.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RecordedStep<const NX: usize> {
+    /// Corrected state, from which the step begins.
+    pub corrected: SVector<f64, NX>,
+    /// Matrix Φ: change of the next predicted state with the corrected one.
+    pub transition: SMatrix<f64, NX, NX>,
+    /// Matrix C: change of the outputs with the predicted state.
+    pub outputs: SMatrix<f64, OUTPUTS, NX>,
 }
 
-impl RecordedRows {
+/// Steps and rows of all samples of a pass.
+pub(super) struct RecordedPass<const NX: usize> {
+    pub steps: Vec<RecordedStep<NX>>,
+    /// Whitened sensitivities in the lanes of the parameters: sample by sample, output by output;
+    /// zero where an output does not count.
+    pub rows: AlignedMatrix,
+}
+
+impl<const NX: usize> RecordedPass<NX> {
     pub fn new(samples: usize, width: usize) -> Self {
-        RecordedRows {
-            rows: AlignedBuffer::zeros(samples * OUTPUTS * width),
-            width,
+        RecordedPass {
+            steps: Vec::with_capacity(samples),
+            rows: AlignedMatrix::zeros(samples * OUTPUTS, width),
         }
     }
-
-    /// Sum Σ s u of the sensitivities s times the values u, over all samples and outputs, lane by
-    /// lane.
-    pub fn weighted_sum(&self, values: &[[f64; OUTPUTS]]) -> Vec<f64> {
-        Arch::new().dispatch(WeightedSum {
-            rows: self,
-            weights: values.as_flattened(),
-        })
-    }
 }
 
-/// Weighted sum of rows, some vectors of all rows at a time.
-struct WeightedSum<'a> {
-    rows: &'a RecordedRows,
-    weights: &'a [f64],
-}
-
-impl WithSimd for WeightedSum<'_> {
-    type Output = Vec<f64>;
-
+impl<const NX: usize> RowSink<NX> for RecordedPass<NX> {
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Vec<f64> {
-        let width = self.rows.width;
-        let mut sum = vec![0.0; width];
-        for (block, sum) in sum.chunks_exact_mut(VECTOR).enumerate() {
-            let mut partial = [simd.splat_f64s(0.0); VECTOR];
-            let vectors = VECTOR / S::F64_LANES;
-            let rows = self.rows.rows.slice().chunks_exact(width);
-            for (row, weight) in rows.zip(self.weights) {
-                let row = S::as_simd_f64s(&row[block * VECTOR..][..VECTOR]).0;
-                let weight = simd.splat_f64s(*weight);
-                for v in 0..vectors {
-                    partial[v] = simd.mul_add_f64s(row[v], weight, partial[v]);
+    fn take_steps(&mut self, history: &StageHistory<NX>, steps: &Propagators<NX>, samples: usize) {
+        for k in 0..samples {
+            let mut step = RecordedStep {
+                corrected: history.states[k],
+                transition: SMatrix::zeros(),
+                outputs: SMatrix::zeros(),
+            };
+            for j in 0..NX {
+                for i in 0..NX {
+                    step.transition[(i, j)] = steps.phi[i][j][k];
+                }
+                for o in 0..OUTPUTS {
+                    step.outputs[(o, j)] = steps.c[o][j][k];
                 }
             }
-            let sum = S::as_mut_simd_f64s(sum).0;
-            sum.copy_from_slice(&partial[..vectors]);
+            self.steps.push(step);
         }
-        sum
     }
-}
 
-impl RowSink for RecordedRows {
     #[inline(always)]
     fn take<'a, S: Simd>(
         &mut self,
@@ -226,11 +226,11 @@ impl RowSink for RecordedRows {
         used: impl Fn(usize) -> &'a [bool; OUTPUTS],
         rows: &mut [f64],
     ) {
-        let width = self.width;
+        let width = self.rows.width();
         for k in 0..white.len() {
             for o in (0..OUTPUTS).filter(|o| used(k)[*o]) {
                 let (from, to) = (k * OUTPUTS + o, (first + k) * OUTPUTS + o);
-                self.rows.slice_mut()[to * width..][..width]
+                self.rows.values_mut()[to * width..][..width]
                     .copy_from_slice(&rows[from * width..][..width]);
             }
         }
@@ -238,7 +238,7 @@ impl RowSink for RecordedRows {
 }
 
 /// One pass; without a sink no sensitivities are computed.
-pub(super) struct FilterPass<'a, const NX: usize, E: InGusts<NX>, K: RowSink> {
+pub(super) struct FilterPass<'a, const NX: usize, E: InGusts<NX>, K: RowSink<NX>> {
     pub case: &'a Case<NX, E>,
     pub layout: &'a LaneLayout,
     pub terms: Vec<ValuedTerm>,
@@ -377,7 +377,7 @@ impl<'a, const NX: usize, E: InGusts<NX>> ChunkCorrections<'a, NX, E> {
     }
 }
 
-impl<const NX: usize, E: InGusts<NX>, K: RowSink> WithSimd for FilterPass<'_, NX, E, K> {
+impl<const NX: usize, E: InGusts<NX>, K: RowSink<NX>> WithSimd for FilterPass<'_, NX, E, K> {
     type Output = Result<(), Diverged>;
 
     #[inline(always)]
@@ -434,6 +434,7 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink> WithSimd for FilterPass<'_, NX
                 continue;
             };
             propagators.set_steps::<S, E>(simd, &history, count, case.step_s);
+            sink.take_steps(&history, &propagators, count);
             fill_regressor_rows(case, layout, points, regressors);
             let mut propagation = Propagation {
                 simd,

@@ -49,6 +49,8 @@ pub struct Window {
     flow: Arc<Vec<[f64; 2]>>,
     pub step_s: f64,
     pub samples: usize,
+    /// Two, or one in a window without the points between samples.
+    points_per_sample: usize,
 }
 
 impl Window {
@@ -86,6 +88,7 @@ impl Window {
             flow: Arc::default(),
             step_s: record.step_s,
             samples: range.len(),
+            points_per_sample: 2,
         };
         window.flow = Arc::new(window.flow_at_cg());
         Ok(window)
@@ -108,10 +111,45 @@ impl Window {
         }
     }
 
-    /// Number of points: samples and the halves between them.
+    /// Number of points: samples, and the halves between them unless they are left out.
     #[must_use]
     pub fn len(&self) -> usize {
-        (2 * self.samples).saturating_sub(1)
+        let per_sample = self.points_per_sample;
+        (per_sample * self.samples).saturating_sub(per_sample - 1)
+    }
+
+    /// Returns true if a point is a sample.
+    #[must_use]
+    pub fn is_sample(&self, point: usize) -> bool {
+        point.is_multiple_of(self.points_per_sample)
+    }
+
+    /// Window with the samples of a signal from another window of the maneuver.
+    #[must_use]
+    pub fn with_samples_of(&self, name: &str, other: &Window) -> Window {
+        let mut window = self.clone();
+        if let Some(points) = other.points.get(name) {
+            let stride = other.points_per_sample / self.points_per_sample;
+            window.set(name, points.iter().step_by(stride).copied().collect());
+        }
+        window
+    }
+
+    /// Window without the points between samples, for equations at the samples alone.
+    #[must_use]
+    pub fn at_samples(&self) -> Window {
+        let stride = self.points_per_sample;
+        let every = |points: &Vec<f64>| points.iter().step_by(stride).copied().collect();
+        let points = self.points.iter();
+        Window {
+            points: points
+                .map(|(name, points)| (name.clone(), Arc::new(every(points))))
+                .collect(),
+            sensors: self.sensors.clone(),
+            flow: Arc::new(self.flow.iter().step_by(stride).copied().collect()),
+            points_per_sample: 1,
+            ..*self
+        }
     }
 
     #[must_use]
@@ -159,8 +197,9 @@ impl Window {
     pub fn late(&self, name: &str, delay_s: f64) -> Window {
         let mut window = self.clone();
         if let Some(points) = self.points.get(name) {
-            // Points lie half a step apart.
-            let per_difference = delay_s / self.step_s;
+            // Time between the points on either side of a point.
+            let between_s = 2.0 * self.step_s / self.points_per_sample as f64;
+            let per_difference = delay_s / between_s;
             let last = points.len().saturating_sub(1);
             let value = |(i, value): (usize, &f64)| {
                 let difference = points[(i + 1).min(last)] - points[i.saturating_sub(1)];

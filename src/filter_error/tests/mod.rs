@@ -2,6 +2,7 @@
 
 mod inputs;
 mod joint;
+mod misread;
 
 use std::collections::BTreeMap;
 

@@ -93,12 +93,12 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Preparation<'_, NX, E> {
             let motion = measured.at(point);
             let inputs = E::rate_inputs(aircraft, &motion);
             prepared.flow.push([motion.alpha, motion.beta]);
-            if point % 2 == 0 {
+            if window.is_sample(point) {
                 let sensors = E::sensor_inputs(aircraft, &motion);
                 prepared.sensor_inputs.push(sensors);
                 prepared.states.push(E::measured_state(&motion));
             }
-            if with_implied && point % 2 == 0 {
+            if with_implied && window.is_sample(point) {
                 let implied = E::implied_coefficients(aircraft, &motion, &inputs);
                 prepared.implied.push(implied);
                 let rest = measured.without_angular_accelerations(point);
