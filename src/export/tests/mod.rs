@@ -14,7 +14,9 @@ use nalgebra::Vector3;
 use super::export_table::{ExportTable, is_same_breakpoint};
 use super::*;
 use crate::aero::wind_tunnel::TunnelPoint;
-use crate::aero::{Coefficient, Condition, Derivative, Regressor, WindTunnel, wind_tunnel};
+use crate::aero::{
+    Buildup, Coefficient, Condition, Derivative, Regressor, WindTunnel, wind_tunnel,
+};
 use crate::config::{Config, Overrides};
 use crate::export::jsbsim::section as section_of;
 use crate::lab::simulator::aerodynamics::Aerodynamics;
@@ -378,8 +380,13 @@ fn the_jsbsim_section_gives_the_forces_and_moments_of_the_build_up() {
     surfaces.dedup();
     let deflections: Vec<f64> = (0..surfaces.len()).map(|i| 3.0 - 1.1 * i as f64).collect();
     let names: Vec<String> = surfaces.iter().map(|s| format!("harvest/{s}")).collect();
+    // JSBSim reads constant and slope linearly and apart.
+    let buildup = Buildup {
+        combined: vec![],
+        ..contents.buildup.clone()
+    };
     let truth = Aerodynamics::new(
-        contents.buildup,
+        &buildup,
         database(&tables, &wind_tunnel::Settings::default()),
         &surfaces,
     )
