@@ -3,7 +3,6 @@
 use super::*;
 use crate::aero::wind_tunnel::TunnelPoint;
 use crate::filter_error::tests::{plain_outputs, plain_step};
-use crate::output_error::tests::nothing_measured;
 use crate::units::DEG;
 
 /// Deflection of the stabilator about which it moves, deg.
@@ -38,16 +37,7 @@ fn flown_with_changing_derivative(bench: &Bench, seed: u64, vane_noise_deg: f64)
     for value in &mut record.signals.get_mut("de_deg").unwrap().values {
         *value = TRIM_DEG + LARGER * *value;
     }
-    let truth = truth(bench.class.axis);
-    let model = Model {
-        free: truth.iter().map(|(d, _)| d).collect(),
-        ..Model::default()
-    };
-    let surfaces = ["de_deg", "dpv_deg"];
-    let recorded = MassProperties::Recorded;
-    let window = Window::cut(&bench.aircraft, &record, 0..SAMPLES, surfaces, recorded).unwrap();
-    let case = Case::<3, Longitudinal>::new(&bench.aircraft, &window, nothing_measured(), &model);
-    let values: BTreeMap<&str, f64> = truth.iter().map(|(d, v)| (d.name.as_str(), *v)).collect();
+    let (case, values) = bench.true_case(&record);
     let mut own = case.starting_values(|name| match name {
         "CN_0" | "Cm_0" => values[name] - TRIM_DEG * values[name.replace('0', "de").as_str()],
         _ => values[name],

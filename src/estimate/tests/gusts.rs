@@ -25,17 +25,7 @@ fn bench_in_gusts(method: Method) -> Bench {
 /// Record of [`Bench::flown`] in air whose angle is a random walk.
 fn flown_in_gusts(bench: &Bench, seed: u64, factor: f64) -> Record {
     let mut record = bench.flown(seed, factor, 0.0);
-    let truth = truth(bench.class.axis);
-    let model = Model {
-        free: truth.iter().map(|(d, _)| d).collect(),
-        ..Model::default()
-    };
-    let surfaces = ["de_deg", "dpv_deg"];
-    let recorded = MassProperties::Recorded;
-    let window = Window::cut(&bench.aircraft, &record, 0..SAMPLES, surfaces, recorded).unwrap();
-    let nothing = crate::output_error::tests::nothing_measured();
-    let case = Case::<3, Longitudinal>::new(&bench.aircraft, &window, nothing, &model);
-    let values: BTreeMap<&str, f64> = truth.iter().map(|(d, v)| (d.name.as_str(), *v)).collect();
+    let (case, values) = bench.true_case(&record);
     let own = case.starting_values(|n| values[n] * if n == "Cm_de" { factor } else { 1.0 });
     let mut noise = Noise(seed);
     let mut x = case.start;

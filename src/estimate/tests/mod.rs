@@ -25,8 +25,8 @@ use crate::dynamics::{Longitudinal, OUTPUTS};
 use crate::flight::record::Series;
 use crate::flight::{Mark, Record, signal};
 use crate::maneuver::{Class, Maneuver, Recognition, Status};
-use crate::output_error::tests::{NOISE, Noise, SAMPLES, TABLE, record, truth};
-use crate::output_error::{Case, InitialState, Measurements, Model};
+use crate::output_error::tests::{NOISE, Noise, SAMPLES, TABLE, nothing_measured, record, truth};
+use crate::output_error::{Case, InitialState, Model};
 use crate::tables::{EstimateRow, FitRow, Outcome, Participation, PredictionStatus};
 
 /// The aircraft, model, class and settings of the tests.
@@ -83,6 +83,21 @@ impl Bench {
         Context::new(aircraft, buildup, tunnel, settings)
     }
 
+    /// Case of a record in which the true derivatives are free, with their values.
+    fn true_case(&self, record: &Record) -> (Case<3, Longitudinal>, BTreeMap<String, f64>) {
+        let truth = truth(self.class.axis);
+        let model = Model {
+            free: truth.iter().map(|(d, _)| d).collect(),
+            ..Model::default()
+        };
+        let surfaces = ["de_deg", "dpv_deg"];
+        let recorded = MassProperties::Recorded;
+        let window = Window::cut(&self.aircraft, record, 0..SAMPLES, surfaces, recorded).unwrap();
+        let case = Case::new(&self.aircraft, &window, nothing_measured(), &model);
+        let values = truth.iter().map(|(d, value)| (d.name.clone(), *value));
+        (case, values.collect())
+    }
+
     /// A record whose outputs are the response to the true derivatives times `factor`, with noise
     /// and a bias of an.
     fn flown(&self, seed: u64, factor: f64, an_bias_g: f64) -> Record {
@@ -98,27 +113,7 @@ impl Bench {
         correlation: f64,
     ) -> Record {
         let mut record = record();
-        let truth = truth(self.class.axis);
-        let model = Model {
-            free: truth.iter().map(|(d, _)| d).collect(),
-            ..Model::default()
-        };
-        let surfaces = ["de_deg", "dpv_deg"];
-        let window = Window::cut(
-            &aircraft(),
-            &record,
-            0..SAMPLES,
-            surfaces,
-            MassProperties::Recorded,
-        )
-        .unwrap();
-        let nothing = Measurements {
-            values: vec![[0.0; OUTPUTS]; SAMPLES],
-            used: vec![[true; OUTPUTS]; SAMPLES],
-        };
-        let case = Case::<3, Longitudinal>::new(&self.aircraft, &window, nothing, &model);
-        let values: BTreeMap<&str, f64> =
-            truth.iter().map(|(d, v)| (d.name.as_str(), *v)).collect();
+        let (case, values) = self.true_case(&record);
         let mut response = case.response();
         case.respond(
             &case.starting_values(|n| values[n] * if n == "Cm_de" { factor } else { 1.0 }),
