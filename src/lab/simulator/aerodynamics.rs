@@ -19,6 +19,16 @@ pub struct Aerodynamics {
     /// Names of the simulated surfaces.
     surfaces: Vec<String>,
     truth: WindTunnel,
+    sums: Vec<TabulatedSum>,
+}
+
+/// Sum of constant and slope times α: places of both among the derivatives, and angles of attack of the slope's
+/// table, deg.
+#[derive(Clone, Debug)]
+struct TabulatedSum {
+    constant: usize,
+    slope: usize,
+    alphas_deg: Vec<f64>,
 }
 
 impl Aerodynamics {
@@ -42,9 +52,18 @@ impl Aerodynamics {
                 return Err(format!("{}: `surfaces` has no `{name}`", derivative.name));
             }
         }
+        let place = |name: &str| buildup.derivatives.iter().position(|d| d.name == name);
+        let sum = |sum: &Combined| {
+            Some(TabulatedSum {
+                constant: place(&sum.constant)?,
+                slope: place(&sum.slope)?,
+                alphas_deg: truth.alphas_deg(&sum.slope),
+            })
+        };
         Ok(Aerodynamics {
             buildup: buildup.clone(),
             surfaces: surfaces.to_vec(),
+            sums: buildup.combined.iter().filter_map(sum).collect(),
             truth,
         })
     }
@@ -61,34 +80,32 @@ impl Aerodynamics {
     /// its points with the tabulated slopes, so that the slope is the coefficient's derivative along α.
     #[must_use]
     pub fn values(&self, alpha_deg: f64, mach: f64) -> Vec<f64> {
-        let derivatives = &self.buildup.derivatives;
-        let value = |d: &Derivative| self.tabulated(&d.name, alpha_deg, mach);
-        let mut values: Vec<f64> = derivatives.iter().map(value).collect();
-        for sum in &self.buildup.combined {
-            let place = |name: &str| derivatives.iter().position(|d| d.name == name);
-            if let (Some(constant), Some(slope)) = (place(&sum.constant), place(&sum.slope)) {
-                let (at, along) = self.sum(sum, alpha_deg, mach);
-                (values[constant], values[slope]) = (at - along * alpha_deg, along);
-            }
+        let places = 0..self.buildup.derivatives.len();
+        let mut values: Vec<f64> = places.map(|i| self.tabulated(i, alpha_deg, mach)).collect();
+        for sum in &self.sums {
+            let (at, along) = self.sum(sum, alpha_deg, mach);
+            (values[sum.constant], values[sum.slope]) = (at - along * alpha_deg, along);
         }
         values
     }
 
     /// Sum of constant and slope times α, and its derivative along α.
-    fn sum(&self, sum: &Combined, alpha_deg: f64, mach: f64) -> (f64, f64) {
-        let points = self.truth.alphas_deg(&sum.slope);
+    fn sum(&self, sum: &TabulatedSum, alpha_deg: f64, mach: f64) -> (f64, f64) {
+        let points = &sum.alphas_deg;
         let above = points.partition_point(|point| *point <= alpha_deg);
         let around = above.saturating_sub(1)..(above + 1).min(points.len());
         let knot = |alpha: &f64| {
-            let slope = self.tabulated(&sum.slope, *alpha, mach);
-            let constant = self.tabulated(&sum.constant, *alpha, mach);
+            let slope = self.tabulated(sum.slope, *alpha, mach);
+            let constant = self.tabulated(sum.constant, *alpha, mach);
             (*alpha, constant + slope * alpha, slope)
         };
         let curve = CubicCurve::through(points[around].iter().map(knot).collect());
         curve.map_or((0.0, 0.0), |curve| curve.at(alpha_deg))
     }
 
-    fn tabulated(&self, name: &str, alpha_deg: f64, mach: f64) -> f64 {
+    /// Value of a derivative by its place.
+    fn tabulated(&self, derivative: usize, alpha_deg: f64, mach: f64) -> f64 {
+        let name = &self.buildup.derivatives[derivative].name;
         let value = self.truth.value(name, alpha_deg, mach);
         value.map_or(0.0, |v| v.value)
     }
