@@ -200,7 +200,7 @@ fn changes<const NX: usize, E: Equations<NX>>(
             let sum = &mut in_tunnel[derivative.coefficient.index()];
             sum.add(&changes, alphas, regressor.as_deref());
         }
-        let own = own_change(task, derivative, alphas);
+        let own = own_change(task, derivative, alphas, range.mean);
         let mut change = CoefficientChange::none(name, derivative.coefficient, alphas);
         change.add(&own, alphas, regressor.as_deref());
         changes.push((change, SlopePrior::DEVIATION));
@@ -209,14 +209,14 @@ fn changes<const NX: usize, E: Equations<NX>>(
     changes
 }
 
-/// One standard deviation of a derivative's own change at the samples; along α itself, of the coefficient's.
+/// One standard deviation of a derivative's own change from the mean `at` of the angles to each sample; along α
+/// itself, of the coefficient's.
 ///
 /// The error of the table has the standard uncertainty u, and fades over the length ℓ as in the posterior of
 /// the campaign: over a small distance d it changes by √3 u d/ℓ.
-fn own_change(task: &Task, derivative: &Derivative, alphas: &[f64]) -> Vec<f64> {
+fn own_change(task: &Task, derivative: &Derivative, alphas: &[f64], at: f64) -> Vec<f64> {
     let length = task.context.settings.tunnel_error_length_deg;
     let slope = 3f64.sqrt() * task.held_uncertainty(derivative) / length;
-    let at = mean(alphas.iter().copied());
     let change = |alpha: &f64| match derivative.regressor {
         Regressor::Alpha => 0.5 * slope * (alpha - at).powi(2),
         _ => slope * (alpha - at),

@@ -3,6 +3,7 @@
 use super::task::Task;
 use crate::aero::{Condition, Derivative, Regressor};
 use crate::numerics::cubic_curve::CubicCurve;
+use crate::numerics::mean::mean;
 use crate::numerics::trapezoid::running_integral;
 
 /// Intervals of the swept angles of attack, in each of which the tunnel's change is linear.
@@ -10,7 +11,7 @@ const INTERVALS: usize = 200;
 
 /// Range of a maneuver's angles of attack, deg.
 pub(super) struct AlphaRange {
-    mean: f64,
+    pub mean: f64,
     lowest: f64,
     /// Length of an interval.
     step: f64,
@@ -83,7 +84,7 @@ impl TunnelChange<'_, '_> {
 impl AlphaRange {
     /// Range of the samples' angles, deg.
     pub fn from_samples(alphas: &[f64]) -> AlphaRange {
-        let mean = alphas.iter().sum::<f64>() / alphas.len().max(1) as f64;
+        let mean = mean(alphas.iter().copied());
         let lowest = alphas.iter().copied().fold(mean, f64::min);
         let highest = alphas.iter().copied().fold(mean, f64::max);
         let mut range = AlphaRange {
