@@ -153,14 +153,14 @@ next-study: ## are the bounds that plans predict kept, how many minutes do they 
 	cargo test --release --locked --lib -- --ignored --nocapture flight_plan::
 
 bench: ## run the benchmarks
-	cargo bench --locked
+	cargo bench --locked --features polars-reader
 
 count: build ## count the instructions of five cases into docs/performance.md
 	bash tests/count.sh "$(or $(CARGO_TARGET_DIR),target)/release/harvest"
 
 lint: ## formatting and lints, as .ci/run has them
 	cargo fmt --check
-	cargo clippy --all-targets --features s3 --locked -- -D warnings
+	cargo clippy --all-targets --features s3,polars-reader --locked -- -D warnings
 
 supply-chain: ## advisories, licences, sources and duplicate versions of the dependencies, by cargo-deny
 	bash tests/supply_chain.sh

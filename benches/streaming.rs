@@ -1,7 +1,7 @@
 //! Throughput of ingest and segment, beside polars reading the same columns.
 //!
-//! `cargo bench --bench streaming` uses the demonstration campaign, `cargo bench --bench streaming --
-//! <folder>` another archive; long flights give steadier figures. Each measurement follows a run that
+//! `cargo bench --features polars-reader --bench streaming` uses the demonstration campaign; with
+//! `-- <folder>` at its end, another archive. Long flights give steadier figures. Each measurement follows a run that
 //! fills the file cache, and is the best of three. The last line is the maximum memory of the
 //! process.
 

@@ -6,6 +6,7 @@ mod artefact_name;
 mod artefacts;
 pub mod atomic;
 mod clock_column;
+mod encoding;
 pub mod input_digests;
 pub mod files;
 pub mod fingerprint;

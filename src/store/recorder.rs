@@ -8,10 +8,8 @@ use std::sync::Arc;
 
 use arrow::array::{ArrayRef, Float64Array, RecordBatch, StringDictionaryBuilder};
 use arrow::datatypes::{DataType, Field, Int32Type, Schema};
-use parquet::arrow::ArrowWriter;
-use parquet::basic::{Compression, ZstdLevel};
-use parquet::file::properties::WriterProperties;
 
+use super::encoding;
 use crate::flight::channel::RawColumn;
 
 /// Key of the field metadata that states a column's unit.
@@ -66,16 +64,10 @@ pub fn tall_bytes(time: &str, columns: &BTreeMap<String, RawColumn>) -> Result<V
     encode(&batch)
 }
 
-/// Bytes of a Parquet file with one batch.
 fn encode(batch: &RecordBatch) -> Result<Vec<u8>, String> {
-    let properties = properties()?;
-    let refused = |e: parquet::errors::ParquetError| format!("cannot write the flight: {e}");
-    let mut bytes = Vec::new();
-    let mut writer =
-        ArrowWriter::try_new(&mut bytes, batch.schema(), Some(properties)).map_err(refused)?;
-    writer.write(batch).map_err(refused)?;
-    writer.close().map_err(refused)?;
-    Ok(bytes)
+    encoding::properties()
+        .and_then(|properties| encoding::bytes(batch, properties.build()))
+        .map_err(|e| format!("cannot write the flight: {e}"))
 }
 
 /// Schema of columns with their units.
@@ -92,11 +84,4 @@ pub(super) fn schema<'a>(columns: impl Iterator<Item = (&'a str, Option<&'a str>
 pub(super) fn array(values: &[f64]) -> ArrayRef {
     let values = values.iter().map(|v| v.is_finite().then_some(*v));
     Arc::new(values.collect::<Float64Array>())
-}
-
-/// Properties of the files: Zstandard.
-pub(super) fn properties() -> Result<WriterProperties, String> {
-    let level = ZstdLevel::try_new(3).map_err(|e| e.to_string())?;
-    let properties = WriterProperties::builder().set_compression(Compression::ZSTD(level));
-    Ok(properties.build())
 }

@@ -1,17 +1,19 @@
-//! The published tables: columns to a data frame, to Parquet and CSV.
+//! The published tables: columns to Parquet and CSV.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use arrow::array::{ArrayRef, Float64Array, Int64Array, RecordBatch, StringArray};
+use arrow::datatypes::{Field, Schema};
+use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
 use parquet::file::reader::{FileReader, SerializedFileReader};
-use polars::prelude::{
-    CsvWriter, DataFrame, KeyValueMetadata, NamedFrom, ParquetCompression, ParquetWriter,
-    SerWriter, Series,
-};
+use polars::prelude::{CsvWriter, DataFrame, NamedFrom, PolarsError, SerWriter, Series};
 use serde_json::json;
 
-use super::{atomic, regular, visible_text};
+use super::{atomic, encoding, regular, visible_text};
 use crate::error::{Error, Result};
 use crate::schema::{Cells, Column, Row, Table};
 use crate::tables::{ExportRow, FitRow, PredictedRow};
@@ -123,55 +125,64 @@ fn place(shelf: &Shelf, name: &str, rows: usize, columns: &[Column]) -> Result<(
         folder.join(format!("{name}.parquet")),
         folder.join(format!("{name}.csv")),
     );
-    let frame = |series: fn(&Column) -> Series| {
-        let series = columns.iter().map(|column| series(column).into());
-        DataFrame::new(rows, series.collect())
-    };
     let mut metadata = shelf.provenance.clone();
     metadata.push((COLUMNS.to_owned(), explanations(columns)));
-    let mut bytes = Vec::new();
-    let written = frame(series).and_then(|mut frame| {
-        ParquetWriter::new(&mut bytes)
-            .with_compression(ParquetCompression::Zstd(None))
-            .with_key_value_metadata(Some(KeyValueMetadata::from_static(metadata)))
-            .finish(&mut frame)
-    });
-    written.map_err(|e| Error::store(&parquet, &e))?;
+    let bytes = parquet_bytes(columns, metadata).map_err(|e| Error::store(&parquet, &e))?;
     atomic::place(&parquet, &bytes)?;
-    bytes.clear();
-    frame(series_of_csv)
-        .and_then(|mut frame| CsvWriter::new(&mut bytes).finish(&mut frame))
-        .map_err(|e| Error::store(&csv, &e))?;
+    let bytes = csv_bytes(columns, rows).map_err(|e| Error::store(&csv, &e))?;
     atomic::place(&csv, &bytes)
 }
 
-fn series(column: &Column) -> Series {
-    let name = column.name.as_str().into();
+fn parquet_bytes(
+    columns: &[Column],
+    metadata: Vec<(String, String)>,
+) -> Result<Vec<u8>, ParquetError> {
+    let arrays: Vec<ArrayRef> = columns.iter().map(array).collect();
+    let fields = columns
+        .iter()
+        .zip(&arrays)
+        .map(|(column, array)| Field::new(&column.name, array.data_type().clone(), true));
+    let schema = Schema::new(fields.collect::<Vec<_>>());
+    let batch = RecordBatch::try_new(Arc::new(schema), arrays)?;
+    let pairs = metadata
+        .into_iter()
+        .map(|(key, value)| KeyValue::new(key, value));
+    let properties = encoding::properties()?.set_key_value_metadata(Some(pairs.collect()));
+    encoding::bytes(&batch, properties.build())
+}
+
+fn array(column: &Column) -> ArrayRef {
     match &column.cells {
         Cells::Text(cells) => {
-            let texts: Vec<_> = cells
-                .iter()
-                .map(|text| text.map(visible_text::of))
-                .collect();
-            Series::new(name, texts)
+            let texts = cells.iter().map(|text| text.map(visible_text::of));
+            Arc::new(texts.collect::<StringArray>())
         }
-        Cells::Number(cells) => Series::new(name, cells),
-        Cells::Whole(cells) => Series::new(name, cells),
+        Cells::Number(cells) => Arc::new(Float64Array::from(cells.clone())),
+        Cells::Whole(cells) => Arc::new(Int64Array::from(cells.clone())),
     }
 }
 
+fn csv_bytes(columns: &[Column], rows: usize) -> Result<Vec<u8>, PolarsError> {
+    let series = columns.iter().map(|column| series(column).into());
+    let mut frame = DataFrame::new(rows, series.collect())?;
+    let mut bytes = Vec::new();
+    CsvWriter::new(&mut bytes).finish(&mut frame)?;
+    Ok(bytes)
+}
+
 /// A column of a CSV, without text that a spreadsheet would take for a formula.
-fn series_of_csv(column: &Column) -> Series {
+fn series(column: &Column) -> Series {
+    let name = column.name.as_str().into();
     match &column.cells {
         Cells::Text(cells) => {
             let texts = cells.iter().map(|text| {
                 let text = visible_text::of((*text)?);
                 Some(no_formula(&text).into_owned())
             });
-            let texts: Vec<Option<String>> = texts.collect();
-            Series::new(column.name.as_str().into(), texts)
+            Series::new(name, texts.collect::<Vec<Option<String>>>())
         }
-        _ => series(column),
+        Cells::Number(cells) => Series::new(name, cells),
+        Cells::Whole(cells) => Series::new(name, cells),
     }
 }
 
@@ -188,8 +199,7 @@ fn no_formula(text: &str) -> Cow<'_, str> {
 /// Key of the Parquet metadata for the columns' units and explanations.
 const COLUMNS: &str = "harvest.columns";
 
-/// Name, unit and meaning of each column as JSON; the unit of text is null. The polars writer has
-/// no metadata per field.
+/// Name, unit and meaning of each column as JSON; the unit of text is null.
 fn explanations(columns: &[Column]) -> String {
     let explain = |column: &Column| {
         json!({

@@ -12,7 +12,6 @@ use arrow::compute::{cast, concat_batches};
 use arrow::datatypes::{DataType, Field, Float64Type, Schema};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
-use polars::prelude::{DataFrame, ParquetReader, SerReader};
 
 /// The recorder of the demonstration flights, Hz.
 const RATE_HZ: usize = 40;
@@ -202,9 +201,10 @@ impl Campaign {
         table(&self.path("reports").join(format!("{name}.csv")))
     }
 
-    pub fn frame(&self, name: &str) -> DataFrame {
-        let file = File::open(self.path("reports").join(format!("{name}.parquet"))).unwrap();
-        ParquetReader::new(file).finish().unwrap()
+    /// Rows of a published table from its Parquet file.
+    pub fn batch(&self, name: &str) -> RecordBatch {
+        let path = self.path("reports").join(format!("{name}.parquet"));
+        rows_of(&path, usize::MAX)
     }
 
     /// Bytes of every file below a folder of the campaign, by relative path. Left out are files that
@@ -333,7 +333,11 @@ pub fn number(row: &Row, column: &str) -> f64 {
 pub fn flight(number: u32, seconds: usize) -> RecordBatch {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join(format!("data/demo/flights/flight_{number:03}.parquet"));
-    let rows = seconds * RATE_HZ;
+    rows_of(&path, seconds * RATE_HZ)
+}
+
+/// The first rows of a Parquet file.
+fn rows_of(path: &Path, rows: usize) -> RecordBatch {
     let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(path).unwrap()).unwrap();
     let schema = reader.schema().clone();
     let batches: Vec<RecordBatch> = reader

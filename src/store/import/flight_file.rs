@@ -11,7 +11,8 @@ use parquet::arrow::ArrowWriter;
 use super::imported_contents::{ImportedColumn, refused};
 use crate::error::{Error, Result};
 use crate::store::atomic::Draft;
-use crate::store::recorder::{BATCH_ROWS, array, properties, schema};
+use crate::store::encoding;
+use crate::store::recorder::{BATCH_ROWS, array, schema};
 
 /// Numbers that are in memory at once: those of 256 columns.
 const BATCH_NUMBERS: usize = BATCH_ROWS << 8;
@@ -48,10 +49,10 @@ impl FlightWriter {
         }
         let heads = columns.iter().map(|c| (c.name.as_str(), c.unit.as_deref()));
         let schema = schema(heads);
-        let properties = properties().map_err(|e| Error::store(path, &e))?;
+        let properties = encoding::properties().map_err(|e| Error::store(path, &e))?;
         let draft = Draft::of(path)?;
         let file = BufWriter::with_capacity(1 << 16, draft.handle()?);
-        let writer = ArrowWriter::try_new(file, schema.clone(), Some(properties))
+        let writer = ArrowWriter::try_new(file, schema.clone(), Some(properties.build()))
             .map_err(|e| Error::store(path, &e))?;
         Ok(FlightWriter {
             draft,

@@ -17,7 +17,8 @@ use super::delimited::{
 use super::imported_contents::{ImportedContents, of_scratch, refused, scratch_in, unwritable};
 use super::tall::{self, Role, Tall};
 use crate::error::{Error, Result};
-use crate::store::recorder::{UNIT, properties};
+use crate::store::encoding;
+use crate::store::recorder::UNIT;
 use crate::units::Unit;
 
 /// Rows that are written at once.
@@ -134,9 +135,9 @@ impl TallLayout {
     fn write_parquet(&self, source: &Path, handle: File) -> Result<Failures> {
         let unwritable = |e: parquet::errors::ParquetError| Error::store(source, &e);
         let schema = self.schema();
-        let properties = properties().map_err(|e| Error::store(source, &e))?;
+        let properties = encoding::properties().map_err(unwritable)?;
         let mut writer =
-            ArrowWriter::try_new(handle, schema.clone(), Some(properties)).map_err(unwritable)?;
+            ArrowWriter::try_new(handle, schema.clone(), Some(properties.build())).map_err(unwritable)?;
         let opened = File::open(source).map_err(Error::io(source, "cannot open it"))?;
         let mut reader = BufReader::new(opened);
         let (mut line, mut number_of_line) = (Vec::new(), 0);

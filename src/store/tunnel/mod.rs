@@ -7,11 +7,14 @@ mod tests;
 mod xml_bounds;
 
 use std::collections::BTreeMap;
-use std::io::Cursor;
 use std::path::Path;
 
-use polars::prelude::{Column, DataFrame, DataType, ParquetReader, SerReader};
+use arrow::array::{ArrayRef, AsArray, RecordBatch};
+use arrow::compute::{CastOptions, cast_with_options, concat_batches};
+use arrow::datatypes::{DataType, Float64Type};
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
+use super::archive::guarded;
 use super::files::{self, TunnelRow};
 use crate::error::{Error, Result};
 
@@ -74,17 +77,29 @@ fn of_csv(path: &Path, third: Option<&str>) -> Result<Vec<(usize, TunnelRow)>> {
 
 fn of_parquet(path: &Path, third: Option<&str>) -> Result<Vec<(usize, TunnelRow)>> {
     let bytes = files::bytes(path)?;
-    let frame = ParquetReader::new(Cursor::new(bytes))
-        .finish()
-        .map_err(|e| Error::config(path, None, e.to_string()))?;
-    let table = Frame {
+    let batch =
+        guarded(|| batch_of(bytes)).map_err(|reason| Error::config(path, None, reason))?;
+    let table = ParquetTable {
         path,
-        frame: &frame,
+        batch: &batch,
     };
     let columns = TunnelColumns::of(&table, third)?;
-    (0..frame.height())
+    (0..batch.num_rows())
         .map(|i| Ok((i + 1, columns.row(i, path)?)))
         .collect()
+}
+
+/// All rows of a Parquet file.
+fn batch_of(bytes: Vec<u8>) -> Result<RecordBatch, String> {
+    let unreadable = |e: &dyn std::fmt::Display| format!("not a readable Parquet file: {e}");
+    let builder = ParquetRecordBatchReaderBuilder::try_new(bytes::Bytes::from(bytes))
+        .map_err(|e| unreadable(&e))?;
+    let schema = builder.schema().clone();
+    let reader = builder.build().map_err(|e| unreadable(&e))?;
+    let batches: Vec<RecordBatch> = reader
+        .collect::<Result<_, _>>()
+        .map_err(|e| unreadable(&e))?;
+    concat_batches(&schema, &batches).map_err(|e| unreadable(&e))
 }
 
 /// Columns of a Parquet table; `None` for a column that it lacks.
@@ -100,7 +115,7 @@ struct TunnelColumns {
 }
 
 impl TunnelColumns {
-    fn of(table: &Frame, third: Option<&str>) -> Result<TunnelColumns> {
+    fn of(table: &ParquetTable, third: Option<&str>) -> Result<TunnelColumns> {
         Ok(TunnelColumns {
             third: third.map_or(Ok(None), |name| table.numbers(name))?,
             derivative: table.words("derivative")?,
@@ -138,32 +153,37 @@ fn at<T: Clone>(column: Option<&Vec<Option<T>>>, row: usize) -> Option<T> {
 }
 
 /// Rows of a Parquet table.
-struct Frame<'a> {
+struct ParquetTable<'a> {
     path: &'a Path,
-    frame: &'a DataFrame,
+    batch: &'a RecordBatch,
 }
 
-impl Frame<'_> {
-    fn cast(&self, name: &str, to: &DataType) -> Result<Option<Column>> {
-        let Ok(column) = self.frame.column(name) else {
+impl ParquetTable<'_> {
+    /// A column in another type; `None` for one that the table lacks.
+    fn column_as(&self, name: &str, to: &DataType) -> Result<Option<ArrayRef>> {
+        let Some(column) = self.batch.column_by_name(name) else {
             return Ok(None);
         };
-        let cast = column.strict_cast(to);
-        cast.map(Some)
+        let strict = CastOptions {
+            safe: false,
+            ..CastOptions::default()
+        };
+        cast_with_options(column, to, &strict)
+            .map(Some)
             .map_err(|e| Error::config(self.path, None, format!("column `{name}`: {e}")))
     }
 
     fn numbers(&self, name: &str) -> Result<Option<Vec<Option<f64>>>> {
-        let column = self.cast(name, &DataType::Float64)?;
-        Ok(column.and_then(|c| c.f64().map(|c| c.iter().collect()).ok()))
+        let column = self.column_as(name, &DataType::Float64)?;
+        Ok(column.map(|c| c.as_primitive::<Float64Type>().iter().collect()))
     }
 
     fn words(&self, name: &str) -> Result<Option<Vec<Option<String>>>> {
-        let column = self.cast(name, &DataType::String)?;
-        Ok(column.and_then(|c| {
-            c.str()
-                .map(|c| c.iter().map(|w| w.map(str::to_owned)).collect())
-                .ok()
-        }))
+        let column = self.column_as(name, &DataType::Utf8)?;
+        let texts = |column: ArrayRef| {
+            let texts = column.as_string::<i32>();
+            texts.iter().map(|word| word.map(str::to_owned)).collect()
+        };
+        Ok(column.map(texts))
     }
 }
