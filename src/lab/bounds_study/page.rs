@@ -41,6 +41,8 @@ pub fn page(command: &str, conditions: &[StudyCondition], study: StudyTables) ->
 }
 
 fn introduction(command: &str, coverage: &[CoverageRow]) -> String {
+    let records = coverage.iter().map(|r| r.realisations).max().unwrap_or(0);
+    let least = least_converged(coverage);
     format!(
         "# Coverage of the bounds\n\n\
          Made by `{command}`, harvest {version}, sources {sources}.\n\n\
@@ -50,31 +52,33 @@ fn introduction(command: &str, coverage: &[CoverageRow]) -> String {
          held derivatives have their true values. Coloured noise is a first-order process with the standard \
          deviation of the white noise.\n\n\
          *Scatter* is the standard deviation of the estimates, *bound* the root mean square of their bounds. \
-         *Coverage* is the share of the intervals that contain the truth. The number of records leaves a \
-         standard error of {error:.1} % in a coverage of 95 % of one derivative, and of {bias:.2} in a ratio of \
-         bias to scatter.\n",
+         *Coverage* is the share of the intervals that contain the truth. With \
+         {records} records, a coverage of 95 % of one derivative has a standard error of {error:.1} %, and a \
+         ratio of bias to scatter one of {bias:.2}; in the row with fewest converged records ({least}), \
+         {most_error:.1} % and {most_bias:.2}.\n",
         version = env!("CARGO_PKG_VERSION"),
         sources = env!("HARVEST_SOURCE"),
-        records = coverage.iter().map(|r| r.realisations).max().unwrap_or(0),
-        error = 100.0 * coverage_error(coverage),
-        bias = bias_error(coverage),
+        error = 100.0 * coverage_error(records),
+        bias = bias_error(records),
+        most_error = 100.0 * coverage_error(least),
+        most_bias = bias_error(least),
     )
 }
 
 /// Least number of converged records of any maneuver.
-fn least_converged(coverage: &[CoverageRow]) -> f64 {
+fn least_converged(coverage: &[CoverageRow]) -> usize {
     let converged = coverage.iter().map(|r| r.converged);
-    converged.min().unwrap_or(1).max(1) as f64
+    converged.min().unwrap_or(1).max(1)
 }
 
-/// Standard error of a coverage of 95%.
-fn coverage_error(coverage: &[CoverageRow]) -> f64 {
-    (0.95 * 0.05 / least_converged(coverage)).sqrt()
+/// Standard error of a coverage of 95% from a number of records.
+fn coverage_error(records: usize) -> f64 {
+    (0.95 * 0.05 / records as f64).sqrt()
 }
 
-/// Standard error of the ratio of bias to scatter.
-fn bias_error(coverage: &[CoverageRow]) -> f64 {
-    1.0 / least_converged(coverage).sqrt()
+/// Standard error of the ratio of bias to scatter from a number of records.
+fn bias_error(records: usize) -> f64 {
+    1.0 / (records as f64).sqrt()
 }
 
 fn conditions_table(conditions: &[StudyCondition]) -> String {
