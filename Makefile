@@ -52,7 +52,7 @@ qualities: build ## judge the flying qualities of the posterior, with the probab
 match: build ## fly every maneuver again by a simulator, and judge the match by tolerances
 	$(call harvest,match) $(running)
 
-compare: build ## compare the trends with the wind-tunnel database
+compare: build ## compare the posterior and each maneuver with the wind tunnel, and trends with earlier campaigns
 	$(call harvest,compare) $(running)
 
 report: build ## write the report
