@@ -182,7 +182,7 @@ settings! {
         /// Largest share of marked samples over the outputs together, and in each surface:
         /// `segment: quality: marked_share`.
         pub max_marked_share: f64 = 0.2,
-        /// Angle of attack over which an error of the tunnel changes, deg: `model: length_deg`.
+        /// Angle of attack over which an error of the tunnel changes, deg: `model: expert: length_deg`.
         pub tunnel_error_length_deg: f64 = 15.0,
     }
 }

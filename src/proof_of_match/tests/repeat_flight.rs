@@ -143,7 +143,7 @@ fn stated_probabilities_are_the_shares_of_repeat_flights_that_pass() {
 fn a_deficiency_of_the_posterior_is_expected_again_in_the_repeat_flight() {
     let flown = flown("PPSS", 10.0);
     let record = noisy(&flown, 3);
-    // The posterior is sure of a wrong derivative.
+    // A narrow posterior around a wrong derivative.
     let local = posterior(&flown, 1.0);
     let mean = truth(&flown, "Cm_de", 1.8);
     let judged = |model: WindTunnel| {
