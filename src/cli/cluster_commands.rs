@@ -21,7 +21,7 @@ use crate::store::{atomic, files};
 pub struct PlanOptions {
     #[command(flatten)]
     options: Options,
-    /// Deal flights, to be ingested and segmented; or the maneuvers found in them, to be estimated
+    /// Work to divide: `flights` (ingest and segment), or `maneuvers` (estimate)
     #[arg(long, value_enum)]
     of: DealtArgument,
     /// Number of shards [default: the pipeline's `cluster: shards:`]
@@ -41,8 +41,8 @@ enum DealtArgument {
 /// Options to compute one shard instead of the whole campaign.
 #[derive(Args, Debug)]
 pub struct ShareOptions {
-    /// Compute a shard of this plan into the store, and publish nothing; exit code 75: another try
-    /// may complete it
+    /// Compute a shard of this plan into the store, and publish nothing; exit code 75: a
+    /// repetition may complete it
     #[arg(long, value_name = "FILE", requires = "shard")]
     plan: Option<PathBuf>,
     /// The shard and the number of shards: 3/24
@@ -156,7 +156,7 @@ impl ShareOptions {
 }
 
 fn ask_for_another_try(error: &anyhow::Error) -> ExitCode {
-    err!("harvest: {error:#}; another try may succeed");
+    err!("harvest: {error:#}; a repetition may succeed");
     ExitCode::from(TRY_AGAIN)
 }
 

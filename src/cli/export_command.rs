@@ -11,8 +11,8 @@ use crate::night::{has_rejections, model_export, model_export::Draws};
 
 /// Help below the options.
 pub const EXPORT_HELP: &str = "\
-What is needed is brought up to date first, as far as `model`. Each derivative is the posterior of tunnel and flight, with \
-its uncertainty; every value says whether it is mostly flight's or the tunnel's.
+The stages up to `model` are brought up to date first. Each derivative is the posterior of tunnel and flight, with its \
+uncertainty; `source` names the larger source of information of each value.
 
   flight_updated.csv, .parquet   rows that `wind_tunnel:` reads as a database again
   flight_updated.dml             DAVE-ML (ANSI/AIAA S-119): tables, and the coefficients as their sums

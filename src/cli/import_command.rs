@@ -15,7 +15,7 @@ Formats, known by their content:
   Parquet   tall: columns time, name, value and perhaps unit; runs and init also read it as it is. A Parquet file with one \
 column a channel needs no import
 
-Numbers keep every bit; what is no number becomes a missing value. import.json beside the files names each source with its \
+Numbers keep every bit; fields that are not numbers become missing values. import.json beside the files names each source with its \
 fingerprint, the columns with their units, and what was left out.
 
 Examples:

@@ -9,8 +9,8 @@ use crate::pipeline::draft;
 
 /// Help below the options.
 pub const INIT_HELP: &str = "\
-Names and stated units propose which column is which signal; the equations of motion decide unit and sign, and say how \
-sure they are: attitudes must follow from rates, speeds from accelerations and gravity, climb from the flight path, \
+Names and stated units propose which column is which signal; the equations of motion determine unit and sign, and how \
+certain they are: attitudes must follow from rates, speeds from accelerations and gravity, climb from the flight path, \
 dynamic pressure and Mach number from speed and altitude. The files have a question (FILL_IN) where no recording can \
 answer: reference dimensions, positions of sensors, masses that are not recorded. `harvest check NAME` lists what is open.
 
@@ -36,7 +36,7 @@ fn name(typed: &str) -> Result<String, String> {
     if typed.chars().all(is_plain) && typed.starts_with(|c: char| c.is_ascii_alphabetic()) {
         Ok(typed.to_owned())
     } else {
-        Err("it must begin with a letter, and have letters, digits, `_` and `-` alone".to_owned())
+        Err("it must begin with a letter, and contain only letters, digits, `_` and `-`".to_owned())
     }
 }
 

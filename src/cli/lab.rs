@@ -18,8 +18,8 @@ use crate::tables;
 pub enum LabCommand {
     /// Fly a campaign of test cards: archive, wind-tunnel database, true derivatives
     Simulate(SimulateOptions),
-    /// Measure how often the intervals hold the truth: simulated maneuvers, flown and recorded many times
-    /// under the cards' conditions and estimated
+    /// Measure the coverage of the intervals: simulated maneuvers, flown and recorded many times under
+    /// the cards' conditions and estimated
     Validate(ValidateOptions),
     /// Time the estimate of a maneuver given as JSON with its record as CSV beside it
     Bench(BenchOptions),

@@ -53,8 +53,8 @@ const VERSION: &str = concat!(
 );
 
 const AFTER: &str = "\
-Every stage first brings its predecessors up to date. Work that is up to date is not repeated, and a killed run goes on
-where it was. The results of a run are published at once, as a night; the last nights stay.
+Every stage first brings its predecessors up to date. Work that is up to date is not repeated, and a run that was killed
+continues where it stopped. The results of a run are published at once, as a night; the last nights stay.
 
 Examples:
   harvest run                                    the pipeline pipelines/harv, to the report
@@ -87,7 +87,7 @@ Exit codes:
      well, and end with 0
   3  `diff`: a value moved by more than its uncertainty, vanished or changed; `status`: something is stale
   64 the command as typed is wrong; nothing was done
-  75 a shard or a merge that another try may complete: the disk failed, a file could not be read, the store is in use";
+  75 a shard or a merge that a repetition may complete: the disk failed, a file could not be read, the store is in use";
 
 #[derive(Debug, Subcommand)]
 enum Command {
@@ -107,7 +107,7 @@ enum Command {
     Qualities(RunOptions),
     /// Fly every maneuver again by a simulator, and judge the match by tolerances
     Match(RunOptions),
-    /// Compare the trends with the wind-tunnel database
+    /// Compare the posterior and each maneuver with the wind tunnel, and trends with earlier campaigns
     Compare(RunOptions),
     /// Write the report
     Report(RunOptions),
@@ -136,7 +136,7 @@ enum Command {
     Verify(night_commands::VerifyOptions),
     /// List the artefacts and nights that nothing published needs, and remove them with --yes
     Gc(night_commands::GcOptions),
-    /// Deal a campaign's work to shards of about equal cost
+    /// Divide a campaign's work into shards of about equal cost
     Plan(cluster_commands::PlanOptions),
     /// Publish what the shards of a plan computed; refuses while something is missing
     Merge(cluster_commands::MergeOptions),

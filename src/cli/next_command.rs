@@ -13,7 +13,7 @@ use crate::tables::NextCardRow;
 
 /// Help below the options.
 pub const NEXT_HELP: &str = "\
-What is needed is brought up to date first, as far as `model`. Each card (class, angle of attack, scale of its inputs) is \
+The stages up to `model` are brought up to date first. Each card (class, angle of attack, scale of its inputs) is \
 flown by a simulator with the derivatives of tonight's posterior and estimated as a flown maneuver is; the cards that lower \
 the standard deviations of the goals most in the minutes are chosen (docs/next.md).
 
@@ -90,7 +90,7 @@ fn print(planned: &PlannedFlight, minutes: f64) {
     let flown = || plan.cards.iter().filter(|row| row.place.is_some());
     let times: usize = flown().map(|row| row.times).sum();
     out!(
-        "{times} cards in {:.1} of {minutes} minutes; the standard deviations of the goals fall by {:.0} % in the mean",
+        "{times} cards in {:.1} of {minutes} minutes; the standard deviations of the goals fall by {:.0} % (weighted geometric mean)",
         plan.minutes,
         plan.fall_pct()
     );

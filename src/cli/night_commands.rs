@@ -249,8 +249,8 @@ pub fn gc(options: &GcOptions) -> anyhow::Result<ExitCode> {
         );
         if let Some(shared) = &config.shared_store {
             out!(
-                "that is the cache in {}; {} is left as it is, for other machines' nights may be made of it: rules of the \
-                 bucket's lifecycle remove what is old",
+                "that is the cache in {}; {} is not cleaned, because nights of other machines may need it: use the bucket's \
+                 lifecycle rules",
                 config.store.display(),
                 shared.display()
             );

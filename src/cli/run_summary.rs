@@ -31,7 +31,7 @@ pub fn print_summary(config: &Config, outcome: &RunOutcome, until: Stage) {
         );
     }
     if !outcome.is_new {
-        out!("nothing new: night {} holds", outcome.night);
+        out!("nothing new: night {} is still current", outcome.night);
     }
     out!("tables in {}", config.reports.display());
     if let Some(report) = &outcome.report {

@@ -22,8 +22,8 @@ pub enum Show {
 }
 
 const FLIGHT_HELP: &str = "\
-What is needed is brought up to date first, as far as `segment`. Maneuvers are shaded through all strips and labelled \
-with class and id; where a list of events is given, it and what was found stand under each other above the strips. \
+The stages up to `segment` are brought up to date first. Maneuvers are shaded through all strips and labelled \
+with class and id; where a list of events is given, the list and the maneuvers found are drawn in two rows above the strips. \
 Samples that were bridged, replaced or are missing are marked at their time. However long the flight, the smallest and \
 the largest sample of each column of the picture is drawn: no spike is lost.
 
@@ -34,7 +34,7 @@ Examples:
 Exit codes: 0 drawn; 1 not drawn, the message says why; 2 drawn, and something in the flight was rejected.";
 
 const MANEUVER_HELP: &str = "\
-What is needed is brought up to date first, as far as `estimate`. A maneuver that was rejected is shown as measured, \
+The stages up to `estimate` are brought up to date first. A maneuver that was rejected is shown as measured, \
 with the reason in the heading. The ids are in the table `maneuvers` and over the windows of `harvest show flight`.
 
 Examples:

@@ -150,8 +150,8 @@ impl<'a> Recorder<'a> {
 
     fn no_excitation_flag(&self) -> Option<String> {
         self.config.segment.excitation_flag.is_empty().then(|| {
-            "no `segment: excitation_flag`: maneuvers close together are told apart by their steps \
-             alone, and feedback that answers the pilot may count as excitation"
+            "no `segment: excitation_flag`: only their steps separate maneuvers that are close \
+             together, and feedback that answers the pilot may count as excitation"
                 .to_owned()
         })
     }

@@ -94,8 +94,8 @@ fn header(contents: &ExportContents, xml: &mut Xml) {
     );
     xml.empty("creationDate", &[("date", &settings.date)]);
     let text = format!(
-        "{}: flight-updated derivatives: posterior of flight tests and wind tunnel; each table says which it is \
-         mostly, and a function <name>_is_flight says it at every point. Uncertainties are standard deviations; correlations \
+        "{}: flight-updated derivatives: posterior of flight tests and wind tunnel; the description of each \
+         table names the larger source of information; the function <name>_is_flight gives it at every point. Uncertainties are standard deviations; correlations \
          between derivatives are means over the breakpoints. Body axes: CN up, CA aft, CY right, moments \
          right wing down, nose up, nose right, about the c.g. Reference area {} ft2, span {} ft, chord {} ft. Thrust \
          vectoring is in lbf and ft lbf and in no coefficient. Tables are linear between their points and constant beyond.",

@@ -20,7 +20,7 @@ pub fn section(contents: &ExportContents, tables: &[ExportTable]) -> String {
     xml.open("aerodynamics", &[]);
     let a = contents.aircraft;
     let description = format!(
-        "{}: posterior of flight tests and wind tunnel; each function says which it mostly is. \
+        "{}: posterior of flight tests and wind tunnel; the description of each function names the larger source of information. \
          Reference area {} ft2, span {} ft, chord {} ft: metrics must be the same. Moments are about the c.g.: put the \
          aerodynamic reference point (AERORP) there. Signals that have no property of their own begin with harvest/ and \
          are to be set by the flight control section, in the unit of their names.",

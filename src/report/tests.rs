@@ -382,7 +382,7 @@ fn the_summary_comes_first_with_news_failures_and_disagreements() {
     let at = |words: &str| page.find(words).unwrap_or_else(|| panic!("{words}"));
     assert!(at("<h3>What is new</h3>") < at("<h3>What failed</h3>"));
     assert!(at("1-OLON-10 (did not converge)") < at("<h3>What disagrees</h3>"));
-    assert!(at("Largest beside their uncertainty") < at("id=\"failures\""));
+    assert!(at("Largest in standard errors") < at("id=\"failures\""));
 }
 
 #[test]

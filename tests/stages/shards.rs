@@ -164,7 +164,7 @@ fn a_store_in_use_and_a_file_that_cannot_be_read_ask_for_another_try() {
     lock.lock().unwrap();
     let busy = run(&mut shard(&campaign, "segment", 1, 1));
     assert!(
-        busy.code == Some(75) && busy.stderr.contains("another try may succeed"),
+        busy.code == Some(75) && busy.stderr.contains("a repetition may succeed"),
         "{busy:?}"
     );
     drop(lock);

@@ -66,7 +66,7 @@ fn not_estimable(name: &str, config: &Config) -> Option<String> {
     derivative.regressor.has_alpha_rate().then(|| {
         format!(
             "`{name}` is estimated; a derivative along `alpha_dot` is held or inactive, since its rate is the measured one, and \
-             noise alone tells it from the damping in pitch (docs/method.md, terms of the model)"
+             only noise separates it from the damping in pitch (docs/method.md, terms of the model)"
         )
     })
 }

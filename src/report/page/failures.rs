@@ -64,7 +64,7 @@ fn fits(contents: &Contents) -> TableView {
         .map(missing_fit);
     let heads = ["maneuver", "class", "α", "outcome", "reason"];
     TableView::new(
-        "Maneuvers without a sound fit",
+        "Maneuvers without a usable fit",
         "",
         &heads,
         failed.chain(missing).collect(),

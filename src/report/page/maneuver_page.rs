@@ -136,7 +136,7 @@ fn match_facts(matched: &Matched) -> impl Iterator<Item = (String, String, bool)
         let value = match row.verdict {
             MatchVerdict::NotFlown => format!("not flown again: {}", row.reason),
             verdict => format!(
-                "{verdict} the tolerances, margin {}, decided by {}; a repeat flight passes with {} %",
+                "{verdict} the tolerances, margin {}, decided by {}; probability for a repeat: {} %",
                 number(row.margin, 2),
                 row.decided_by,
                 row.repeat_pct
@@ -153,7 +153,7 @@ fn match_caption(matched: &Matched) -> String {
     let model = first.map_or("", |row| row.model.name());
     let closed = first.is_some_and(|row| row.closed_loop == Some(1));
     let note = if closed {
-        " Feedback moved the surfaces: they are those recorded."
+        " Surfaces as recorded: feedback moved them."
     } else {
         ""
     };
@@ -184,7 +184,7 @@ fn flight_condition(m: &Maneuver) -> Vec<(String, String, bool)> {
         fixed(m.altitude_ft, 0)
     );
     let mass = format!(
-        "{} slug, center of gravity at {} ft",
+        "{} slug, centre of gravity at {} ft",
         fixed(m.mass_slug, 0),
         fixed(m.x_cg_ft, 2)
     );

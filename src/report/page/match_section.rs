@@ -37,8 +37,8 @@ pub fn section(contents: &Contents, markers: &ClassMarkers) -> Option<MatchSecti
         note: format!(
             "{}. Each maneuver is flown again by a body with six degrees of freedom: initial state and \
              trim are matched over its first second at most, then it runs free to the end with the \
-             recorded surfaces and thrust. Where feedback moved the surfaces, the recorded surfaces \
-             contain it, and the control law is not judged. {} % of the samples must be inside.",
+             recorded surfaces and thrust. Where feedback moved the surfaces, the recorded positions \
+             include it, so the control law is not tested. {} % of the samples must be inside.",
             specification.standard,
             fixed(specification.inside_pct, 0)
         ),

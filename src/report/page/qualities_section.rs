@@ -66,7 +66,7 @@ pub fn section(contents: &Contents) -> Option<QualitiesSection> {
             "{}. Category {}, class {}. Modes of the equations that are estimated, linearised about \
              steady wings-level flight at the mass, dynamic pressure, Mach number and path flown at \
              each angle of attack, with the posterior's derivatives. The probabilities count the \
-             posterior's covariance; they ask nothing of pilots.",
+             posterior's covariance; they do not include pilot ratings.",
             specification.specification, specification.category, specification.class
         ),
         airframes: airframes

@@ -153,8 +153,7 @@ fn largest_disagreements(derivatives: &[DerivativeResults]) -> Option<String> {
         .take(LONGEST_LIST)
         .map(|(name, (z, row))| disagreement_in_words(name, *z, row))
         .collect();
-    (!listed.is_empty())
-        .then(|| format!("Largest beside their uncertainty: {}.", listed.join("; ")))
+    (!listed.is_empty()).then(|| format!("Largest in standard errors: {}.", listed.join("; ")))
 }
 
 fn disagreement_in_words(name: &str, z: f64, row: &ComparisonRow) -> String {
@@ -209,7 +208,7 @@ fn failed_fits_line(fits: &[&FitRow]) -> Option<String> {
     };
     (!fits.is_empty()).then(|| {
         format!(
-            "{} without a sound fit: {}{more}.",
+            "{} without a usable fit: {}{more}.",
             count(fits.len(), "maneuver"),
             listed.join(", ")
         )

@@ -104,7 +104,7 @@ fn answer(
     let sentences = [
         Some(format!(
             "Flights have brought the standard deviations of the derivatives to {} % of those before flight, in \
-             the median; they gave least on {}.",
+             the median; the least reduction is of {}.",
             fixed(all, 0),
             places.join(", ")
         )),
@@ -377,7 +377,7 @@ mod tests {
         assert!(
             section.answer.starts_with(
                 "Flights have brought the standard deviations of the derivatives to 40 % of those before flight, in \
-                 the median; they gave least on Cn_dr at 30° (130 %; no class estimates it), CY_beta at 40° (40 %; \
+                 the median; the least reduction is of Cn_dr at 30° (130 %; no class estimates it), CY_beta at 40° (40 %; \
                  PYRS estimates it best)."
             ),
             "{}",
