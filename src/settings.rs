@@ -10,6 +10,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
 
 /// One key of a configuration file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -98,10 +99,58 @@ macro_rules! elements {
 }
 pub(crate) use elements;
 
-/// A default as YAML, on one line.
-pub fn written_default(default: &impl Serialize) -> Option<String> {
-    let text = serde_json::to_string(default).ok()?;
-    Some(text.strip_suffix(".0").unwrap_or(&text).to_owned())
+/// Default as YAML on one line, with the keys that may be written and no others.
+pub fn written_default<T: Setting + Serialize>(default: &T) -> Option<String> {
+    let value = serde_json::to_value(default).ok()?;
+    let keys = T::keys();
+    let paths: Vec<&[&str]> = keys.iter().map(|key| &key.path[..]).collect();
+    Some(one_line(&value, &paths))
+}
+
+/// A value as YAML on one line. `paths` are the keys below the value; without any, all of its
+/// members are written. A member that is `null` is left out.
+fn one_line(value: &Value, paths: &[&[&str]]) -> String {
+    match value {
+        Value::Array(entries) => {
+            let below = below_name(paths, "[]");
+            let entries: Vec<String> = entries.iter().map(|e| one_line(e, &below)).collect();
+            format!("[{}]", entries.join(", "))
+        }
+        Value::Object(members) => {
+            let names = member_names(members, paths);
+            let written = names.into_iter().filter_map(|name| {
+                let member = members.get(name).filter(|m| !m.is_null())?;
+                let text = one_line(member, &below_name(paths, name));
+                Some(format!("{name}: {text}"))
+            });
+            let written: Vec<String> = written.collect();
+            if written.is_empty() {
+                return "{}".to_owned();
+            }
+            format!("{{ {} }}", written.join(", "))
+        }
+        single => {
+            let text = single.to_string();
+            text.strip_suffix(".0").unwrap_or(&text).to_owned()
+        }
+    }
+}
+
+/// Names of a map's members in the order of their keys.
+fn member_names<'a>(members: &'a Map<String, Value>, paths: &[&[&'a str]]) -> Vec<&'a str> {
+    if paths.is_empty() {
+        return members.keys().map(String::as_str).collect();
+    }
+    let mut names: Vec<&str> = paths.iter().filter_map(|p| p.first().copied()).collect();
+    names.dedup();
+    names
+}
+
+/// Paths below a name.
+fn below_name<'a>(paths: &[&'a [&'a str]], name: &str) -> Vec<&'a [&'a str]> {
+    let below = paths.iter().filter_map(|path| path.split_first());
+    let below = below.filter(|(first, rest)| **first == name && !rest.is_empty());
+    below.map(|(_, rest)| rest).collect()
 }
 
 /// Default of an element's key: `none` for one that may be left out.

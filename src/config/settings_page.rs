@@ -78,6 +78,7 @@ fn rows(keys: &[&Key]) -> String {
 fn plain(default: &str) -> String {
     match default {
         "null" => "none".to_owned(),
+        "\"\"" => default.to_owned(),
         _ => default.replace('"', "").replace('|', "\\|"),
     }
 }
@@ -125,6 +126,26 @@ fn yaml(path: &[&str], value: &str) -> String {
         ["[]", rest @ ..] => format!("[{}]", yaml(rest, value)),
         [name, rest @ ..] => format!("{{ \"{name}\": {} }}", yaml(rest, value)),
     }
+}
+
+#[test]
+fn every_default_can_be_written_under_its_key() {
+    let mut parsed = 0;
+    for key in PipelineFile::keys() {
+        let default = key.default.as_deref().map(plain);
+        let Some(default) = default.filter(|default| default != "none") else {
+            continue;
+        };
+        let text = format!(
+            "title: t\narchive: a\n{}: {}\n",
+            key.path[0],
+            yaml(&key.path[1..], &default)
+        );
+        let file = source(&text).parse::<PipelineFile>();
+        assert!(file.is_ok(), "{text}: {}", file.err().unwrap());
+        parsed += 1;
+    }
+    assert!(parsed > 100, "{parsed} defaults");
 }
 
 /// Names that the parser accepts at a path, taken from its error about an unknown name; `None` if
