@@ -163,6 +163,10 @@ pub fn similarity(a: &str, b: &str) -> f64 {
     strsim::jaro_winkler(&a.to_lowercase(), &b.to_lowercase())
 }
 
+/// Similarity, from 0 to 1, from which a name is suggested: a name of five letters with two other letters
+/// reaches it.
+const SUGGESTED: f64 = 0.7;
+
 /// A phrase to append to an error: the name among `known` nearest to `given`; empty if none is
 /// similar.
 #[must_use]
@@ -172,7 +176,7 @@ pub fn did_you_mean<'a>(given: &str, known: impl IntoIterator<Item = &'a str>) -
         .map(|name| (similarity(given, name), name))
         .max_by(|a, b| a.0.total_cmp(&b.0));
     match near {
-        Some((score, name)) if score > 0.7 => format!("; did you mean `{name}`?"),
+        Some((score, name)) if score > SUGGESTED => format!("; did you mean `{name}`?"),
         _ => String::new(),
     }
 }

@@ -7,7 +7,7 @@
 use pulp::{Arch, Simd, WithSimd};
 
 /// Number of samples that an interpolated value depends on.
-const WIDTH: usize = 4;
+pub const WIDTH: usize = 4;
 
 /// Weights of four samples at a shift, and the slopes of the weights along the shift, per sample.
 #[derive(Clone, Copy, Debug, PartialEq)]

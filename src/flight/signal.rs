@@ -52,6 +52,9 @@ pub fn is_own(signal: &str) -> bool {
     REQUIRED.contains(&signal) || OPTIONAL.contains(&signal)
 }
 
+/// Value of a flag, 0 or 1, above which it is up.
+pub const FLAG_UP: f64 = 0.5;
+
 /// Required signals that are greater than zero in flight.
 pub const POSITIVE: &[&str] = &[VELOCITY, QBAR, MASS, IX, IY, IZ];
 

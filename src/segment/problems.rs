@@ -6,7 +6,7 @@ use super::absent_signals::{AbsentSignal, absent_signals};
 use super::recognition::found::FoundManeuver;
 use super::settings::Settings;
 use crate::error::{Problem, ProblemStage};
-use crate::flight::Record;
+use crate::flight::{Record, signal};
 use crate::maneuver::{Class, Unknown};
 
 /// Least number of maneuvers that contradict a constant flag before it counts as stuck: one may be
@@ -81,7 +81,7 @@ fn of_stuck_flag(record: &Record, flag: &str, found: &[FoundManeuver]) -> Option
         .values(flag)?
         .iter()
         .filter(|v| v.is_finite())
-        .map(|v| *v > 0.5);
+        .map(|v| *v > signal::FLAG_UP);
     let is_up = positions.next()?;
     let contradictions = found
         .iter()

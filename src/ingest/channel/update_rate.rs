@@ -22,6 +22,12 @@ const MOST_UPDATES: usize = 4;
 /// two samples apart.
 const SHORTEST_WITH_LOSSES: usize = 8;
 
+/// A distance with its two neighbours: the clocks of channel and record slip by one sample.
+const WITH_NEIGHBOURS: usize = 3;
+
+/// Least number of distances without a lost update for each one with it: three of four.
+const UPDATES_PER_LOSS: usize = 3;
+
 /// Share of the distances between recorded samples, or of the changes of a held value, that must
 /// fit a period: frames are lost and clocks slip now and then. Of changes at random half share a phase of the
 /// shortest period, two, so 19 of [`LEAST_CHANGES`] do by chance once in 25,000 spells.
@@ -179,7 +185,7 @@ impl Fit {
         let (period, exact) = distances.iter().enumerate().max_by_key(|(_, n)| **n)?;
         let near = |multiple: usize| -> usize {
             let around = distances.iter().skip(multiple.saturating_sub(1));
-            around.take(3).sum()
+            around.take(WITH_NEIGHBOURS).sum()
         };
         let multiples = (2..=MOST_UPDATES).map(|n| n * period);
         // Of a period of a few samples, every distance is near a multiple.
@@ -200,9 +206,9 @@ impl Fit {
         self.near + self.with_losses
     }
 
-    /// `true` if at least three of four distances have no lost update in them.
+    /// `true` if few enough distances have a lost update in them.
     fn has_few_losses(&self) -> bool {
-        3 * self.with_losses <= self.near
+        UPDATES_PER_LOSS * self.with_losses <= self.near
     }
 }
 

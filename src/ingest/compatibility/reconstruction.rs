@@ -35,7 +35,7 @@ use super::window::Window;
 use crate::aircraft::Aircraft;
 use crate::flight::interpolation_kernel::InterpolationKernel;
 use crate::numerics::runge_kutta::{POINT, STAGES, reaches_s, weights_s};
-use crate::numerics::simd::{load, store};
+use crate::numerics::simd::{VECTOR, load, store};
 
 /// Number of parameters of a window alone: its initial state, and the rates of change of the wind.
 pub const LOCAL: usize = STATES + WIND;
@@ -48,7 +48,7 @@ pub const DRIVING: usize = LOCAL + INPUTS * KINDS;
 /// delay.
 pub const ROW: usize = DRIVING + KINDS;
 /// Length of a row in whole vectors.
-pub const WIDE: usize = ROW.next_multiple_of(8);
+pub const WIDE: usize = ROW.next_multiple_of(VECTOR);
 
 /// Values of a window's own parameters.
 pub type LocalParameters = [f64; LOCAL];

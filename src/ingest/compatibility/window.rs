@@ -11,6 +11,7 @@ use super::parameters::{INPUTS, OUTPUTS, SIGNALS, input_factor, lacks_input};
 use super::settings::Compatibility;
 use crate::aircraft::Aircraft;
 use crate::flight::Record;
+use crate::flight::interpolation_kernel::WIDTH;
 use crate::numerics::sample_count::nearest;
 use crate::units::DEG;
 
@@ -44,7 +45,7 @@ pub struct Window {
 
 /// Samples by which a delay may reach out of a window, with those of the interpolation kernel.
 pub fn margin(settings: &Compatibility, step_s: f64) -> usize {
-    nearest(settings.longest_delay_s / step_s) + 3
+    nearest(settings.longest_delay_s / step_s) + WIDTH - 1
 }
 
 impl Window {

@@ -12,8 +12,10 @@ use crate::numerics::sample_count::nearest;
 /// Largest pitch attitude, deg: beyond it the Euler angles are close to their singularity.
 const STEEPEST_DEG: f64 = 75.0;
 
-/// Largest readings of the vanes, deg: beyond them the flow turns away from the vane's axis.
+/// Largest reading of the vane of α, deg: beyond it the flow turns away from the vane's axis.
 const LARGEST_ALPHA_DEG: f64 = 85.0;
+
+/// Largest reading of the vane of β, deg: as for α.
 const LARGEST_BETA_DEG: f64 = 60.0;
 
 /// Least airspeed, ft/s: below it the vanes and the airspeed sensor do not respond.

@@ -6,14 +6,12 @@
 //! excitation from ordinary flying without any flag.
 
 use crate::flight::Record;
+use crate::flight::signal::FLAG_UP;
 use crate::segment::noisy_controls::ControlNoise;
 use crate::segment::settings::Settings;
 use crate::segment::steps::detection;
 use crate::segment::steps::hidden_halves::add_hidden_halves_of_all;
 use crate::segment::steps::step::{SignalSteps, Steps};
-
-/// Value of a flag signal, 0 or 1, above which it is up.
-const FLAG_UP: f64 = 0.5;
 
 /// Detections in one record, with the record and the settings used.
 #[derive(Clone, Debug)]

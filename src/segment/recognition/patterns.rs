@@ -7,8 +7,11 @@ use crate::numerics::mean::mean;
 use crate::segment::steps::step::Step;
 use crate::segment::steps::swings::Swing;
 
-/// Least number of swings of a sweep: three intervals, one for each third of it.
-const FEWEST_SWINGS: usize = 4;
+/// Parts of a sweep, the first and last of which give its ratio of frequencies.
+const PARTS: usize = 3;
+
+/// Least number of swings of a sweep: an interval for each part of it.
+const FEWEST_SWINGS: usize = PARTS + 1;
 
 /// Factor by which an interval between swings may exceed the one before and still count as not
 /// slower: the times of swings have errors of some samples.
@@ -98,7 +101,7 @@ pub(super) fn fit_sweep(swings: &[Swing], wanted: &Sweep) -> Result<f64, Mismatc
         .windows(2)
         .map(|s| s[1].middle_s() - s[0].middle_s())
         .collect();
-    let third = (intervals.len() / 3).max(1);
+    let third = (intervals.len() / PARTS).max(1);
     let first_third = mean(intervals[..third].iter().copied());
     let last_third = mean(intervals[intervals.len() - third..].iter().copied());
     let ratio = first_third / last_third;

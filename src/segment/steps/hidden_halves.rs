@@ -21,6 +21,9 @@ const LONE_STEP: f64 = 2.0;
 /// √2, rounded.
 const REVERSAL_OVER_HALF: f64 = 1.2;
 
+/// Size of a half over that of the reversal beside it.
+const HALF_OF_REVERSAL: f64 = 0.5;
+
 /// Number of noise standard deviations that turbulence rarely exceeds: 0.3 % of normal changes are
 /// larger.
 const BEYOND_NOISE: f64 = 3.0;
@@ -111,7 +114,7 @@ fn hidden_half(
     } else {
         0.0
     };
-    let least = beyond_noise.max(0.5 * end.size() - NOISE_ON_HALF * noise);
+    let least = beyond_noise.max(HALF_OF_REVERSAL * end.size() - NOISE_ON_HALF * noise);
     let halves = TRIM_SHARE..=1.0 - TRIM_SHARE;
     deflections
         .iter()
