@@ -10,22 +10,13 @@ use crate::units::Unit;
 /// Dash in place of a missing value.
 pub const DASH: &str = "\u{2013}";
 
-/// Outcomes of a fit with their names in the report, in the order of its columns.
-pub const OUTCOMES: [(Outcome, &str); 5] = [
-    (Outcome::Converged, "converged"),
-    (Outcome::Doubtful, "doubtful"),
-    (Outcome::NotConverged, "did not converge"),
-    (Outcome::Unidentifiable, "unidentifiable"),
-    (Outcome::Rejected, "rejected"),
-];
-
 /// Outcome of a fit in words.
 #[must_use]
 pub fn outcome_in_words(outcome: Outcome) -> &'static str {
-    OUTCOMES
-        .iter()
-        .find(|(other, _)| *other == outcome)
-        .map_or(outcome.name(), |(_, words)| words)
+    match outcome {
+        Outcome::NotConverged => "did not converge",
+        other => other.name(),
+    }
 }
 
 /// Coefficient of a derivative named `<coefficient>_<regressor>`; `None` for a bias.

@@ -9,8 +9,8 @@ use crate::aero::Axis;
 use crate::maneuver::Maneuver;
 use crate::report::contents::Contents;
 use crate::report::figure::scale::extent;
-use crate::report::notation::{DASH, OUTCOMES, fixed};
-use crate::tables::FitRow;
+use crate::report::notation::{DASH, fixed, outcome_in_words};
+use crate::tables::{FitRow, Outcome};
 
 /// One row of the table.
 #[derive(Clone, Debug, Serialize)]
@@ -33,11 +33,8 @@ pub struct ClassOutcomes {
 /// Heads of the outcome columns.
 #[must_use]
 pub fn heads() -> Vec<&'static str> {
-    OUTCOMES
-        .iter()
-        .map(|(_, head)| *head)
-        .chain(["no fit"])
-        .collect()
+    let outcomes = Outcome::ALL.into_iter().map(outcome_in_words);
+    outcomes.chain(["no fit"]).collect()
 }
 
 /// A row per configured class, then one per class that occurs in maneuvers only.
@@ -82,12 +79,12 @@ pub fn by_class(contents: &Contents, markers: &ClassMarkers) -> Vec<ClassOutcome
 }
 
 fn count_outcomes(maneuvers: &[&Maneuver], fits: &BTreeMap<&str, &FitRow>) -> Vec<usize> {
-    let mut counts = vec![0; OUTCOMES.len() + 1];
+    let mut counts = vec![0; Outcome::ALL.len() + 1];
     for maneuver in maneuvers {
         let column = fits
             .get(maneuver.maneuver_id.as_str())
-            .and_then(|fit| OUTCOMES.iter().position(|(name, _)| *name == fit.outcome))
-            .unwrap_or(OUTCOMES.len());
+            .and_then(|fit| Outcome::ALL.iter().position(|o| *o == fit.outcome))
+            .unwrap_or(Outcome::ALL.len());
         counts[column] += 1;
     }
     counts
@@ -114,7 +111,7 @@ mod tests {
         let mut campaign = campaign();
         campaign.fits.pop();
         let rows = rows(&campaign.contents());
-        let without_fit: usize = rows.iter().map(|c| c.outcomes[OUTCOMES.len()]).sum();
+        let without_fit: usize = rows.iter().map(|c| c.outcomes[Outcome::ALL.len()]).sum();
         assert_eq!(without_fit, 1);
         let all: usize = rows.iter().flat_map(|c| &c.outcomes).sum();
         assert_eq!(all, campaign.maneuvers.len());
