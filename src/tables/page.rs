@@ -55,75 +55,105 @@ the air follows the vane as closely as the size of the gusts asks for: predictio
 next would follow any motion.
 ";
 
+/// Section of the page: a table with its columns; without any, the meaning names the table that has them.
+struct Section {
+    name: &'static str,
+    per: &'static str,
+    meaning: &'static str,
+    columns: Vec<Column<'static>>,
+}
+
+impl Section {
+    fn of<T: Table + 'static>() -> Section {
+        Section {
+            name: T::NAME,
+            per: T::PER,
+            meaning: T::MEANING,
+            columns: T::columns(&[]),
+        }
+    }
+}
+
 /// The page as Markdown.
 #[must_use]
 pub fn page() -> String {
     let mut page = String::from(HEAD);
     page.push_str("\nUnits of derivatives and biases in the column `unit`:\n\n");
     words(&mut page, DerivativeUnit::ENTRIES);
-    table::<Maneuver>(&mut page);
-    table::<Unknown>(&mut page);
-    let mut columns = FitRow::columns(&[]);
-    columns.extend(PredictedRow::columns(&[]));
-    section(&mut page, FitRow::NAME, FitRow::PER, FitRow::MEANING);
-    rows(&mut page, &columns);
-    table::<EstimateRow>(&mut page);
-    section(
-        &mut page,
-        "combined",
-        "maneuver and tabulated sum",
-        COMBINED,
-    );
-    section(&mut page, "fit_outputs", "maneuver and output", FIT_OUTPUTS);
-    rows(&mut page, &AgreementRow::columns(&[]));
-    table::<AgreementRow>(&mut page);
-    table::<JointRow>(&mut page);
-    table::<CorrelationRow>(&mut page);
-    table::<TrendRow>(&mut page);
-    table::<OutlierRow>(&mut page);
-    table::<PosteriorRow>(&mut page);
-    table::<CovarianceRow>(&mut page);
-    table::<ScaleRow>(&mut page);
-    table::<ContributionRow>(&mut page);
-    table::<SelfCheckRow>(&mut page);
-    table::<LiftAndDragRow>(&mut page);
-    table::<QualityRow>(&mut page);
-    table::<LevelRow>(&mut page);
-    table::<RootRow>(&mut page);
-    table::<MatchRow>(&mut page);
-    table::<MatchVerdictRow>(&mut page);
-    table::<ComparisonRow>(&mut page);
-    table::<ManeuverComparisonRow>(&mut page);
-    table::<VerdictRow>(&mut page);
-    table::<DisagreementRow>(&mut page);
-    table::<ChangeRow>(&mut page);
-    table::<ExtrapolationRow>(&mut page);
-    table::<ExportRow>(&mut page);
-    table::<DrawRow>(&mut page);
-    table::<NextCardRow>(&mut page);
-    table::<NextGoalRow>(&mut page);
-    table::<FlightRow>(&mut page);
-    table::<ChannelRow>(&mut page);
-    table::<CheckRow>(&mut page);
-    table::<InstrumentRow>(&mut page);
-    table::<InstrumentTrendRow>(&mut page);
-    table::<EventRow>(&mut page);
-    table::<Problem>(&mut page);
-    table::<ConditionRow>(&mut page);
-    table::<CoverageRow>(&mut page);
-    table::<StartRow>(&mut page);
+    for section in sections() {
+        heading(&mut page, &section);
+        if !section.columns.is_empty() {
+            rows(&mut page, &section.columns);
+        }
+    }
     page
 }
 
-fn table<T: Table>(page: &mut String) {
-    section(page, T::NAME, T::PER, T::MEANING);
-    rows(page, &T::columns(&[]));
+/// Sections in the order of the page.
+fn sections() -> Vec<Section> {
+    let mut fits = Section::of::<FitRow>();
+    fits.columns.extend(PredictedRow::columns(&[]));
+    vec![
+        Section::of::<Maneuver>(),
+        Section::of::<Unknown>(),
+        fits,
+        Section::of::<EstimateRow>(),
+        Section {
+            name: "combined",
+            per: "maneuver and tabulated sum",
+            meaning: COMBINED,
+            columns: Vec::new(),
+        },
+        Section {
+            name: "fit_outputs",
+            per: "maneuver and output",
+            meaning: FIT_OUTPUTS,
+            columns: AgreementRow::columns(&[]),
+        },
+        Section::of::<AgreementRow>(),
+        Section::of::<JointRow>(),
+        Section::of::<CorrelationRow>(),
+        Section::of::<TrendRow>(),
+        Section::of::<OutlierRow>(),
+        Section::of::<PosteriorRow>(),
+        Section::of::<CovarianceRow>(),
+        Section::of::<ScaleRow>(),
+        Section::of::<ContributionRow>(),
+        Section::of::<SelfCheckRow>(),
+        Section::of::<LiftAndDragRow>(),
+        Section::of::<QualityRow>(),
+        Section::of::<LevelRow>(),
+        Section::of::<RootRow>(),
+        Section::of::<MatchRow>(),
+        Section::of::<MatchVerdictRow>(),
+        Section::of::<ComparisonRow>(),
+        Section::of::<ManeuverComparisonRow>(),
+        Section::of::<VerdictRow>(),
+        Section::of::<DisagreementRow>(),
+        Section::of::<ChangeRow>(),
+        Section::of::<ExtrapolationRow>(),
+        Section::of::<ExportRow>(),
+        Section::of::<DrawRow>(),
+        Section::of::<NextCardRow>(),
+        Section::of::<NextGoalRow>(),
+        Section::of::<FlightRow>(),
+        Section::of::<ChannelRow>(),
+        Section::of::<CheckRow>(),
+        Section::of::<InstrumentRow>(),
+        Section::of::<InstrumentTrendRow>(),
+        Section::of::<EventRow>(),
+        Section::of::<Problem>(),
+        Section::of::<ConditionRow>(),
+        Section::of::<CoverageRow>(),
+        Section::of::<StartRow>(),
+    ]
 }
 
-/// A heading with the table's explanation.
-fn section(page: &mut String, name: &str, per: &str, meaning: &str) {
+/// Writes the heading of a table with its explanation.
+fn heading(page: &mut String, section: &Section) {
+    let Section { name, per, .. } = section;
     line(page, &format!("\n## {name}: one row per {per}\n"));
-    for text in meaning.lines() {
+    for text in section.meaning.lines() {
         line(page, text.strip_prefix(' ').unwrap_or(text));
     }
 }
@@ -177,32 +207,21 @@ mod tests {
         );
     }
 
-    fn assert_units<T: Table>() {
-        let columns = T::columns(&[]);
-        let has_units = columns.iter().any(|column| column.name == "unit");
-        for column in &columns {
-            let is_text = matches!(column.cells, Cells::Text(_));
-            let name = &column.name;
-            assert!(
-                is_text || has_units || !column.unit.is_empty(),
-                "{}: {name}",
-                T::NAME
-            );
-            assert!(!is_text || column.unit.is_empty(), "{}: {name}", T::NAME);
-        }
-    }
-
     #[test]
     fn every_number_has_a_unit_or_a_column_with_its_unit() {
-        assert_units::<Maneuver>();
-        assert_units::<Unknown>();
-        assert_units::<FitRow>();
-        assert_units::<CorrelationRow>();
-        assert_units::<JointRow>();
-        assert_units::<ExtrapolationRow>();
-        assert_units::<ChannelRow>();
-        assert_units::<CheckRow>();
-        assert_units::<EventRow>();
-        assert_units::<StartRow>();
+        let sections = sections();
+        assert!(sections.len() > 35, "{} tables", sections.len());
+        for Section { name, columns, .. } in &sections {
+            let has_units = columns.iter().any(|column| column.name == "unit");
+            for column in columns {
+                let is_text = matches!(column.cells, Cells::Text(_));
+                let column_name = &column.name;
+                assert!(
+                    is_text || has_units || !column.unit.is_empty(),
+                    "{name}: {column_name}"
+                );
+                assert!(!is_text || column.unit.is_empty(), "{name}: {column_name}");
+            }
+        }
     }
 }

@@ -63,8 +63,8 @@ table! {
         pub second_mach: Option<f64> ["1"],
         /// Third variable of `second`.
         pub second_third: Option<f64> ["the variable's unit"],
-        /// Covariance, in the product of both derivatives' units.
-        pub covariance: f64,
+        /// Covariance of the two values.
+        pub covariance: f64 ["product of both derivatives' units"],
     }
 }
 
