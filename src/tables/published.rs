@@ -53,3 +53,34 @@ impl From<&ComparisonRow> for PublishedVerdict {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::schema::Table;
+
+    fn assert_columns<T: Table>(row: &impl Serialize) {
+        let columns: Vec<String> = T::columns(&[]).into_iter().map(|c| c.name).collect();
+        let read = serde_json::to_value(row).unwrap();
+        for name in read.as_object().unwrap().keys() {
+            assert!(columns.contains(name), "{} has no column {name}", T::NAME);
+        }
+    }
+
+    #[test]
+    fn columns_that_are_read_back_are_published() {
+        assert_columns::<TrendRow>(&PublishedTrend {
+            derivative: "Cm_q".to_owned(),
+            unit: "1/rad".to_owned(),
+            group: "all".to_owned(),
+            alpha_deg: 10.0,
+            value: -5.0,
+            standard_error: 0.1,
+        });
+        assert_columns::<ComparisonRow>(&PublishedVerdict {
+            derivative: "Cm_q".to_owned(),
+            alpha_deg: 10.0,
+            verdict: TunnelVerdict::Agrees,
+        });
+    }
+}
