@@ -7,11 +7,11 @@
 
 use std::cmp::Ordering;
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
 use super::joint_filter::{JointFilter, JointResponse};
 use crate::dynamics::InGusts;
-use crate::numerics::symmetric::{scale, scaled};
+use crate::numerics::symmetric::solve_damped;
 use crate::settings::settings;
 
 settings! {
@@ -77,7 +77,7 @@ pub fn minimise<const NX: usize, E: InGusts<NX>>(
     let (mut damping, mut slow_steps) = (0.0, 0);
     while scored.iterations < settings.max_iterations {
         let (gradient, information) = scored.free_system(filter, floors);
-        let Some(full) = step(&information, &gradient, 0.0) else {
+        let Some(full) = solve_damped(&information, &gradient, 0.0) else {
             "the information matrix is singular".clone_into(&mut scored.reason);
             break;
         };
@@ -141,7 +141,7 @@ impl Scored {
         // A damped step may fail: its cost alone is cheap.
         let mut may_fail = *damping > 0.0;
         while *damping < MOST_DAMPING {
-            if let Some(step) = step(information, gradient, *damping) {
+            if let Some(step) = solve_damped(information, gradient, *damping) {
                 let next =
                     stepped_parameters(&self.parameters, &step, floors, filter.first_noise());
                 let lowers = |response: &JointResponse| response.cost < self.response.cost;
@@ -198,16 +198,4 @@ fn stepped_parameters(
         (value + step).max(*floor)
     })
     .collect()
-}
-
-/// Solves (H + damping · diag H) d = g for the step d, with the information H scaled to unit
-/// diagonal and the gradient g of −J.
-fn step(information: &DMatrix<f64>, gradient: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
-    let unit = scale(information);
-    let mut h = scaled(information, &unit);
-    for i in 0..h.nrows() {
-        h[(i, i)] += damping;
-    }
-    let solution = Cholesky::new(h)?.solve(&gradient.component_mul(&unit));
-    Some(solution.component_mul(&unit))
 }

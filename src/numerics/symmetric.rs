@@ -1,6 +1,6 @@
 //! Symmetric positive definite matrices: scaling to unit diagonal, and the inverse.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::matrix::AlignedMatrix;
 
@@ -30,6 +30,22 @@ pub fn inverse(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
             .to_dense(),
         &scale,
     ))
+}
+
+/// Solution d of (H + damping · diag H) d = g, computed at unit diagonal; `None` unless positive definite.
+#[must_use]
+pub fn solve_damped(
+    information: &DMatrix<f64>,
+    right: &DVector<f64>,
+    damping: f64,
+) -> Option<DVector<f64>> {
+    let unit = scale(information);
+    let mut h = scaled(information, &unit);
+    for i in 0..h.nrows() {
+        h[(i, i)] += damping;
+    }
+    let solution = Cholesky::new(h)?.solve(&right.component_mul(&unit));
+    Some(solution.component_mul(&unit))
 }
 
 /// Columns of a block of [`square`].

@@ -18,14 +18,14 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
 use super::cost::add_square;
 use super::whittle;
 use crate::dynamics::motion::slope_reach;
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
 use crate::numerics::harmonics::Harmonics;
-use crate::numerics::symmetric::{scale, scaled};
+use crate::numerics::symmetric::solve_damped;
 use crate::output_error::case::build_up::BuildUpTerm;
 use crate::output_error::case::{Case, Measurements};
 
@@ -149,13 +149,7 @@ fn regress_coefficient<const NX: usize, E: Equations<NX>>(
         }
     }
     normal.fill_upper_triangle_with_lower_triangle();
-    let unit = scale(&normal);
-    let mut scaled = scaled(&normal, &unit);
-    for i in 0..range.len() {
-        scaled[(i, i)] += PRIOR_WEIGHT;
-    }
-    let solution = Cholesky::new(scaled)?.solve(&right.component_mul(&unit));
-    let change = solution.component_mul(&unit);
+    let change = solve_damped(&normal, &right, PRIOR_WEIGHT)?;
     change.iter().all(|d| d.is_finite()).then_some(change)
 }
 

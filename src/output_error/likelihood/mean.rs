@@ -5,9 +5,9 @@
 //! parameter's own bound would fail: constant and slope of one maneuver are strongly correlated,
 //! and only their sum is well determined.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
-use crate::numerics::symmetric::{inverse, scale, scaled};
+use crate::numerics::symmetric::{inverse, solve_damped};
 
 /// Estimates of some of the wanted parameters, with their covariance.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,9 +33,7 @@ pub fn weighted(estimates: &[Estimate], n: usize) -> Option<DVector<f64>> {
             }
         }
     }
-    let scale = scale(&information);
-    let solution = Cholesky::new(scaled(&information, &scale))?.solve(&right.component_mul(&scale));
-    let mean = solution.component_mul(&scale);
+    let mean = solve_damped(&information, &right, 0.0)?;
     mean.iter().all(|v| v.is_finite()).then_some(mean)
 }
 

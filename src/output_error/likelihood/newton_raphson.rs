@@ -5,13 +5,13 @@
 //! iteration only improves the start. From there on every response is whole and decides where the
 //! iteration ends.
 
-use nalgebra::{Cholesky, DVector};
+use nalgebra::DVector;
 
 use super::cost::Sums;
 use super::definition::Likelihood;
 use super::outcome::{Fit, Outcome};
 use crate::dynamics::OUTPUTS;
-use crate::numerics::symmetric::{scale, scaled};
+use crate::numerics::symmetric::solve_damped;
 use crate::output_error::kernel::response::Detail;
 use crate::settings::settings;
 
@@ -218,14 +218,6 @@ fn full_step(sums: &Sums) -> Option<DVector<f64>> {
     damped_step(sums, 0.0).or_else(|| damped_step(sums, FIRST_DAMPING))
 }
 
-/// Solves (H + damping · diag H) d = g for the step d, with the information H scaled to unit
-/// diagonal and the gradient g.
 fn damped_step(sums: &Sums, damping: f64) -> Option<DVector<f64>> {
-    let unit = scale(&sums.information);
-    let mut h = scaled(&sums.information, &unit);
-    for i in 0..h.nrows() {
-        h[(i, i)] += damping;
-    }
-    let solution = Cholesky::new(h)?.solve(&sums.gradient.component_mul(&unit));
-    Some(solution.component_mul(&unit))
+    solve_damped(&sums.information, &sums.gradient, damping)
 }
