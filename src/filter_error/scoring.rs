@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::joint_filter::{JointFilter, JointResponse};
 use crate::dynamics::InGusts;
+use crate::numerics::damping::{next_damping, raised_damping};
 use crate::numerics::symmetric::solve_damped;
 use crate::settings::settings;
 
@@ -153,24 +154,14 @@ impl Scored {
                     let predicted = gradient.dot(&step) - 0.5 * (information * &step).dot(&step);
                     let kept = (self.response.cost - response.cost) / predicted;
                     (self.parameters, self.response) = (next, response);
-                    *damping = next_damping(*damping, kept);
+                    *damping = next_damping(*damping, kept, FIRST_DAMPING);
                     return true;
                 }
             }
             may_fail = true;
-            *damping = (*damping * 10.0).max(FIRST_DAMPING);
+            *damping = raised_damping(*damping, FIRST_DAMPING);
         }
         false
-    }
-}
-
-/// Damping after a step, by the ratio of its gain to the predicted gain.
-fn next_damping(damping: f64, kept: f64) -> f64 {
-    match kept {
-        k if k > 0.75 && damping > FIRST_DAMPING => damping / 10.0,
-        k if k > 0.75 => 0.0,
-        k if k < 0.25 => (damping * 10.0).max(FIRST_DAMPING),
-        _ => damping,
     }
 }
 

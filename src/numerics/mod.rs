@@ -5,6 +5,7 @@
 pub mod bisection;
 pub mod chi_squared;
 pub(crate) mod cubic_curve;
+pub mod damping;
 pub mod differences;
 pub(crate) mod digits;
 pub mod dual;

@@ -11,6 +11,7 @@ use super::cost::Sums;
 use super::definition::Likelihood;
 use super::outcome::{Fit, Outcome};
 use crate::dynamics::OUTPUTS;
+use crate::numerics::damping::{next_damping, raised_damping};
 use crate::numerics::symmetric::solve_damped;
 use crate::output_error::kernel::response::Detail;
 use crate::settings::settings;
@@ -181,12 +182,13 @@ impl<'a, D: Likelihood> StepSearch<'a, D> {
                     let gain = sums.weighted_square - lower.weighted_square;
                     if gain > 0.0 {
                         let kept = gain / predicted_gain(sums, &step);
-                        self.damping = next_damping(self.damping, kept);
+                        // With large residuals, undamped Gauss-Newton steps zigzag across the minimum.
+                        self.damping = next_damping(self.damping, kept, FIRST_DAMPING);
                         return Some((next, lower));
                     }
                 }
             }
-            self.damping = (self.damping * 10.0).max(FIRST_DAMPING);
+            self.damping = raised_damping(self.damping, FIRST_DAMPING);
         }
         None
     }
@@ -199,18 +201,6 @@ fn stepped_parameters(values: &[f64], step: &DVector<f64>) -> Vec<f64> {
 /// Reduction of Σ w v² by a step if the residuals were linear in the parameters.
 fn predicted_gain(sums: &Sums, step: &DVector<f64>) -> f64 {
     2.0 * sums.gradient.dot(step) - (&sums.information * step).dot(step)
-}
-
-/// Damping after a step, by the ratio of its gain to the predicted gain: less after a good
-/// prediction, more after a poor one. With large residuals, undamped Gauss-Newton steps zigzag
-/// across the minimum.
-fn next_damping(damping: f64, kept: f64) -> f64 {
-    match kept {
-        k if k > 0.75 && damping > FIRST_DAMPING => damping / 10.0,
-        k if k > 0.75 => 0.0,
-        k if k < 0.25 => (damping * 10.0).max(FIRST_DAMPING),
-        _ => damping,
-    }
 }
 
 /// Undamped step, with the least damping where the matrix is singular to rounding.
