@@ -4,6 +4,7 @@ use super::task::Task;
 use crate::aero::Axis;
 use crate::filter_error::noise::Noise;
 use crate::flight::signal;
+use crate::numerics::mean::mean;
 use crate::units::DEG;
 
 /// Scale of turbulence at altitude, ft (MIL-F-8785C, Dryden): with it the random walk of the angle
@@ -14,7 +15,7 @@ const GUST_SCALE_FT: f64 = 1750.0;
 pub(super) fn gust_ft_s(task: &Task, noise: &Noise, step_s: f64) -> f64 {
     let maneuver = task.record.values(signal::VELOCITY).unwrap_or_default();
     let velocities = maneuver.get(task.range()).unwrap_or_default();
-    let velocity = velocities.iter().sum::<f64>() / velocities.len().max(1) as f64;
+    let velocity = mean(velocities.iter().copied());
     let steps = GUST_SCALE_FT / (2.0 * velocity * step_s);
     velocity * noise.angle * steps.sqrt()
 }

@@ -89,7 +89,7 @@ impl Search<'_> {
         let Some(values) = own.and_then(|choice| self.grid.columns.get(&choice.column)) else {
             return 0.0;
         };
-        let reflected = about_mean(values);
+        let reflected = reflected_about_mean(values);
         let growth = |equation: Equation| {
             let own = self.misfit(equation, assignment)?.ratio;
             let replaced = |q: Quantity| (q == quantity).then_some(&reflected[..]);
@@ -221,7 +221,7 @@ pub fn turned(assignment: &Assignment, reversed: impl Iterator<Item = Quantity>)
 }
 
 /// A series reflected about its mean.
-fn about_mean(values: &[f64]) -> Vec<f64> {
+fn reflected_about_mean(values: &[f64]) -> Vec<f64> {
     let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     let mean = finite.iter().sum::<f64>() / finite.len() as f64;
     values.iter().map(|value| 2.0 * mean - value).collect()

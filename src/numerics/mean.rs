@@ -7,6 +7,12 @@ pub fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     values.sum::<f64>() / count
 }
 
+/// Root mean square of all values; zero without one.
+#[must_use]
+pub fn root_mean_square(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    mean(values.map(|v| v * v)).sqrt()
+}
+
 /// Mean of the finite values; `None` without one.
 #[must_use]
 pub fn finite_mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {

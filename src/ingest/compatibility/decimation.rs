@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::flight::{Mark, Record};
+use crate::numerics::mean::mean;
 use crate::output_error::surface_noise::white_variance;
 
 /// Samples of the record that are averaged into one sample of a window, alike for all channels: at least
@@ -24,7 +25,7 @@ pub fn decimation(step_s: f64) -> usize {
 pub fn decimate(values: &[f64], decimation: usize) -> Vec<f64> {
     values
         .chunks_exact(decimation)
-        .map(|v| v.iter().sum::<f64>() / decimation as f64)
+        .map(|v| mean(v.iter().copied()))
         .collect()
 }
 

@@ -14,7 +14,7 @@
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
-use crate::numerics::mean::mean;
+use crate::numerics::mean::{mean, root_mean_square};
 use crate::numerics::symmetric::{inverse, scale, scaled};
 use crate::settings::settings;
 
@@ -176,14 +176,16 @@ impl Directions {
 pub fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
     let (da, db) = (about_mean(a), about_mean(b));
     let product: f64 = da.iter().zip(&db).map(|(x, y)| x * y).sum();
-    let size = root_mean_square(&da) * root_mean_square(&db) * da.len() as f64;
+    let size = root_mean_square(da.iter().copied())
+        * root_mean_square(db.iter().copied())
+        * da.len() as f64;
     (size > 0.0).then(|| (product / size).clamp(-1.0, 1.0))
 }
 
 /// Root mean square of a history about its mean; rounding of a constant counts as zero.
 #[must_use]
 pub fn excitation(values: &[f64]) -> f64 {
-    root_mean_square(&about_mean(values))
+    root_mean_square(about_mean(values).into_iter())
 }
 
 fn about_mean(values: &[f64]) -> Vec<f64> {
@@ -199,10 +201,6 @@ fn about_mean(values: &[f64]) -> Vec<f64> {
             }
         })
         .collect()
-}
-
-fn root_mean_square(values: &[f64]) -> f64 {
-    mean(values.iter().map(|v| v * v)).sqrt()
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::class_markers::ClassMarkers;
 use super::history_strips;
 use crate::aero::Axis;
-use crate::numerics::mean::mean;
+use crate::numerics::mean::{mean, root_mean_square};
 use crate::report::contents::{Contents, group_by};
 use crate::report::figure::legend::{LegendView, key, line};
 use crate::report::figure::scale::extent;
@@ -218,9 +218,8 @@ fn correlated_figure(
 /// lacks the signal or it did not move.
 fn normalised_change(history: &History, name: &str) -> Option<Points> {
     let points = history::points(history, samples(history, name)?);
-    let count = points.len() as f64;
-    let mean = points.iter().map(|p| p.1).sum::<f64>() / count;
-    let rms = (points.iter().map(|p| (p.1 - mean).powi(2)).sum::<f64>() / count).sqrt();
+    let mean = mean(points.iter().map(|p| p.1));
+    let rms = root_mean_square(points.iter().map(|p| p.1 - mean));
     (rms > 0.0).then(|| {
         points
             .into_iter()
@@ -296,7 +295,11 @@ fn rate_figure(
     let sizes: Vec<String> = measured
         .iter()
         .map(|(history, points)| {
-            format!("{} {}", history.class, fixed(root_mean_square(points), 1))
+            format!(
+                "{} {}",
+                history.class,
+                fixed(root_mean_square(points.iter().map(|p| p.1)), 1)
+            )
         })
         .collect();
     let caption = format!("Root mean square, deg/s: {}.", sizes.join(", "));
@@ -351,10 +354,6 @@ fn rate_strips(name: &str, measured: &[(&History, Points)], markers: &ClassMarke
             strip
         })
         .collect()
-}
-
-fn root_mean_square(points: &[(f64, f64)]) -> f64 {
-    mean(points.iter().map(|p| p.1 * p.1)).sqrt()
 }
 
 #[cfg(test)]
