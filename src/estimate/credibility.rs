@@ -53,7 +53,7 @@ impl<const NX: usize, E: Equations<NX>> Credibility<'_, '_, NX, E> {
         let doubts = doubts.join("; ");
         match self.task.context.settings.doubtful {
             Doubtful::LeaveOut => (row.outcome, row.reason) = (Outcome::Doubtful, doubts),
-            Doubtful::Use => row.reason = format!("{}; used though {doubts}", row.reason),
+            Doubtful::Use => row.reason = format!("{}; used in spite of: {doubts}", row.reason),
         }
     }
 
@@ -142,8 +142,9 @@ impl<const NX: usize, E: Equations<NX>> Credibility<'_, '_, NX, E> {
             };
             let error = self.impossible_error(output, first + i, change, DEG);
             let name = &case.names[first + i];
-            doubts
-                .extend(error.map(|error| format!("{name} differs from the measured by {error}")));
+            doubts.extend(
+                error.map(|error| format!("{name} differs from its measured value by {error}")),
+            );
         }
         doubts
     }

@@ -252,7 +252,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
     fn reason_in_words(&self, parameter: usize, because: Option<HoldingReason>) -> String {
         let names = &self.wide.names;
         match because {
-            None => "it was held beside others that are free now".to_owned(),
+            None => "held together with derivatives that were freed later".to_owned(),
             Some(HoldingReason::NotExcited) => {
                 match self.task.context.buildup.derivative(&names[parameter]) {
                     Some(Derivative {
@@ -266,7 +266,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
             }
             Some(HoldingReason::NotSeparable(others)) => {
                 let others: Vec<&str> = others.iter().map(|&j| names[j].as_str()).collect();
-                format!("the data do not tell it apart from {}", others.join(", "))
+                format!("not identifiable beside {}", others.join(", "))
             }
             Some(HoldingReason::Bound {
                 bound,

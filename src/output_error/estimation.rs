@@ -106,7 +106,7 @@ fn identify<D: Bounded>(data: &D, fit: &mut Fit<D::Response>, settings: &Setting
             let names: Vec<&str> = names.map(String::as_str).collect();
             fit.condition_number = condition_number;
             fit.outcome = Outcome::Unidentifiable;
-            fit.reason = format!("the data do not tell apart {}", names.join(", "));
+            fit.reason = format!("not identifiable together: {}", names.join(", "));
             fit.undetermined = parameters;
         }
     }

@@ -67,7 +67,7 @@ impl<'a> Step for SegmentStep<'a> {
     type Artefact = FoundManeuvers;
 
     const KIND: Kind = Kind::Segment;
-    const VERSION: u32 = 15;
+    const VERSION: u32 = 16;
 
     fn item(&self) -> &str {
         self.flight.id()

@@ -150,8 +150,8 @@ impl ExaminedSeries {
         let mut problems: Vec<Problem> = far
             .map(|sample| {
                 let reason = format!(
-                    "`{}`: {} is far from the other flights' ({}, scatter {}). The record is not corrected by it: \
-                     look after the instrument of this flight",
+                    "`{}`: {} is far from the other flights' ({}, scatter {}). This error is not corrected: \
+                     check the instrument of this flight",
                     series.channel,
                     self.in_words(sample.value, sample.bound),
                     self.in_words(common.mean, common.bound),

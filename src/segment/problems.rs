@@ -88,7 +88,7 @@ fn of_stuck_flag(record: &Record, flag: &str, found: &[FoundManeuver]) -> Option
         .filter(|f| f.class.recognition.flags.get(flag) == Some(&!is_up))
         .count();
     let reason = format!(
-        "is {} throughout, and {contradictions} maneuvers say otherwise: it is stuck",
+        "is {} throughout and contradicts {contradictions} maneuvers: it is stuck",
         if is_up { "up" } else { "down" }
     );
     (contradictions >= FEWEST_CONTRADICTIONS && positions.all(|up| up == is_up))

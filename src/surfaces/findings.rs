@@ -99,8 +99,8 @@ impl SurfaceFindings {
                 flight_id: flight_id.to_owned(),
                 place: format!("channel `{}`", row.channel),
                 reason: format!(
-                    "`{}` acts against the wind tunnel: {:.2} times its effect (bound {:.2}) in {} maneuvers. Its sign \
-                     is reversed, or its tunnel values are: check both (aircraft.yaml: channels: {}: sign: -1)",
+                    "the effect of `{}` is {:.2} times the tunnel's (bound {:.2}) in {} maneuvers: its sign, or that of its \
+                     tunnel values, is reversed; check both (aircraft.yaml: channels: {}: sign: -1)",
                     row.channel, effect.ratio, effect.bound, effect.maneuvers, row.channel
                 ),
             });

@@ -301,7 +301,7 @@ fn of_surfaces_that_move_in_proportion_evidence_holds_one_and_says_from_what_it_
     let other = if name == "Cm_de" { "Cm_twin" } else { "Cm_de" };
     assert!(["Cm_de", "Cm_twin"].contains(&name), "{held:?}");
     assert!(
-        because.starts_with("the data do not tell it apart from") && because.contains(other),
+        because.starts_with("not identifiable beside") && because.contains(other),
         "{because}"
     );
     // The twin moves by twice the elevator: an error of the one enters the other, and its

@@ -68,7 +68,7 @@ pub fn wrong_time(checks: &[Check]) -> Option<ImpossibleSignal> {
             signal: signal::TIME,
             reason: format!(
                 "it counts {seconds:.4} s for each second of the motion: attitudes, altitude and speed change {slope:.3} \
-                 times as fast as rates and accelerations say, in {} relations{unit} Correct its unit in the channel map, \
+                 times as fast as rates and accelerations imply, in {} relations{unit} Correct its unit in the channel map, \
                  or leave the flight out",
                 all.len()
             ),

@@ -14,6 +14,9 @@ use crate::flight::{Channel, signal};
 use crate::tables::{InstrumentRow, InstrumentVerdict};
 use crate::units::Unit;
 
+/// Verb of a scale error in words; the other errors follow "is".
+const READS: &str = "reads";
+
 /// Estimated errors of one instrument; `None` for an error that the flight does not determine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InstrumentFinding {
@@ -74,7 +77,7 @@ impl InstrumentFinding {
             let e = self.estimates[kind as usize].filter(|e| e.fault)?;
             let words = match kind {
                 Kind::Bias => format!("off by {:.3} {}", e.value, self.unit()),
-                Kind::Scale => format!("reads {:.3} times what it should", 1.0 + e.value),
+                Kind::Scale => format!("{READS} {:.3} times what it should", 1.0 + e.value),
                 Kind::Delay if e.value > 0.0 => format!("delayed by {:.0} ms", 1e3 * e.value),
                 Kind::Delay => format!("ahead by {:.0} ms", -1e3 * e.value),
             };
@@ -102,13 +105,21 @@ impl InstrumentFinding {
             })
         };
         let bounds: Vec<String> = ALL_KINDS.into_iter().filter_map(bound).collect();
-        let (faults, bounds) = (self.faults().join(", "), bounds.join(", "));
+        let predicate = |fault: String| {
+            if fault.starts_with(READS) {
+                fault
+            } else {
+                format!("is {fault}")
+            }
+        };
+        let faults: Vec<String> = self.faults().into_iter().map(predicate).collect();
         format!(
-            "`{}` is {faults} against the other channels ({bounds}){}",
+            "`{}` {} against the other channels ({}){}",
             self.channel,
+            faults.join(", "),
+            bounds.join(", "),
             self.vane_position().unwrap_or_default()
         )
-        .replace("is reads", "reads")
     }
 
     /// Temperature of the air that explains the scale error of q̄, in words.
@@ -133,7 +144,7 @@ impl InstrumentFinding {
         let (distance_ft, speed_ft_s) = (delay.value * self.speed_ft_s?, self.speed_ft_s?);
         let direction = if distance_ft > 0.0 { "ahead" } else { "aft" };
         Some(format!(
-            "; a vane {:.1} ft further {direction} than aircraft.yaml has it reads so at {speed_ft_s:.0} ft/s: check its \
+            "; a vane {:.1} ft {direction} of its position in aircraft.yaml has this delay at {speed_ft_s:.0} ft/s: check the \
              position first",
             distance_ft.abs()
         ))
@@ -147,9 +158,9 @@ impl InstrumentFinding {
             .flatten()
             .any(|e| e.fault && e.applied)
         {
-            "the record is corrected by it. Look after the instrument or the recorder"
+            "the record is corrected by it. Check the instrument and the recorder"
         } else {
-            "the channel is left as recorded. Look after the instrument or the recorder, or have it corrected \
+            "the channel is left as recorded. Check the instrument and the recorder, or have it corrected \
              (ingest: compatibility: fault: apply)"
         }
     }
@@ -207,9 +218,9 @@ mod tests {
             air_temperature: None,
         };
         let ahead = finding(signal::ALPHA_VANE, 0.088).fault_sentence();
-        assert!(ahead.contains("15.0 ft further ahead"), "{ahead}");
+        assert!(ahead.contains("15.0 ft ahead of its position"), "{ahead}");
         let aft = finding(signal::BETA_VANE, -0.088).fault_sentence();
-        assert!(aft.contains("15.0 ft further aft"), "{aft}");
+        assert!(aft.contains("15.0 ft aft of its position"), "{aft}");
         assert!(
             !finding(signal::THETA, 0.088)
                 .fault_sentence()

@@ -73,7 +73,10 @@ fn findings(segment: &Segment, class: &Class) -> Vec<Finding> {
         let does = if *wanted { "moves" } else { "rests" };
         findings.push(match segment.moves(signal) {
             Some(_) => Finding::new(1.0, format!("{signal} {does}")),
-            None => Finding::new(MOTION_UNCLEAR, format!("{signal} says nothing")),
+            None => Finding::new(
+                MOTION_UNCLEAR,
+                format!("{signal} neither moves nor rests clearly"),
+            ),
         });
     }
     for (signal, pulses) in &class.recognition.pulses {
