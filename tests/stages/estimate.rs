@@ -1,7 +1,7 @@
 //! Estimate: every maneuver a row, the demonstration's derivatives near their truths, new
 //! derivatives by YAML alone.
 
-use crate::support::{Campaign, Row, demo, number};
+use crate::support::{Campaign, Row, demo, number, rows};
 
 /// Two tables of estimates are the same but for rounding: to a thousandth of the estimate's own
 /// bound.
@@ -20,11 +20,11 @@ pub fn assert_same_estimates(a: &[Row], b: &[Row]) {
     }
 }
 
-fn estimate(maneuver: &str, derivative: &str) -> f64 {
+fn estimate(maneuver: &str, derivative: &str) -> &'static Row {
     let of = |row: &&Row| row["maneuver_id"] == maneuver && row["derivative"] == derivative;
-    let row = demo().tables["estimates"].iter().find(of).unwrap();
+    let row = rows("estimates").iter().find(of).unwrap();
     assert_eq!(row["status"], "estimated", "{row:?}");
-    number(row, "value")
+    row
 }
 
 #[test]
@@ -42,7 +42,7 @@ fn derivatives_are_near_those_that_were_flown() {
     // The last number of each line is the derivative that was true during the maneuver, from the
     // list that came with the simulated campaign (JSBSim). The instruments have biases and scale
     // factors of one to two per cent; a derivative is a ratio of two channels, and a tenth is what
-    // two such errors and a bound of a few per cent leave.
+    // two such errors and a bound of a few per cent leave. The corrected bound has both in it.
     for (maneuver, derivative, truth) in [
         ("flight_001_t00118", "CN_alpha", 0.084_940),
         ("flight_003_t00103", "CN_alpha", 0.038_856),
@@ -58,10 +58,17 @@ fn derivatives_are_near_those_that_were_flown() {
         ("flight_003_t00541", "Cn_dyv", 2127.180),
         ("flight_004_t00124", "Cl_p", -0.227_934),
     ] {
-        let ratio = estimate(maneuver, derivative) / truth;
+        let row = estimate(maneuver, derivative);
+        let (value, bound) = (number(row, "value"), number(row, "bound_corrected"));
+        let ratio = value / truth;
         assert!(
             (ratio - 1.0).abs() < 0.1,
             "{derivative} of {maneuver} is {ratio} times the truth"
+        );
+        let errors = (value - truth).abs() / bound;
+        assert!(
+            errors < 3.0,
+            "{derivative} of {maneuver} is {errors} bounds from the truth"
         );
     }
 }
@@ -109,7 +116,7 @@ fn primary_derivatives_have_the_sign_of_a_conventional_aircraft() {
 
 #[test]
 fn a_bound_stands_beside_every_estimate_and_nowhere_else() {
-    for row in &demo().tables["estimates"] {
+    for row in rows("estimates") {
         assert_eq!(
             row["status"] == "estimated",
             !row["bound"].is_empty(),

@@ -532,8 +532,8 @@ fn no_name_of_a_file_stops_a_campaign_or_deceives_a_reader() {
         let shifted = with_values(&record, "altitude", |_, v| v + 1.0 + shift as f64);
         campaign.add(name, &shifted.slice(100 * shift, 5400));
     }
-    let outcome = campaign.harvest("run");
-    assert!(matches!(outcome.code, Some(0 | 2)), "{outcome:?}");
+    // The accelerometer is off in every flight, which is a problem of the campaign.
+    let outcome = campaign.ends("run", 2);
     assert!(!outcome.stdout.contains('\u{1b}'), "{outcome:?}");
     let flights = campaign.table("flights");
     let ids: Vec<&str> = flights.iter().map(|row| &*row["flight_id"]).collect();

@@ -58,12 +58,9 @@ fn a_simulated_campaign_is_found_and_estimated() {
     let maneuvers = flights.table("maneuvers");
     let classes: Vec<&str> = maneuvers.iter().map(|m| m["class"].as_str()).collect();
     assert_eq!(classes, ["3211", "OLAT", "PPSSTV"]);
-    assert!(
-        flights
-            .table("fits")
-            .iter()
-            .all(|fit| fit["outcome"] == "converged")
-    );
+    let fits = flights.table("fits");
+    assert_eq!(fits.len(), 3);
+    assert!(fits.iter().all(|fit| fit["outcome"] == "converged"));
 }
 
 #[test]
@@ -185,11 +182,11 @@ fn the_study_of_the_bounds_does_not_depend_on_the_threads_and_finds_wrong_bounds
 
     let rows = table(&once.join("coverage.csv"));
     let still = |r: &&Row| r["condition"] == "white" || r["condition"] == "coloured";
-    assert!(
-        rows.iter()
-            .filter(still)
-            .all(|r| r["class"] == "PPSS" && r["converged"] == "8")
-    );
+    let in_still_air: Vec<&Row> = rows.iter().filter(still).collect();
+    assert!(in_still_air.len() > 10, "{}", in_still_air.len());
+    for row in in_still_air {
+        assert!(row["class"] == "PPSS" && row["converged"] == "8", "{row:?}");
+    }
     // Eight records know a scatter to 25%; the white bound of coloured residuals is wrong by far
     // more.
     let ratio = |condition: &str, column: &str| {
@@ -204,11 +201,9 @@ fn the_study_of_the_bounds_does_not_depend_on_the_threads_and_finds_wrong_bounds
     assert!((0.6..1.5).contains(&ratio("white", "scatter_over_bound")));
     assert!(ratio("coloured", "scatter_over_bound") > 2.5);
     assert!((0.6..1.5).contains(&ratio("coloured", "scatter_over_corrected")));
-    assert!(
-        table(&once.join("starts.csv"))
-            .iter()
-            .all(|r| r["reached"] == r["records"])
-    );
+    let starts = table(&once.join("starts.csv"));
+    assert!(!starts.is_empty());
+    assert!(starts.iter().all(|r| r["reached"] == r["records"]));
     let page = fs::read_to_string(once.join("coverage.md")).unwrap();
     assert!(
         page.contains("--realisations 8`") && page.contains("| PPSS | Cm_alpha | 20 |"),

@@ -77,6 +77,7 @@ fn a_light_aircraft_is_estimated_within_its_bounds() {
     };
     assert_eq!(classes(maneuvers), classes(&events));
     let fits = &navion().tables["fits"];
+    assert_eq!(fits.len(), maneuvers.len());
     assert!(fits.iter().all(|fit| fit["outcome"] == "converged"));
 
     let truths = table(Path::new("data/navion/truth/derivatives.csv"));
@@ -103,6 +104,9 @@ fn a_light_aircraft_is_estimated_within_its_bounds() {
     instruments_are_within_their_bounds();
 }
 
+/// Signals of a flight with a bias that its short window determines.
+const WITH_BIAS: usize = 11;
+
 /// Each file is one short window, whose bounds contain the noise of rates and accelerations.
 fn instruments_are_within_their_bounds() {
     let truths = table(Path::new("data/navion/truth/instruments.csv"));
@@ -116,12 +120,18 @@ fn instruments_are_within_their_bounds() {
         Some((number(row, "bias") - truth).abs() / bound)
     };
     let distances: Vec<f64> = instruments.iter().filter_map(distance).collect();
+    let flights = navion().tables["flights"].len();
+    assert_eq!(
+        distances.len(),
+        WITH_BIAS * flights,
+        "rates, accelerations, vanes, attitudes and the speed of each flight"
+    );
     let within = distances
         .iter()
         .filter(|distance| **distance < 1.96)
         .count();
     assert!(
-        distances.len() > 100 && within * 100 >= 92 * distances.len(),
+        within * 100 >= 92 * distances.len(),
         "{within} of {} biases are within their intervals",
         distances.len()
     );

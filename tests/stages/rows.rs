@@ -5,17 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 
 use crate::compare::verdict;
-use crate::support::{Campaign, Row, demo, number};
+use crate::support::{Campaign, Row, demo, number, rows};
 
 fn near(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-9 * a.abs().max(b.abs())
-}
-
-/// Rows of a table of the demonstration; it must have some.
-fn rows(table: &str) -> &'static [Row] {
-    let rows = &demo().tables[table];
-    assert!(!rows.is_empty(), "{table} has no rows");
-    rows
 }
 
 /// Estimates and sums of the demonstration by maneuver and derivative.

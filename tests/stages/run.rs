@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Stdio;
 use std::time::{Duration, Instant, SystemTime};
 
@@ -201,7 +201,7 @@ const PUBLISHED: &[(&str, &str, &str)] = &[
 ];
 
 /// Tables without rows in the demonstration: it has one maneuver of each class at an angle of attack,
-/// no list of events, and nothing fails. Their rows are tested in `rows`, `together`, `segment` and
+/// no list of events, and nothing fails. Their rows are tested in `rows`, `joint_estimation`, `segment` and
 /// `ingest`.
 const WITHOUT_ROWS: [&str; 7] = [
     "beyond_tunnel",
@@ -439,21 +439,41 @@ fn a_killed_run_goes_on_where_it_was() {
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    let records = campaign.path("store/records");
+    let ingested = campaign.path("store/ingest");
     let patience = Instant::now() + Duration::from_mins(1);
-    while fs::read_dir(&records).map_or(0, Iterator::count) == 0 && Instant::now() < patience {
+    while whole_files(&ingested).is_empty() && Instant::now() < patience {
         std::thread::sleep(Duration::from_millis(1));
     }
     child.kill().unwrap();
     child.wait().unwrap();
+    let made = whole_files(&ingested);
+    assert!(!made.is_empty(), "it was killed before its first flight");
     assert!(
         !campaign.path("reports/report.html").exists(),
         "it was killed before its end"
     );
 
     campaign.finishes("run");
+    let after = whole_files(&ingested);
+    assert!(
+        made.iter().all(|(path, time)| after[path] == *time),
+        "a flight was ingested again"
+    );
     assert!(campaign.bytes("store") == store);
     assert!(campaign.bytes("reports") == reports);
+}
+
+/// Files of a folder with their times of last write, without those that are being written.
+fn whole_files(folder: &Path) -> BTreeMap<PathBuf, SystemTime> {
+    let Ok(entries) = fs::read_dir(folder) else {
+        return BTreeMap::new();
+    };
+    let whole = entries
+        .map(Result::unwrap)
+        .filter(|entry| !entry.file_name().to_string_lossy().starts_with('.'));
+    whole
+        .map(|entry| (entry.path(), entry.metadata().unwrap().modified().unwrap()))
+        .collect()
 }
 
 #[test]
