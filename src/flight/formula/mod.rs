@@ -4,14 +4,17 @@
 //! `+ - * / ^` and parentheses. Columns are converted to degree, foot, slug, second and kelvin first,
 //! so a formula holds in any units. A sum of different quantities is refused.
 
+mod parser;
+mod parts;
+mod tokens;
+
 use serde::Serialize;
 
-use super::formula_parser;
-use super::formula_parts::{MOST_OPERANDS, Node};
-use super::linear_table::LinearTable;
+use self::parts::{MOST_OPERANDS, Node};
+use crate::flight::linear_table::LinearTable;
 use crate::units::{Conversion, Unit, name_of};
 
-pub use super::formula_parts::Operand;
+pub use self::parts::Operand;
 
 /// Largest number of characters of a formula.
 const LONGEST: usize = 500;
@@ -54,7 +57,7 @@ impl Formula {
         if text.chars().count() > LONGEST {
             return Err(format!("a formula has at most {LONGEST} characters"));
         }
-        let parsed = formula_parser::parse(text, &operand)?;
+        let parsed = parser::parse(text, &operand)?;
         if parsed.dimensions != target.dimensions() {
             return Err(format!(
                 "it is in {}, which is no {}",

@@ -1,7 +1,7 @@
 //! Recursive-descent parser of formulas, which checks units.
 
-use super::formula_parts::{MOST_OPERANDS, Node, Operand};
-use super::formula_tokens::{Token, tokens};
+use super::parts::{MOST_OPERANDS, Node, Operand};
+use super::tokens::{Token, tokens};
 use crate::units::{Conversion, Dimensions, Unit, UnitProduct, name_of};
 
 /// Deepest nesting of parentheses and signs.
