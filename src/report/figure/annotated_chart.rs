@@ -6,7 +6,7 @@ use std::fmt::Write;
 use super::scale::Scale;
 use super::strip::{Sizes, Strip};
 use super::strip_marks::{self, MISSING_STYLE};
-use super::strips::{StripColumn, StripDrawing};
+use super::strip_renderer::{StripColumn, StripDrawing};
 use super::style::{EXCLUDED_COLOUR, FAINT, INK};
 use super::svg_writer::{Alternative, PathStyle, SvgWriter, TextStyle, coordinate, rectangle};
 

@@ -6,9 +6,8 @@
 //!   maneuver class), `verdict_bar`;
 //! - `derivative_figure`: estimates over angle of attack; the only file that uses the plotting crate;
 //! - `svg_writer`, and `layers` (shapes of one style as one path);
-//! - `strip` and `strip_marks` (a signal over time, its marks), `strips` (the renderer of all strip
-//!   charts), `strip_figure` (time histories
-//!   of the report), `annotated_chart` (strip charts with shaded maneuvers);
+//! - `strip` and `strip_marks` (a signal over time, its marks), `strip_renderer` (of all strip
+//!   charts), `strip_figure` (time histories of the report), `annotated_chart` (strip charts with shaded maneuvers);
 //! - `xy_chart`: one quantity over another, with levels; `chart_axis` and `chart_labels` are its
 //!   parts.
 
@@ -23,7 +22,7 @@ pub mod scale;
 pub mod strip;
 pub mod strip_figure;
 mod strip_marks;
-pub mod strips;
+pub mod strip_renderer;
 pub mod style;
 pub mod svg_writer;
 pub mod verdict_bar;

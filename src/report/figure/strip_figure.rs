@@ -2,7 +2,7 @@
 
 use super::scale::Scale;
 use super::strip::{Sizes, Strip};
-use super::strips::{StripColumn, StripDrawing};
+use super::strip_renderer::{StripColumn, StripDrawing};
 use super::svg_writer::{Alternative, SvgWriter};
 
 /// A drawing of strips.
