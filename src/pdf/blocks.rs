@@ -20,7 +20,7 @@ const TITLE_SIZE: f32 = 18.0;
 const CHAPTER_SIZE: f32 = 13.0;
 const SECTION_SIZE: f32 = 10.5;
 /// Gap between children side by side, pt.
-const GAP: f32 = 16.0;
+const PAIR_GAP: f32 = 16.0;
 /// Largest size of a drawing's unit, pt.
 const LARGEST_UNIT: f32 = 1.0;
 const LIST_INDENT: f32 = 11.0;
@@ -255,12 +255,12 @@ impl<'a> Blocks<'a> {
 
     /// Children two by two, each pair as high as the higher one.
     fn pairs(&mut self, node: Node, width: f32, style: Style) -> Vec<Item> {
-        let column = 0.5 * (width - GAP);
+        let column = 0.5 * (width - PAIR_GAP);
         let children: Vec<Node> = node.children().filter(Node::is_element).collect();
         let mut items = Vec::new();
         for pair in children.chunks(2) {
             let mut row = Item::default();
-            for (child, x) in pair.iter().zip([0.0, column + GAP]) {
+            for (child, x) in pair.iter().zip([0.0, column + PAIR_GAP]) {
                 let cell = joined(&self.block(*child, column, style));
                 row.height = row.height.max(cell.height);
                 row.absorb(&cell, x, 0.0);

@@ -175,14 +175,14 @@ fn anchor_headings(items: &mut [Item]) -> Vec<Entry> {
 }
 
 /// Gap between the columns of the contents, pt.
-const GAP: f32 = 20.0;
-const COLUMN: f32 = 0.5 * (WIDTH - 2.0 * MARGIN - GAP);
+const COLUMN_GAP: f32 = 20.0;
+const COLUMN: f32 = 0.5 * (WIDTH - 2.0 * MARGIN - COLUMN_GAP);
 /// Width reserved for the page number in a line of the contents, pt.
 const NUMBER_WIDTH: f32 = 26.0;
 
 /// A line of the contents: heading, cut to the column, and page number.
 fn contents_line(entry: &Entry, fonts: &Fonts) -> Item {
-    const HEIGHT: f32 = 11.0;
+    const LINE_HEIGHT: f32 = 11.0;
     const BASE: f32 = 8.5;
     let style = match entry.level {
         0 => Style::of_size(8.5).bold(),
@@ -199,7 +199,7 @@ fn contents_line(entry: &Entry, fonts: &Fonts) -> Item {
         ..style
     };
     Item {
-        height: HEIGHT,
+        height: LINE_HEIGHT,
         marks: vec![
             Mark::Text {
                 x,
@@ -218,7 +218,7 @@ fn contents_line(entry: &Entry, fonts: &Fonts) -> Item {
                 x,
                 y: 0.0,
                 width: COLUMN - x,
-                height: HEIGHT,
+                height: LINE_HEIGHT,
                 target: entry.anchor.clone(),
             },
         ],
@@ -240,7 +240,7 @@ fn in_columns(lines: &[Item]) -> Vec<Item> {
         for (i, item) in left.iter().enumerate() {
             let mut row = item.clone();
             if let Some(beside) = right.get(i) {
-                row.absorb(beside, COLUMN + GAP, 0.0);
+                row.absorb(beside, COLUMN + COLUMN_GAP, 0.0);
             }
             rows.push(row);
         }

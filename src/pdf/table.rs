@@ -15,7 +15,7 @@ use super::item::{Colour, INK, Item, Mark, RULE, Style};
 /// Sizes of type, tried in turn, pt.
 const SIZES: [f32; 5] = [7.5, 7.0, 6.5, 6.0, 5.5];
 /// Gap between columns, pt.
-const GAP: f32 = 6.0;
+const CELL_GAP: f32 = 6.0;
 
 /// Classes of shaded cells with their colours, and `true` if the text is white.
 const SHADES: [(&str, Colour, bool); 4] = [
@@ -79,7 +79,7 @@ fn lay_out(table: Node, width: f32, fonts: &Fonts) -> (TableLayout, Vec<Row>) {
     for size in sizes {
         grid = read(table, fonts, *size);
         let (least, most) = column_widths(&grid);
-        let room = width - GAP * most.len().saturating_sub(1) as f32;
+        let room = width - CELL_GAP * most.len().saturating_sub(1) as f32;
         let fits = least.iter().sum::<f32>() <= room;
         layout.size = *size;
         layout.columns = share_width(&least, &most, room);
@@ -185,7 +185,7 @@ fn share_width(least: &[f32], most: &[f32], room: f32) -> Vec<f32> {
 impl TableLayout {
     /// Width of the table, pt.
     fn width(&self) -> f32 {
-        self.columns.iter().sum::<f32>() + GAP * self.columns.len().saturating_sub(1) as f32
+        self.columns.iter().sum::<f32>() + CELL_GAP * self.columns.len().saturating_sub(1) as f32
     }
 
     /// Rule below a row.
@@ -218,14 +218,14 @@ impl TableLayout {
             }
             item.height = item.height.max(y + room);
             shades.extend(cell.shade.map(|colour| (x, *width, colour)));
-            x += width + GAP;
+            x += width + CELL_GAP;
         }
         item.height = item.height.max(self.size * 1.35 + 2.0 * room);
         let height = item.height;
         let fills = shades.into_iter().map(|(x, width, colour)| Mark::Fill {
-            x: x - 0.5 * GAP,
+            x: x - 0.5 * CELL_GAP,
             y: 0.0,
-            width: width + GAP,
+            width: width + CELL_GAP,
             height,
             colour,
         });

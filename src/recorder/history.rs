@@ -15,7 +15,7 @@ use crate::numerics::student;
 const FEWEST_BESIDE: usize = 2;
 
 /// Least number of flights with a history.
-const FEWEST_FLIGHTS: usize = 6;
+const FEWEST_IN_HISTORY: usize = 6;
 
 /// Kind of an error's change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,7 +44,7 @@ pub struct Change {
 pub fn change(series: &ErrorSeries, common: &CommonError) -> Option<Change> {
     let is_near = |sample: &&ErrorSample| !common.far.contains(&sample.flight_id);
     let samples: Vec<&ErrorSample> = series.samples.iter().filter(is_near).collect();
-    if samples.len() < FEWEST_FLIGHTS {
+    if samples.len() < FEWEST_IN_HISTORY {
         return None;
     }
     let observation = |sample: &&ErrorSample| Observation {

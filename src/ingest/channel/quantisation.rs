@@ -19,7 +19,7 @@ const MOST_STEPS: f64 = 40.0;
 
 /// Share of changes that must be multiples of the step: one in twenty may be a spike. Of changes without a grid
 /// one in ten fits (2 [`OFF_GRID`]), so the share is far from chance with [`LEAST_CHANGES`] and more.
-const FITTING_SHARE: f64 = 0.95;
+const ON_GRID_SHARE: f64 = 0.95;
 
 /// Relative change below which two values are equal: the last digits of a converted number.
 const SAME_VALUE: f64 = 1e-9;
@@ -49,5 +49,5 @@ pub fn quantisation(values: &[f64]) -> Option<f64> {
         .collect();
     let is_on_grid = |n: &&f64| (**n - n.round()).abs() < OFF_GRID;
     let share = steps.iter().filter(is_on_grid).count() as f64 / steps.len().max(1) as f64;
-    (steps.len() >= LEAST_CHANGES && share >= FITTING_SHARE).then_some(smallest)
+    (steps.len() >= LEAST_CHANGES && share >= ON_GRID_SHARE).then_some(smallest)
 }

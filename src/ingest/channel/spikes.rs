@@ -18,7 +18,7 @@ use crate::numerics::sample_count::whole_steps;
 const MEAN_VARIANCE: f64 = 1.5;
 
 /// Relative difference below which a sample is its neighbours' mean: rounding of the arithmetic.
-const SAME_VALUE: f64 = 1e-12;
+const MEAN_ROUNDING: f64 = 1e-12;
 
 /// Least number of samples off their neighbours' mean from which the rounding is inferred.
 const LEAST_ROUNDED: usize = 20;
@@ -207,9 +207,9 @@ fn rounding(values: &[f64], mut deviations: Vec<f64>) -> f64 {
         .step_by(STRIDE)
         .map(|v| v.abs())
         .fold(0.0, f64::max);
-    deviations.retain(|r| *r > SAME_VALUE * largest);
+    deviations.retain(|r| *r > MEAN_ROUNDING * largest);
     if deviations.len() < LEAST_ROUNDED {
-        0.5 * least_difference(values, SAME_VALUE * largest)
+        0.5 * least_difference(values, MEAN_ROUNDING * largest)
     } else {
         lower_quantile_in_place(&mut deviations, ROUNDING_QUANTILE).unwrap_or(0.0)
     }
