@@ -95,7 +95,7 @@ impl<'m, const NX: usize, E: Equations<NX>> Diagnostics<'_, 'm, NX, E> {
             let moved = match &derivative.regressor {
                 Regressor::Constant => None,
                 // In deg, not over q̄S.
-                Regressor::Vane(name) => Some(excitation(&samples(window, name))),
+                Regressor::Vane(name) => Some(excitation(&window.samples_of(name))),
                 _ => Some(excitation(&history)),
             };
             Some(RegressorHistory {
@@ -177,7 +177,7 @@ impl<'m, const NX: usize, E: Equations<NX>> Diagnostics<'_, 'm, NX, E> {
 
     /// Name and history of a regressor: of the signal where it is one; `None` for a constant.
     fn named_regressor(&self, one: &RegressorHistory) -> Option<(String, Vec<f64>)> {
-        let of_signal = |name: &str| (name.to_owned(), samples(self.window, name));
+        let of_signal = |name: &str| (name.to_owned(), self.window.samples_of(name));
         Some(match &one.derivative.regressor {
             Regressor::Constant => return None,
             Regressor::Alpha => ("alpha".to_owned(), one.history.clone()),
@@ -223,11 +223,6 @@ impl<'m, const NX: usize, E: Equations<NX>> Diagnostics<'_, 'm, NX, E> {
 /// Pairs of the numbers below a count, each once.
 fn pairs(count: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..count).flat_map(move |i| (i + 1..count).map(move |j| (i, j)))
-}
-
-/// A signal at the samples, without the interpolated points between them.
-fn samples(window: &Window, name: &str) -> Vec<f64> {
-    window.signal(name).iter().step_by(2).copied().collect()
 }
 
 /// Near-collinear groups by name, worst first, each group once.

@@ -177,6 +177,16 @@ impl Window {
             .map_or(&[], |points| points.as_slice())
     }
 
+    /// Values of a signal at the samples, without the points between them.
+    #[must_use]
+    pub fn samples_of(&self, name: &str) -> Vec<f64> {
+        self.signal(name)
+            .iter()
+            .step_by(self.points_per_sample)
+            .copied()
+            .collect()
+    }
+
     /// Window as a sensor in error would have recorded it: a signal's values times `1 + scale`,
     /// plus `bias`.
     #[must_use]

@@ -51,7 +51,7 @@ pub fn noisy_surfaces(aircraft: &Aircraft, window: &Window, model: &Model) -> Ve
     surfaces.dedup();
     let mut noisy = Vec::new();
     for surface in surfaces {
-        let variance = white_variance(&samples_of(window, surface));
+        let variance = white_variance(&window.samples_of(surface));
         if variance > 0.0 {
             let own = derivatives
                 .iter()
@@ -76,7 +76,7 @@ impl DeflectionEffect {
         let factors = match derivative.regressor {
             Regressor::Vane(_) => {
                 let times_qbar = derivative.coefficient_factor(aircraft, 1.0);
-                let qbar = samples_of(window, signal::QBAR);
+                let qbar = window.samples_of(signal::QBAR);
                 qbar.iter().map(|qbar| times_qbar / qbar).collect()
             }
             _ => vec![],
@@ -87,11 +87,6 @@ impl DeflectionEffect {
             factors,
         }
     }
-}
-
-/// Values of a signal at the samples, without the halves between them.
-fn samples_of(window: &Window, name: &str) -> Vec<f64> {
-    window.signal(name).iter().step_by(2).copied().collect()
 }
 
 /// Variance of the white noise on a signal that is otherwise smooth except for a few steps.
