@@ -56,7 +56,8 @@ pub fn document(contents: &ExportContents, tables: &[ExportTable]) -> String {
             &table.sources(),
             Mark::Output,
         );
-        let words = format!("1 where flight gave half or more of what is known of {name}, else 0");
+        let words =
+            format!("1 where flight gave half or more of the information on {name}, else 0");
         variable(&mut xml, name, &flag(name), "nd", &words, Mark::Output);
     }
     for coefficient in COEFFICIENTS {

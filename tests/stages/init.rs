@@ -1,4 +1,4 @@
-//! Init: a recording that nobody has described becomes a pipeline. Channels are found in copies of the
+//! Init: a recording without a channel map becomes a pipeline. Channels are found in copies of the
 //! demonstration that are renamed, in other units, with reversed signs, or incomplete.
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -99,7 +99,7 @@ fn of_condition<'a>(
 
 /// Heads of the columns about all estimates of a condition or class.
 const ERROR_HEADS: &str = "records, converged | median steps | estimates | 95 % intervals of `bound`, of \
-    `bound_corrected` that hold the truth | median error, median `bound_corrected`, % of the size | median \
+    `bound_corrected` that contain the truth | median error, median `bound_corrected`, % of the size | median \
     `bound_corrected` / `bound` |";
 
 /// Cells of the columns about all estimates of a condition or class.

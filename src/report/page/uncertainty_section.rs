@@ -104,7 +104,7 @@ fn answer(
     let sentences = [
         Some(format!(
             "Flights have brought the standard deviations of the derivatives to {} % of those before flight, in \
-             the median; the least reduction is of {}.",
+             the median; the reduction is least for {}.",
             fixed(all, 0),
             places.join(", ")
         )),
@@ -297,7 +297,7 @@ fn chart(
 ) -> Option<QualityChart> {
     let (low, high) = extent(rows.iter().map(|(row, _)| row.alpha_deg))?;
     let (_, most) = extent(rows.iter().map(|(_, pct)| *pct))?;
-    let caption = "Standard deviation of each derivative over that before flight, the least known named, and the \
+    let caption = "Standard deviation of each derivative over that before flight, the most uncertain named, and the \
                    medians of both axes. From 100 % flights gave nothing; above it, they leave the size of the \
                    tunnel's error uncertain, which counts after flight.";
     let marks = rows
@@ -377,7 +377,7 @@ mod tests {
         assert!(
             section.answer.starts_with(
                 "Flights have brought the standard deviations of the derivatives to 40 % of those before flight, in \
-                 the median; the least reduction is of Cn_dr at 30° (130 %; no class estimates it), CY_beta at 40° (40 %; \
+                 the median; the reduction is least for Cn_dr at 30° (130 %; no class estimates it), CY_beta at 40° (40 %; \
                  PYRS estimates it best)."
             ),
             "{}",

@@ -119,7 +119,7 @@ impl Layout {
         (is_comma && names >= 2 && rows == 2 * names).then(|| {
             format!(
                 "its rows have {rows} fields and the line above them {names}: decimal commas between commas cannot be \
-                 told apart; save it with semicolons or decimal points"
+                 distinguished; save it with semicolons or decimal points"
             )
         })
     }

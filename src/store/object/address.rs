@@ -32,14 +32,18 @@ impl Address {
         let (bucket, key) = rest.split_once('/').unwrap_or((rest, ""));
         let is_name = |c: char| c.is_ascii_alphanumeric() || "-._".contains(c);
         if bucket.is_empty() || !bucket.chars().all(is_name) {
-            return Err(wrong(&format!("`{bucket}` is no name of a bucket")));
+            return Err(wrong(&format!(
+                "`{bucket}` is not a valid name of a bucket"
+            )));
         }
         let key = key.trim_end_matches('/');
         if key.split('/').any(|part| matches!(part, "." | ".."))
             || key.contains("//")
             || key.starts_with('/')
         {
-            return Err(wrong(&format!("`{key}` is no key: its parts have names")));
+            return Err(wrong(&format!(
+                "`{key}` is not a valid key: each of its parts needs a name"
+            )));
         }
         Ok(Address {
             bucket: bucket.to_owned(),
