@@ -1,13 +1,15 @@
 //! Effect of calibration errors on the bounds.
 
+use std::collections::BTreeMap;
+
 use nalgebra::DVector;
 
-use super::context::Context;
 use super::prepared_case::PreparedCase;
+use super::task::Task;
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::Window;
 use crate::dynamics::{Equations, OUTPUTS};
-use crate::output_error::calibration_errors::{FittedManeuver, Misreading};
+use crate::output_error::calibration_errors::{Calibration, FittedManeuver, Misreading};
 use crate::output_error::{Diverged, Fit, calibration_errors};
 
 /// Added to the reason of a fit whose bounds lack the effect of calibration errors.
@@ -16,17 +18,19 @@ pub(super) const NOT_COUNTED: &str =
 
 /// Adds the effect of calibration errors to the corrected covariance of a fit.
 pub(super) fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
-    context: &Context,
+    task: &Task,
     prepared: &PreparedCase<NX, E>,
     fit: &mut Fit,
 ) {
-    let is_exact = context.settings.calibration.is_empty() && context.delays.is_empty();
-    if fit.covariance_corrected.is_none() || is_exact {
+    if fit.covariance_corrected.is_none() {
         return;
     }
-    let errors = misreadings(context, &prepared.window);
+    if task.has_exact_signals() {
+        return;
+    }
+    let errors = misreadings(&[task], &prepared.window);
     match gradient_shifts(
-        context.aircraft,
+        task.context.aircraft,
         prepared,
         &errors,
         &fit.values,
@@ -39,14 +43,21 @@ pub(super) fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
     }
 }
 
-/// Errors of one standard deviation each of the signals of a window.
-pub(super) fn misreadings<'a>(context: &'a Context<'a>, window: &Window) -> Vec<Misreading<'a>> {
+/// Errors of one standard deviation each of the signals of a window. Of several maneuvers each error
+/// has its largest size.
+pub(super) fn misreadings<'a>(tasks: &[&Task<'a>], window: &Window) -> Vec<Misreading<'a>> {
     // A signal that the maneuver does not use has no effect.
     let is_used = |signal: &str| !window.signal(signal).is_empty();
-    let calibration = context.settings.calibration.iter();
-    let used = calibration.filter(|(signal, _)| is_used(signal));
-    let readings = used.flat_map(|(signal, c)| c.misreadings(signal));
-    let delays = context.delays.iter().filter(|d| is_used(&d.surface));
+    let mut sizes: BTreeMap<&str, Calibration> = BTreeMap::new();
+    for (signal, own) in tasks.iter().flat_map(|task| task.signal_errors()) {
+        let size = sizes.entry(signal).or_default();
+        size.bias = size.bias.max(own.bias);
+        size.scale_pct = size.scale_pct.max(own.scale_pct);
+    }
+    let used = sizes.into_iter().filter(|(signal, _)| is_used(signal));
+    let readings = used.flat_map(|(signal, size)| size.misreadings(signal));
+    let delays = tasks.first().map_or(&[][..], |task| task.context.delays);
+    let delays = delays.iter().filter(|d| is_used(&d.surface));
     let late = delays.map(|d| Misreading::late(&d.surface, d.uncertainty_s));
     readings.chain(late).collect()
 }

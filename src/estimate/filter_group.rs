@@ -327,10 +327,11 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
         let Some(first) = self.members.first() else {
             return;
         };
-        let errors = misreadings(first.task.context, &first.slopes.window);
-        if self.task.context.settings.calibration.is_empty() && errors.is_empty() {
+        let tasks: Vec<&Task> = self.members.iter().map(|member| &member.task).collect();
+        if tasks.iter().all(|task| task.has_exact_signals()) {
             return;
         }
+        let errors = misreadings(&tasks, &first.slopes.window);
         let mut together = vec![DVector::zeros(fit.values.len()); errors.len()];
         for (i, (member, filter)) in self.members.iter().zip(&slope_fit.filters).enumerate() {
             let parameters = self

@@ -65,7 +65,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
             return new_filter(&self.task, self.prepared, window, model);
         };
         let aircraft = self.task.context.aircraft;
-        let biases = bias_uncertainties(self.task.context.settings, model);
+        let biases = bias_uncertainties(&self.task, model);
         let filter = filter.with_model(aircraft, window, model, &biases);
         filter.with_noisy_inputs(noisy_inputs(&self.task, self.prepared, window, model))
     }

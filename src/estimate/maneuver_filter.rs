@@ -1,7 +1,6 @@
 //! Filter of one maneuver: its inputs' noise, the prior of its biases, and the sensors' noise.
 
 use super::prepared_case::PreparedCase;
-use super::settings::Settings;
 use super::task::Task;
 use super::whiteness::sample_noise;
 use crate::aero::Output;
@@ -19,7 +18,7 @@ pub(super) fn new_filter<const NX: usize, E: Equations<NX>, const NG: usize, G: 
     model: &Model,
 ) -> Filter<NG, G> {
     let measurements = prepared.case.measurements.clone();
-    let biases = bias_uncertainties(task.context.settings, model);
+    let biases = bias_uncertainties(task, model);
     let filter = Filter::new(task.context.aircraft, window, measurements, model, &biases);
     filter.with_noisy_inputs(noisy_inputs(task, prepared, window, model))
 }
@@ -37,13 +36,27 @@ pub(super) fn noisy_inputs<const NX: usize, E: Equations<NX>>(
     }
 }
 
-/// Standard uncertainty of each bias, if calibration gives one.
-pub(super) fn bias_uncertainties(settings: &Settings, model: &Model) -> Vec<Option<f64>> {
-    let uncertainty = |output: Output| {
-        let calibration = settings.calibration.get(output.signal())?;
-        (calibration.bias > 0.0).then_some(calibration.bias)
-    };
-    model.biases.iter().map(|b| uncertainty(b.output)).collect()
+/// Standard uncertainty of each bias of a model; `None` without any prior.
+pub(super) fn bias_uncertainties(task: &Task, model: &Model) -> Vec<Option<f64>> {
+    let biases = model.biases.iter();
+    biases.map(|b| bias_uncertainty(task, b.output)).collect()
+}
+
+/// Standard uncertainty of an output's bias in one maneuver: the one stated, or the ordinary size
+/// where the flight determines the bias. The flight's own bound is that of a mean over the flight. A
+/// gyro drifts, and a slow gust looks like a bias: a prior as narrow as that bound draws the
+/// derivatives off.
+fn bias_uncertainty(task: &Task, output: Output) -> Option<f64> {
+    let settings = task.context.settings;
+    let signal = output.signal();
+    let stated = settings.calibration.get(signal).map(|c| c.bias);
+    let remaining = task.record.remaining_errors.get(signal);
+    let is_determined = remaining.is_some_and(|errors| errors.bias.is_some());
+    let ordinary = settings.ordinary_bias.get(&output).copied();
+    let size = stated
+        .filter(|bias| *bias > 0.0)
+        .or_else(|| ordinary.filter(|_| is_determined))?;
+    Some(size.max(task.signal_error(signal).bias))
 }
 
 /// Standard deviations of the outputs' own noise: of the second differences of the measured

@@ -177,7 +177,7 @@ settings! {
         /// Ordinary bias of each output's instrument: `instruments:` of aircraft.yaml.
         pub ordinary_bias: BTreeMap<Output, f64> = BTreeMap::new(),
         /// Uncertainty that calibration leaves of each signal: `instruments:` of aircraft.yaml.
-        /// Signals without an entry count as exact.
+        /// Signals without an entry count as exact, unless the flight itself determines their errors.
         pub calibration: BTreeMap<String, Calibration> = BTreeMap::new(),
         /// Largest share of marked samples over the outputs together, and in each surface:
         /// `segment: quality: marked_share`.

@@ -156,7 +156,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> SingleEstimation<'t, 'a, NX, E> 
         }
         let values = values_by_name(&prepared.model, &case.names, &fit.values);
         consider::consider(case, &self.wide, &values, &self.held_uncertainties, fit);
-        add_calibration_errors(context, prepared, fit);
+        add_calibration_errors(self.task, prepared, fit);
     }
 
     /// Rows of a fit by output error.

@@ -1,14 +1,15 @@
 //! One maneuver to be estimated: its model, held values, weights and measurements.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use super::context::Context;
 use super::settings::InactiveSurfaces;
 use crate::aero::{Bias, Derivative, Output, Regressor};
 use crate::dynamics::OUTPUTS;
-use crate::flight::{Mark, Record};
+use crate::flight::{Mark, Record, RemainingError};
 use crate::maneuver::{Class, Maneuver, Status};
+use crate::output_error::calibration_errors::Calibration;
 use crate::output_error::{Measurements, Model};
 
 /// One maneuver to be estimated.
@@ -21,6 +22,44 @@ pub(super) struct Task<'a> {
 }
 
 impl<'a> Task<'a> {
+    /// Errors of the signals, root mean squares: those that remain where the flight itself determines
+    /// them, elsewhere those that calibration states.
+    pub(super) fn signal_errors(&self) -> impl Iterator<Item = (&'a str, Calibration)> {
+        let stated = &self.context.settings.calibration;
+        let remaining = &self.record.remaining_errors;
+        let signals: BTreeSet<&str> = stated
+            .keys()
+            .chain(remaining.keys())
+            .map(String::as_str)
+            .collect();
+        let task = *self;
+        signals
+            .into_iter()
+            .map(move |signal| (signal, task.signal_error(signal)))
+    }
+
+    /// `true` if no signal has a stated or found error, and no surface a delay.
+    pub(super) fn has_exact_signals(&self) -> bool {
+        self.signal_errors().next().is_none() && self.context.delays.is_empty()
+    }
+
+    /// Errors of one signal, as [`Self::signal_errors`] has them; zero for a signal that counts as
+    /// exact.
+    pub(super) fn signal_error(&self, signal: &str) -> Calibration {
+        let stated = self.context.settings.calibration.get(signal);
+        let stated = stated.copied().unwrap_or_default();
+        let remaining = self.record.remaining_errors.get(signal);
+        let remaining = remaining.copied().unwrap_or_default();
+        let size = |remaining: Option<RemainingError>, stated: f64| {
+            let is_stated = (stated > 0.0).then_some(stated);
+            remaining.map_or(stated, |error| error.root_mean_square(is_stated))
+        };
+        Calibration {
+            bias: size(remaining.bias, stated.bias),
+            scale_pct: 100.0 * size(remaining.scale, stated.scale_pct / 100.0),
+        }
+    }
+
     /// Samples of the maneuver in the record.
     pub(super) fn range(&self) -> Range<usize> {
         self.record.sample_at(self.maneuver.start_s)..self.record.sample_at(self.maneuver.end_s) + 1

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::interpolation_kernel::InterpolationKernel;
 use super::record::{Mark, Record, Series};
+use super::remaining_errors::RemainingErrors;
 
 /// Error of an instrument: it reads `(1 + scale) truth(t − delay) + bias`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -13,6 +14,8 @@ pub struct Correction {
     pub bias: f64,
     pub scale: f64,
     pub delay_s: f64,
+    /// Errors of the signal after the correction.
+    pub remaining: RemainingErrors,
 }
 
 /// Samples beyond a delay that the interpolation kernel reaches.
@@ -34,8 +37,33 @@ impl Correction {
         delay + KERNEL_REACH
     }
 
-    /// Corrects the signal, where the record has it.
+    /// A delay alone.
+    #[must_use]
+    pub fn of_delay(signal: &str, delay_s: f64) -> Correction {
+        Correction {
+            signal: signal.to_owned(),
+            bias: 0.0,
+            scale: 0.0,
+            delay_s,
+            remaining: RemainingErrors::default(),
+        }
+    }
+
+    /// `false` if only the remaining errors are known.
+    #[must_use]
+    pub fn changes_values(&self) -> bool {
+        (self.bias, self.scale, self.delay_s) != (0.0, 0.0, 0.0)
+    }
+
+    /// Corrects the signal, where the record has it, and notes its remaining errors.
     pub fn apply(&self, record: &mut Record) {
+        if self.remaining != RemainingErrors::default() {
+            let own = (self.signal.clone(), self.remaining);
+            record.remaining_errors.extend([own]);
+        }
+        if !self.changes_values() {
+            return;
+        }
         let delay = self.delay_s / record.step_s;
         if let Some(series) = record.signals.get_mut(&self.signal) {
             if delay == 0.0 {
@@ -135,10 +163,9 @@ mod tests {
             marks: marks.to_vec(),
         };
         let late = |delay_s| Correction {
-            signal: String::new(),
             bias: 1.0,
             scale: 1.0,
-            delay_s,
+            ..Correction::of_delay("", delay_s)
         };
         let whole = late(1.0).corrected(&old, 1.0);
         assert_eq!(whole.values[..5], [0.5, 1.0, 1.5, 2.0, 2.5]);

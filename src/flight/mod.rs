@@ -7,6 +7,7 @@ pub mod formula;
 pub mod interpolation_kernel;
 pub mod linear_table;
 pub mod record;
+mod remaining_errors;
 pub mod signal;
 pub mod stand_in;
 
@@ -15,6 +16,7 @@ pub use correction::Correction;
 pub use formula::Formula;
 pub use linear_table::LinearTable;
 pub use record::{Mark, Record};
+pub use remaining_errors::{RemainingError, RemainingErrors};
 pub use stand_in::{Completion, StandIn};
 
 /// `true` if an id is a flight's own or that of one of its stretches.

@@ -6,6 +6,7 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
+use super::remaining_errors::RemainingErrors;
 use crate::numerics::sample_count::nearest;
 
 /// Repair or fault of one sample of one signal.
@@ -83,6 +84,8 @@ pub struct Record {
     pub step_s: f64,
     pub samples: usize,
     pub signals: BTreeMap<String, Series>,
+    /// Errors of the signals that the flight itself determines, after their corrections.
+    pub remaining_errors: BTreeMap<String, RemainingErrors>,
 }
 
 /// Least number of samples beyond either end of a part: as far as an interpolation reaches.
@@ -183,6 +186,7 @@ impl Record {
             signals: wanted
                 .map(|(name, series)| (name.clone(), cut(series)))
                 .collect(),
+            remaining_errors: self.remaining_errors.clone(),
         }
     }
 

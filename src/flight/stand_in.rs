@@ -366,6 +366,7 @@ mod tests {
                 .iter()
                 .map(|(name, value)| ((*name).to_owned(), series(*value)))
                 .collect(),
+            remaining_errors: [].into(),
         }
     }
 

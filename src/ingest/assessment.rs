@@ -80,7 +80,7 @@ pub fn assess(
         checks: relations.check_rows(flight_id),
         instruments: findings.rows(flight_id),
         error_evidence: findings.evidence(),
-        corrections: findings.corrections(),
+        corrections: findings.corrections(&context.settings.compatibility),
         problems,
         lift: lift_curve(&outcome.blocks, context.aircraft, &context.settings.checks),
         completion: outcome.completion,

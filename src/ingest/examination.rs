@@ -324,7 +324,9 @@ impl Examination<'_> {
             return (relations, findings);
         }
         if findings.has_fault() {
-            let corrected = blocks.corrected(&findings.with_faults_corrected().corrections());
+            let compatibility = &self.context.settings.compatibility;
+            let corrected =
+                blocks.corrected(&findings.with_faults_corrected().corrections(compatibility));
             let again = self.check(&corrected);
             if again.report.is_none() {
                 return (again, findings);

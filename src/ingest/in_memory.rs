@@ -115,6 +115,7 @@ fn ingest_stretch(
         step_s: stretch.clock.step_s,
         samples,
         signals,
+        remaining_errors: BTreeMap::new(),
     };
     let assessment = assess(stretch, conditioned, context, &|signals, range| {
         Some(record.cut(Some(signals), range))

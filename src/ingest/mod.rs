@@ -40,7 +40,7 @@ pub use channel::{
 pub use checks::LiftPoint;
 pub use clock::{Clock, Stretch, Survey, check_clocks, survey};
 pub use column_source::ColumnSource;
-pub use compatibility::{Compatibility, ErrorEvidence};
+pub use compatibility::{Compatibility, ErrorEvidence, correction};
 pub use computed_columns::ComputedColumns;
 pub use context::Context;
 pub use in_memory::{Ingested, record, records};

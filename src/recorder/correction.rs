@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 
 use super::findings::{ExaminedSeries, RecorderFindings};
 use crate::flight::Correction;
-use crate::ingest::Compatibility;
-use crate::tables::{InstrumentError, InstrumentRow, InstrumentVerdict};
+use crate::ingest::{Compatibility, correction};
+use crate::tables::{InstrumentRow, InstrumentVerdict};
 
 /// Largest bound of a completed error, in ordinary sizes: with a larger one the other flights have
 /// as little information as the flight itself.
@@ -46,7 +46,7 @@ pub fn correct_flights(
     }
     let of_flight = |flight_id: String| {
         let own = rows.iter().filter(|row| row.flight_id == flight_id);
-        let corrections = own.filter_map(correction).collect();
+        let corrections = own.filter_map(|row| correction(row, settings)).collect();
         FlightCorrections {
             flight_id,
             corrections,
@@ -108,20 +108,6 @@ pub fn apply_common_verdicts(rows: &mut [InstrumentRow], examined: &[ExaminedSer
 fn on_grid(value: f64, bound: f64) -> f64 {
     let step = (bound / STEPS_IN_BOUND).log2().floor().exp2();
     step * (value / step).round()
-}
-
-/// Correction by the errors of a row; `None` if none is applied.
-fn correction(row: &InstrumentRow) -> Option<Correction> {
-    let applied = |error| {
-        let value = row.error(error).filter(|_| row.is_applied(error));
-        value.map_or(0.0, |(value, _)| value)
-    };
-    (!row.applied.is_empty()).then(|| Correction {
-        signal: row.signal.clone(),
-        bias: applied(InstrumentError::Bias),
-        scale: applied(InstrumentError::Scale),
-        delay_s: applied(InstrumentError::Delay),
-    })
 }
 
 #[cfg(test)]

@@ -138,6 +138,7 @@ fn flight(length_s: u32) -> Record {
         step_s: STEP_S,
         samples,
         signals: BTreeMap::new(),
+        remaining_errors: BTreeMap::new(),
     };
     let constants = [
         (signal::ALPHA_VANE, 25.0),

@@ -38,12 +38,7 @@ impl DelayCorrection {
     /// Correction of the record; `None` for a surface that stays as recorded.
     #[must_use]
     pub fn of_record(&self) -> Option<Correction> {
-        (self.delay_s != 0.0).then(|| Correction {
-            signal: self.surface.clone(),
-            bias: 0.0,
-            scale: 0.0,
-            delay_s: self.delay_s,
-        })
+        (self.delay_s != 0.0).then(|| Correction::of_delay(&self.surface, self.delay_s))
     }
 }
 

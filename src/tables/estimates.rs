@@ -192,8 +192,9 @@ table! {
         pub bound: Option<f64>,
         /// Part of both bounds that comes from the held values, in the column `unit`.
         pub bound_held: Option<f64>,
-        /// Part of `bound_corrected` that comes from errors of calibration and from the remaining
-        /// uncertainty of the surfaces' delays, in the column `unit`; empty where there are none.
+        /// Part of `bound_corrected` that comes from the errors that remain in the signals, and from the
+        /// remaining uncertainty of the surfaces' delays, in the column `unit`; empty where all count as
+        /// exact.
         pub bound_calibration: Option<f64>,
         /// Bound for coloured residuals, noisy surfaces and errors of calibration: the one to use.
         /// In the column `unit`.

@@ -121,19 +121,21 @@ fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
     if fit.covariance_corrected.is_none() {
         return;
     }
-    let mut together: Vec<DVector<f64>> = vec![];
-    let mut errors = vec![];
+    let Some(first) = parts.first() else {
+        return;
+    };
+    let tasks: Vec<_> = parts.iter().map(|part| &part.task).collect();
+    let errors = misreadings(&tasks, &first.prepared.window);
+    let mut together = vec![DVector::zeros(joint.names().len()); errors.len()];
     for (i, part) in parts.iter().enumerate() {
         let places = joint.parameters().places(i);
         let own = values_at(places, &fit.values);
-        errors = misreadings(part.task.context, &part.prepared.window);
         let aircraft = part.task.context.aircraft;
         let shifts = gradient_shifts(aircraft, &part.prepared, &errors, &own, &fit.weights);
         let Ok(shifts) = shifts else {
             fit.reason.push_str(NOT_COUNTED);
             return;
         };
-        together.resize(shifts.len(), DVector::zeros(joint.names().len()));
         for (sum, shift) in together.iter_mut().zip(shifts) {
             add_vector(places, &shift, sum);
         }

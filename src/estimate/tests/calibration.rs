@@ -1,7 +1,7 @@
 //! Errors of calibration in the rows of a maneuver.
 
 use super::*;
-use crate::flight::Record;
+use crate::flight::{Record, RemainingError, RemainingErrors};
 use crate::maneuver::Maneuver;
 use crate::output_error::calibration_errors::Calibration;
 
@@ -48,6 +48,55 @@ fn the_scale_of_a_surface_is_the_least_that_its_derivatives_are_known_to() {
         without_row.bound_corrected.unwrap().hypot(part),
         max_relative = 1e-9
     );
+}
+
+#[test]
+fn an_error_that_the_flight_determines_replaces_the_stated_one() {
+    let stated = Calibration {
+        bias: 0.0,
+        scale_pct: 0.5,
+    };
+    let bench = calibrated(&[(signal::QBAR, stated)]);
+    let part = |scale: Option<RemainingError>| {
+        let mut record = bench.flown(5, 1.0, 0.0);
+        let errors = RemainingErrors { bias: None, scale };
+        record.remaining_errors = [(signal::QBAR.to_owned(), errors)].into();
+        let estimated = bench.estimate(&record, &maneuver("m", 20.0));
+        row(&estimated, "Cm_de").bound_calibration.unwrap()
+    };
+    let by_calibration = part(None);
+    let by_flight = part(Some(RemainingError::Corrected { bound: 0.001 }));
+    assert_relative_eq!(by_flight, by_calibration / 5.0, max_relative = 1e-2);
+    let left = RemainingError::Uncorrected {
+        value: 0.0,
+        bound: 0.005,
+    };
+    let by_both = part(Some(left));
+    assert_relative_eq!(
+        by_both,
+        by_calibration * 0.5_f64.sqrt(),
+        max_relative = 1e-2
+    );
+}
+
+#[test]
+fn a_bias_without_calibration_has_a_prior_where_the_flight_determines_it() {
+    let mut bench = calibrated(&[]);
+    bench.settings.ordinary_bias = [(Output::An, 1e-4)].into();
+    let bound = |bias: Option<RemainingError>| {
+        let mut record = bench.flown(5, 1.0, 0.0);
+        let errors = RemainingErrors { bias, scale: None };
+        record.remaining_errors = [(signal::AN.to_owned(), errors)].into();
+        let estimated = bench.estimate(&record, &maneuver("m", 20.0));
+        row(&estimated, "an_bias").bound.unwrap()
+    };
+    let corrected = |bound| Some(RemainingError::Corrected { bound });
+    let without = bound(None);
+    assert!(without > 2e-4, "{without}");
+    // The ordinary size is the prior, and the flight's own bound where it is wider.
+    assert!(bound(corrected(1e-6)) < 1e-4);
+    let wide = bound(corrected(without));
+    assert_relative_eq!(wide, without / 2.0_f64.sqrt(), max_relative = 0.05);
 }
 
 #[test]

@@ -29,6 +29,7 @@ fn record() -> Record {
         signals: signals
             .map(|(name, values)| (name.to_owned(), series(values)))
             .into(),
+        remaining_errors: BTreeMap::new(),
     }
 }
 

@@ -229,7 +229,7 @@ impl BlockMeans {
     /// These means with instrument errors removed.
     pub fn corrected(&self, corrections: &[Correction]) -> BlockMeans {
         let mut changed = self.clone();
-        for correction in corrections {
+        for correction in corrections.iter().filter(|c| c.changes_values()) {
             if let Some(own) = changed.means.get_mut(correction.signal.as_str()) {
                 own.means = Arc::new(correction.of_values(&own.means, self.block_s));
             }

@@ -7,6 +7,7 @@ use super::error_estimates::{ErrorEvidence, has_estimate_at_limit, withdraw_corr
 use super::instrument_finding::InstrumentFinding;
 use super::joint_fit::FittedErrors;
 use super::parameters::{INSTRUMENTS, Kind};
+use super::row_correction::correction;
 use super::settings::Compatibility;
 use crate::error::{Problem, ProblemStage};
 use crate::flight::{Channel, Correction, signal};
@@ -143,25 +144,11 @@ impl Findings {
         inexplicable.map(|f| (f.signal, f.fault_sentence()))
     }
 
-    /// Corrections of the record.
+    /// Corrections of the record, and the errors that remain.
     #[must_use]
-    pub fn corrections(&self) -> Vec<Correction> {
-        let correction = |finding: &InstrumentFinding| {
-            let of = |kind: Kind| {
-                finding.estimates[kind as usize]
-                    .filter(|e| e.applied)
-                    .map_or(0.0, |e| e.value)
-            };
-            let (bias, scale, delay_s) = (of(Kind::Bias), of(Kind::Scale), of(Kind::Delay));
-            let counts = (bias, scale, delay_s) != (0.0, 0.0, 0.0);
-            counts.then(|| Correction {
-                signal: finding.signal.to_owned(),
-                bias,
-                scale,
-                delay_s,
-            })
-        };
-        self.0.iter().filter_map(correction).collect()
+    pub fn corrections(&self, settings: &Compatibility) -> Vec<Correction> {
+        let rows = self.rows("").into_iter();
+        rows.filter_map(|row| correction(&row, settings)).collect()
     }
 
     /// Rows of the table `instruments`.
@@ -237,14 +224,14 @@ mod tests {
             Findings::of(Some(&errors), &channels, &recorded, &settings)
         };
         let at_limit = of_scale(-0.8);
-        assert_eq!(at_limit.corrections(), []);
-        assert_eq!(at_limit.with_faults_corrected().corrections(), []);
+        assert_eq!(at_limit.corrections(&settings), []);
+        assert_eq!(at_limit.with_faults_corrected().corrections(&settings), []);
         let problem = &at_limit.problems("f")[0].reason;
         assert!(problem.contains("left as recorded"), "{problem}");
         let inexplicable: Vec<_> = at_limit.inexplicable().map(|(name, _)| name).collect();
         assert_eq!(inexplicable, [signal::MACH]);
         let inside = of_scale(-0.4);
-        assert_eq!(inside.corrections().len(), 1);
+        assert_eq!(inside.corrections(&settings).len(), 1);
         assert_eq!(inside.inexplicable().count(), 0);
     }
 
@@ -269,7 +256,12 @@ mod tests {
         };
         let scales = |findings: &Findings| {
             let of = |c: &Correction| (c.signal.clone(), c.scale);
-            findings.corrections().iter().map(of).collect::<Vec<_>>()
+            findings
+                .corrections(&Compatibility::default())
+                .iter()
+                .filter(|correction| correction.changes_values())
+                .map(of)
+                .collect::<Vec<_>>()
         };
         // 10 % warmer.
         let (pressure, mach) = (1.0 / 1.1 - 1.0, 1.0 / f64::sqrt(1.1) - 1.0);

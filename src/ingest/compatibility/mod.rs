@@ -20,6 +20,7 @@ mod joint_state;
 mod measured_terms;
 mod parameters;
 mod reconstruction;
+mod row_correction;
 mod settings;
 mod window;
 mod window_choice;
@@ -35,6 +36,7 @@ pub use error_estimates::{ErrorEstimate, ErrorEvidence};
 pub use error_sizes::{ErrorSize, ErrorSizes};
 pub use findings::Findings;
 pub use instrument_finding::InstrumentFinding;
+pub use row_correction::correction;
 pub use settings::{Action, Compatibility, OnFault};
 
 use crate::aircraft::Aircraft;

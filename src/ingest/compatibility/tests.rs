@@ -299,6 +299,7 @@ fn flight(seconds: f64) -> Record {
         step_s: STEP_S,
         samples,
         signals,
+        remaining_errors: BTreeMap::new(),
     }
 }
 
@@ -756,7 +757,7 @@ fn a_scale_error_beyond_the_ordinary_is_named_and_corrected() {
         let found: Vec<&str> = faults(&findings).into_iter().map(|f| f.0).collect();
         assert_eq!(found, [name]);
         findings
-            .corrections()
+            .corrections(&settings())
             .iter()
             .for_each(|c| c.apply(&mut record));
         let (values, truth) = (record.values(name).unwrap(), exact.values(name).unwrap());
@@ -925,6 +926,7 @@ fn marks_move_with_an_applied_correction() {
         step_s: STEP_S,
         samples: 8,
         signals,
+        remaining_errors: BTreeMap::new(),
     };
     let fault = |value| {
         Some(ErrorEstimate {
@@ -946,7 +948,7 @@ fn marks_move_with_an_applied_correction() {
         air_temperature: None,
     }]);
     findings
-        .corrections()
+        .corrections(&settings())
         .iter()
         .for_each(|c| c.apply(&mut record));
     let series = &record.signals[s::THETA];

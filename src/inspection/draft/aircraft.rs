@@ -355,8 +355,8 @@ fn instruments(draft: &Draft) -> String {
         "
 # Sizes of the errors of the instruments, in the signal's unit and in percent: what calibration leaves (uncertainty), what a
 # healthy instrument has (ordinary), and what makes it faulty (fault). These are usual ones; give the recorder's own. Signals
-# without an uncertainty count as exact: a scale error of mass or of an inertia is one of all derivatives of a force or a
-# moment (mass_slug: {{ uncertainty: {{ scale_pct: 0.5 }} }}).
+# without an uncertainty count as exact, unless the flight itself determines their errors. A scale error of mass or of an
+# inertia is one of all derivatives of a force or a moment (mass_slug: {{ uncertainty: {{ scale_pct: 0.5 }} }}).
 instruments:{map}{lines}"
     )
 }

@@ -336,6 +336,7 @@ impl<'a> CardFlight<'a> {
                 .into_iter()
                 .map(|(name, values)| (name, measured(values)))
                 .collect(),
+            remaining_errors: BTreeMap::new(),
         };
         let maneuver = self.maneuver(&record, alphas_deg);
         FlownManeuver {

@@ -157,12 +157,7 @@ impl Instrument {
         if self.delay_s == 0.0 {
             return exact.into();
         }
-        let ahead = Correction {
-            signal: String::new(),
-            bias: 0.0,
-            scale: 0.0,
-            delay_s: -self.delay_s,
-        };
+        let ahead = Correction::of_delay("", -self.delay_s);
         ahead.of_values(exact, step_s).into()
     }
 

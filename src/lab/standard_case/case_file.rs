@@ -205,6 +205,7 @@ impl CaseFile {
                 .into_iter()
                 .map(|(name, values)| (name, series(values)))
                 .collect(),
+            remaining_errors: BTreeMap::new(),
         })
     }
 

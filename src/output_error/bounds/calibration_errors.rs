@@ -26,7 +26,7 @@ use crate::settings::settings;
 
 settings! {
     /// Uncertainty of a signal after calibration, standard deviations: reading = (1 + scale) ·
-    /// truth + bias.
+    /// truth + bias. Errors that the flight itself determines count with its own bounds instead.
     #[derive(Copy)]
     pub struct Calibration {
         /// Uncertainty of the bias, in the signal's unit. Larger: wider `bound_corrected`.
@@ -86,7 +86,10 @@ impl<'a> Misreading<'a> {
 
 impl Calibration {
     /// Independent errors of one standard deviation each.
-    pub fn misreadings<'a>(&self, signal: &'a str) -> impl Iterator<Item = Misreading<'a>> {
+    pub fn misreadings<'a>(
+        &self,
+        signal: &'a str,
+    ) -> impl Iterator<Item = Misreading<'a>> + use<'a> {
         let scale = Misreading {
             signal,
             scale: self.scale_pct / 100.0,

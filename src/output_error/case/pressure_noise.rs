@@ -75,6 +75,7 @@ mod tests {
             step_s: 0.02,
             samples: 400 * every,
             signals: [(signal::QBAR.to_owned(), series)].into(),
+            remaining_errors: [].into(),
         }
     }
 

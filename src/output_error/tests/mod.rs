@@ -167,6 +167,7 @@ pub(crate) fn record() -> Record {
             .into_iter()
             .map(|(name, values)| (name.to_owned(), series(values)))
             .collect(),
+        remaining_errors: BTreeMap::new(),
     }
 }
 

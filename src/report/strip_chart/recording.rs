@@ -87,6 +87,7 @@ fn record(inspection: &Inspection, columns: BTreeMap<String, Vec<f64>>) -> Recor
             .into_iter()
             .map(|(name, values)| (name, series(values)))
             .collect(),
+        remaining_errors: BTreeMap::new(),
     }
 }
 

@@ -47,6 +47,7 @@ fn record(samples: usize) -> Record {
         step_s: 0.025,
         samples,
         signals,
+        remaining_errors: BTreeMap::new(),
     }
 }
 

@@ -391,6 +391,7 @@ mod tests {
             step_s: 0.025,
             samples: series.values.len(),
             signals: [("de_deg".to_owned(), series)].into(),
+            remaining_errors: [].into(),
         };
         let settings = Settings {
             steps: [("de_deg".to_owned(), 2.0)].into(),

@@ -71,6 +71,7 @@ impl RecordHeader {
             step_s: self.step_s,
             samples: samples.len(),
             signals: BTreeMap::new(),
+            remaining_errors: BTreeMap::new(),
         }
     }
 }

@@ -77,6 +77,7 @@ fn record() -> Record {
             ("obes".to_owned(), flag),
         ]
         .into(),
+        remaining_errors: BTreeMap::new(),
     }
 }
 
