@@ -9,13 +9,15 @@ use crate::output_error::{Fit, Measurements, Outcome};
 /// a short maneuver stay below it.
 const COLOURED: f64 = 0.3;
 
-/// Standard deviation of an output's white noise, from its second differences.
+/// Standard deviation of an output's white noise, from second differences of the samples that count,
+/// which lie several steps apart in a slow channel.
 pub(super) fn sample_noise(measurements: &Measurements, output: usize) -> f64 {
-    let samples = measurements.values.array_windows::<3>();
-    let both = samples.zip(measurements.used.array_windows::<3>());
-    let sizes = both
-        .filter(|(_, used)| used.iter().all(|used| used[output]))
-        .map(|(z, _)| differences::second(&z.map(|z| z[output])).abs());
+    let counted = |k: &usize| measurements.used[*k][output];
+    let counted: Vec<usize> = (0..measurements.used.len()).filter(counted).collect();
+    let triples = counted.array_windows::<3>();
+    let sizes = triples
+        .filter(|[before, at, after]| at - before == after - at)
+        .map(|triple| differences::second(&triple.map(|k| measurements.values[k][output])).abs());
     differences::noise_of_second(median(sizes).unwrap_or(0.0))
 }
 
@@ -69,4 +71,31 @@ pub(super) fn white_cost(measurements: &Measurements, fit: &Fit) -> Option<f64> 
         cost += 0.5 * count * (variance.ln() + 1.0);
     }
     cost.is_finite().then_some(cost)
+}
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_relative_eq;
+
+    use super::*;
+    use crate::numerics::random::RandomStream;
+
+    #[test]
+    fn the_noise_of_a_slow_output_is_that_of_its_own_samples() {
+        const EVERY: usize = 4;
+        let mut random = RandomStream::new(7, "slow output");
+        let values = (0..4000).map(|_| [0.3 * random.normal(); OUTPUTS]);
+        let mut measurements = Measurements {
+            values: values.collect(),
+            used: vec![[true; OUTPUTS]; 4000],
+        };
+        for (k, used) in measurements.used.iter_mut().enumerate() {
+            used[1] = k % EVERY == 0;
+            used[2] = false;
+        }
+        let noise = [0, 1, 2].map(|output| sample_noise(&measurements, output));
+        assert_relative_eq!(noise[0], 0.3, max_relative = 0.05);
+        assert_relative_eq!(noise[1], 0.3, max_relative = 0.1);
+        assert!(noise[2] == 0.0, "{}", noise[2]);
+    }
 }
