@@ -136,8 +136,8 @@ impl TallLayout {
         let unwritable = |e: parquet::errors::ParquetError| Error::store(source, &e);
         let schema = self.schema();
         let properties = encoding::properties().map_err(unwritable)?;
-        let mut writer =
-            ArrowWriter::try_new(handle, schema.clone(), Some(properties.build())).map_err(unwritable)?;
+        let mut writer = ArrowWriter::try_new(handle, schema.clone(), Some(properties.build()))
+            .map_err(unwritable)?;
         let opened = File::open(source).map_err(Error::io(source, "cannot open it"))?;
         let mut reader = BufReader::new(opened);
         let (mut line, mut number_of_line) = (Vec::new(), 0);

@@ -77,8 +77,7 @@ fn of_csv(path: &Path, third: Option<&str>) -> Result<Vec<(usize, TunnelRow)>> {
 
 fn of_parquet(path: &Path, third: Option<&str>) -> Result<Vec<(usize, TunnelRow)>> {
     let bytes = files::bytes(path)?;
-    let batch =
-        guarded(|| batch_of(bytes)).map_err(|reason| Error::config(path, None, reason))?;
+    let batch = guarded(|| batch_of(bytes)).map_err(|reason| Error::config(path, None, reason))?;
     let table = ParquetTable {
         path,
         batch: &batch,
