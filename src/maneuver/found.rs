@@ -99,9 +99,10 @@ table! {
     /// Columns of `maneuvers` about the recognition.
     #[derive(Default)]
     pub struct Recognised {
-        /// Confidence from 0 to 1, a product: 0.8 for a flag that contradicts (it may be stuck),
-        /// 0.95 for one that is not recorded, 0.9 for vanes without evidence, 0.5 to 1 for the fit
-        /// of the pulses' lengths.
+        /// Confidence from 0 to 1, a product of factors: 0.8 for each flag that contradicts the
+        /// class (it may be stuck); 0.95 for each flag that is not recorded; 0.9 for each signal of
+        /// `moves` whose motion is unclear; 0.5 to 1 for the fit of the pulses' lengths; 0.9 for a
+        /// record without pilot controls.
         pub confidence: Option<f64> ["1"],
         /// Time of the first step of the inputs.
         pub first_input_s: Option<f64> ["s"],

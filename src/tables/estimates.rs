@@ -142,26 +142,35 @@ table! {
     /// `bound`, `bound_held` and `bound_calibration` are standard deviations (one sigma).
     /// `bound_corrected` is the half width of a 95 % interval over 1.96.
     ///
-    /// - `bound` is the Cramér-Rao bound for any weights W: the root of the diagonal of
-    ///   H⁻¹ [Σ Sᵀ W R̂ W S] H⁻¹ + G P Gᵀ, with S the sensitivities of the outputs, H = Σ Sᵀ W S,
-    ///   and R̂ the variances of the residuals. It assumes white residuals.
+    /// - `bound` is the Cramér-Rao bound with the effect G P Gᵀ of the held values: the root of the
+    ///   diagonal of a covariance. In output error the covariance is
+    ///   H⁻¹ [Σ Sᵀ W R̂ W S] H⁻¹ + G P Gᵀ for any weights W. S are the sensitivities of the
+    ///   outputs, H = Σ Sᵀ W S, and R̂ the variances of the residuals. In filter error it is
+    ///   H⁻¹ + G P Gᵀ, with H the information matrix of the innovations. Both assume that residuals
+    ///   or innovations are white.
     /// - `bound_held` is the root of the diagonal of G P Gᵀ: the effect of the uncertainty P of the
-    ///   tunnel's values on the estimates. G = −H⁻¹ Σ Sᵀ W S_h, with S_h the sensitivities to the
-    ///   values that are held, or that act at the tunnel's value though inactive. P is the tunnel
-    ///   table's `uncertainty`, or 20 % (`held_uncertainty_pct`) of the root mean square of the
+    ///   held values on the estimates. G = −H⁻¹ Σ Sᵀ W S_h, with W the inverse covariance of the
+    ///   innovations in filter error. S_h are the sensitivities to the held values. Inactive
+    ///   derivatives that act at the tunnel's value count as held. P is the tunnel table's
+    ///   `uncertainty`, or 20 % (`held_uncertainty_pct`) of the root mean square of the
     ///   derivative's table. Maneuvers that hold the same value share its error: it does not
     ///   average out.
-    /// - `bound_corrected` allows for coloured residuals: in place of R̂ stands the autocovariance of
-    ///   an autoregressive process per output. It also counts noise of the measured surfaces and
-    ///   errors of calibration. Student's t accounts for the few seconds from which the
-    ///   autocovariance is estimated. It is never below `bound`, and contains `bound_held`.
-    ///   `docs/coverage.md` has the measured coverage of its intervals.
+    /// - `bound_corrected` allows for coloured residuals, or innovations in filter error: the
+    ///   autocovariance of an autoregressive process per output replaces their variances. It also
+    ///   counts noise of the measured surfaces and errors of calibration. Student's t accounts for
+    ///   the few seconds from which the autocovariance is estimated. `bound_corrected` is never
+    ///   below `bound`, and contains `bound_held`. `docs/coverage.md` has the measured coverage of
+    ///   its intervals.
     /// - `bound_calibration` is the effect of each instrument's `uncertainty` in `aircraft.yaml`: the
     ///   estimates' change with one standard deviation of each signal's bias and scale error, as a
     ///   root sum of squares. It does not average out over maneuvers with the same instruments.
     ///
     /// No bound contains errors of signals without such an `uncertainty` (as shipped: mass, c.g.,
-    /// inertias), or noise of signals other than the five outputs and the surfaces.
+    /// inertias). None contains noise of signals other than the five outputs and the surfaces.
+    ///
+    /// With `estimate: held_values: posterior` the stage `model` replaces the held values and their
+    /// uncertainty P by those of the posterior of the other flights. It changes `value`, `bound`,
+    /// `bound_held` and `bound_corrected`.
     ///
     /// Rows of maneuvers estimated together follow, with `flight_id` `joint`. They have the shared
     /// derivatives only. Trends, comparison and report are made from the single maneuvers alone, so
