@@ -97,7 +97,7 @@ impl RecordWriting<'_> {
         let id = &stretch.flight_id;
         let name = ArtefactName::new(Kind::Records, id, self.fingerprint);
         let path = self.store.path(&name);
-        let mut draft = Draft::of(&path)?;
+        let mut draft = Draft::create(&path)?;
         let mut readers: Vec<ChannelReader> = plans
             .iter()
             .map(|p| ChannelReader::new(p, stretch, &self.config.ingest))

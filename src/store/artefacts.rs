@@ -67,7 +67,7 @@ impl Store {
         }
         Ok(Store {
             _lock: Some(lock),
-            in_work: Some(InWorkList::of(folder)),
+            in_work: Some(InWorkList::start_empty(folder)),
             ..Store::read_only(folder)
         })
     }

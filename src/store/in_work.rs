@@ -33,8 +33,8 @@ pub struct Listed<'a> {
 }
 
 impl InWorkList {
-    /// Empty list of a store that this run holds alone. Removes the list of a killed run.
-    pub fn of(folder: &Path) -> InWorkList {
+    /// Starts an empty list of a store that this run holds alone: removes the file of a killed run.
+    pub fn start_empty(folder: &Path) -> InWorkList {
         let list = InWorkList {
             path: folder.join(FILE),
             flights: Mutex::default(),
@@ -97,7 +97,7 @@ mod tests {
     fn flights_in_work_are_listed_while_the_store_is_held() {
         let folder = tempfile::tempdir().unwrap();
         let lock = Lock::take(&folder.path().join("lock"), "store", Duration::ZERO).unwrap();
-        let list = InWorkList::of(folder.path());
+        let list = InWorkList::start_empty(folder.path());
         let first = list.add("007");
         let second = list.add("008");
         let listed: Vec<String> = in_work(folder.path()).into_keys().collect();
