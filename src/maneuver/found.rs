@@ -149,13 +149,14 @@ table! {
         pub verdict: Acceptance,
         /// Limits that the maneuver exceeds, in words.
         pub reason: String,
-        /// Angular rates of its axis before the first input over those in the whole maneuver, root
-        /// mean squares: large where it is not trimmed at the start.
+        /// Angular rates of the maneuver's axis before the first input over those in the whole
+        /// maneuver, root mean squares; large if the maneuver does not start trimmed.
         pub lead_in_motion: Option<f64> ["1"],
         /// Root mean square of the angle of attack about its mean.
         pub alpha_rms_deg: Option<f64> ["deg"],
-        /// Angular accelerations that the motion of the other axis makes, by the products of rates of
-        /// Euler's equations, over all those of its axis; root mean squares about their means.
+        /// Angular accelerations due to the motion of the other axis, by the products of rates in
+        /// Euler's equations, over all angular accelerations of the maneuver's axis; root mean
+        /// squares about their means.
         pub other_axis: Option<f64> ["1"],
         /// Root mean square of the axis's angular rate over its noise from sample to sample; the
         /// better one of roll and yaw.

@@ -21,7 +21,7 @@ table! {
         /// undetermined derivatives that have no tunnel value to be held at.
         pub reason: String,
         /// Starting values of the iteration that led to the outcome: the configured ones, or the
-        /// other ones where these do not converge.
+        /// alternative if these do not converge.
         pub start: Option<StartingValues>,
         /// Number of steps of the iteration.
         pub iterations: usize ["1"],
@@ -29,7 +29,7 @@ table! {
         /// for maneuvers that filter error estimates together.
         pub initial_cost: Option<f64> ["1"],
         /// Cost J of eq. 1.2 at the end of output error, also where filter error follows. Like the
-        /// initial cost with the weights of the class's table, whatever weights the fit has, and none
+        /// initial cost it has the weights of the class's table, whatever weights the fit has. None
         /// for maneuvers that filter error estimates together.
         pub final_cost: Option<f64> ["1"],
         /// Condition number of the information matrix scaled to unit diagonal; beyond 10¹⁰ the fit
@@ -46,9 +46,10 @@ table! {
         pub confounded: Option<String>,
         /// Method of the estimates.
         pub method: Option<EstimationMethod>,
-        /// Speed of the gusts across the flight path, rms, as filter error found them: `w_g` of
-        /// a longitudinal, `v_g` of a lateral maneuver. Found from the gusts' fast part, for a scale
-        /// of turbulence of 1,750 ft. Of maneuvers estimated together the root mean square.
+        /// Gust speed across the flight path, rms, by filter error: `w_g` of a longitudinal, `v_g`
+        /// of a lateral maneuver. Filter error estimates the high-frequency intensity of the flow
+        /// angle; it is converted to a speed with a turbulence scale of 1,750 ft (Dryden). Of
+        /// maneuvers estimated together the root mean square.
         pub gust_ft_s: Option<f64> ["ft/s"],
         /// Rotary gust, rms: `q_g`, or the larger one of `p_g` and `r_g`. Of maneuvers estimated together
         /// the root mean square.
@@ -61,9 +62,10 @@ table! {
         /// Log-likelihood that filter error gained over output error; none for maneuvers estimated
         /// together.
         pub likelihood_gain: Option<f64> ["1"],
-        /// Distance of the derivatives from equation error, √(dᵀ C⁻¹ d / n): d are the differences of
-        /// the n derivatives that both estimate, C is the sum of both covariances. Around or below
-        /// one where they agree: both use the same data, so that C is rather too large.
+        /// Distance of the derivatives from equation error, √(dᵀ C⁻¹ d / n). d are the differences
+        /// of the n derivatives that both methods estimate, C is the sum of the two covariances.
+        /// Around or below one if they agree: the methods use the same data, so that C is rather
+        /// too large.
         pub equation_error_distance: Option<f64> ["1"],
     }
 }
@@ -161,9 +163,10 @@ table! {
     ///   the few seconds from which the autocovariance is estimated. `bound_corrected` is never
     ///   below `bound`, and contains `bound_held`. `docs/coverage.md` has the measured coverage of
     ///   its intervals.
-    /// - `bound_calibration` is the effect of each instrument's `uncertainty` in `aircraft.yaml`: the
-    ///   estimates' change with one standard deviation of each signal's bias and scale error, as a
-    ///   root sum of squares. It does not average out over maneuvers with the same instruments.
+    /// - `bound_calibration` is the effect of each instrument's `uncertainty` in `aircraft.yaml`.
+    ///   It is the root sum of squares of the estimates' changes with one standard deviation of
+    ///   each signal's bias and scale error. It does not average out over maneuvers with the same
+    ///   instruments.
     ///
     /// No bound contains errors of signals without such an `uncertainty` (as shipped: mass, c.g.,
     /// inertias). None contains noise of signals other than the five outputs and the surfaces.
@@ -173,8 +176,8 @@ table! {
     /// `bound_held` and `bound_corrected`.
     ///
     /// Rows of maneuvers estimated together follow, with `flight_id` `joint`. They have the shared
-    /// derivatives only. Trends, comparison and report are made from the single maneuvers alone, so
-    /// that the same data do not count twice; to count maneuvers, leave out `flight_id` `joint`.
+    /// derivatives only. Trends, comparison and report use the single maneuvers alone, so that the
+    /// same data do not count twice. To count maneuvers, leave out `flight_id` `joint`.
     pub struct EstimateRow in "estimates" per "maneuver and derivative or bias of its axis" {
         /// Maneuver, or group of maneuvers estimated together.
         pub maneuver_id: String,
@@ -199,7 +202,8 @@ table! {
         /// Cramér-Rao bound, with the uncertainty of the held values; empty unless estimated and
         /// determined by the data. In the column `unit`.
         pub bound: Option<f64>,
-        /// Part of both bounds that comes from the held values, in the column `unit`.
+        /// Part of `bound` and `bound_corrected` that comes from the held values, in the column
+        /// `unit`.
         pub bound_held: Option<f64>,
         /// Part of `bound_corrected` that comes from errors of calibration and from the remaining
         /// uncertainty of the surfaces' delays, in the column `unit`; empty where there are none.
