@@ -103,8 +103,8 @@ fn reported_repairs(
     stuck.into_iter().chain(beyond)
 }
 
-/// For each channel, the reason to leave it out before any check, if there is one: it has no value, or
-/// a stand-in replaces it and most of its values are missing.
+/// Reason to leave out a channel before any check, for each channel: it has no value, or most of
+/// its values are missing and a stand-in replaces it.
 fn unread_channels<'a>(
     conditioned: &[ConditionedChannel<'a>],
     clock: &Clock,

@@ -18,8 +18,8 @@ use crate::flight::stand_in::GapExtent;
 use crate::flight::{Completion, Record, StandIn, signal};
 use crate::tables::{ChannelVerdict, CheckRow};
 
-/// Samples of a long record that are read at once: under an hour of a usual recorder, so
-/// that memory does not grow with the record.
+/// Samples of a long record that are read at once, so that memory does not grow with the record:
+/// under an hour of a usual recorder.
 pub const PART_SAMPLES: usize = 1 << 17;
 
 /// Reads signals of a record over a range of its samples; `None` if they cannot be read.
@@ -234,8 +234,10 @@ impl Examination<'_> {
         !faulty.is_empty() && faulty.iter().all(|fault| self.is_dispensable(fault))
     }
 
-    /// `true` if no sign or unit of a suspect explains the failed relations, and without the suspects that
-    /// the stretch can do without all others hold and confirm the remaining suspects.
+    /// `true` if three conditions hold:
+    /// 1. no sign or unit of a suspect explains the failed relations;
+    /// 2. without the suspects that the stretch can do without, all other relations hold;
+    /// 3. these relations confirm the remaining suspects.
     fn holds_without_dispensable(&self, relations: &RelationResult, blocks: &BlockMeans) -> bool {
         let faulty = &relations.faulty;
         let dispensable: Vec<&FaultyChannel> =
@@ -299,9 +301,9 @@ impl Examination<'_> {
     /// Reconciles the relations between channels with the errors of the instruments.
     ///
     /// If a channel has a wrong sign or unit, the errors of the other instruments are estimated
-    /// with the channel corrected; the record is left as it is. If no sign and no unit explains a
-    /// failed relation, a delay may: if the relation holds once the delays are removed, the delay
-    /// is the fault.
+    /// with the channel corrected. The record keeps the channel as recorded. If no sign and no unit
+    /// explains a failed relation, a delay may. If the relation holds with the delays removed, the
+    /// delay is the fault.
     fn reconcile(
         &self,
         blocks: &BlockMeans,

@@ -246,8 +246,8 @@ impl<'a> Responses<'a> {
     }
 }
 
-/// Evidence for an input with an effect in standard errors and the sign of the usual one, which acts
-/// more clearly on the axis `other`, if there is one.
+/// Text of the evidence for an input. `found` is its effect in standard errors, `usual` the usual
+/// sign. `other` is the axis on which it acts more clearly, if any.
 fn evidence_in_words((found, usual): (f64, f64), acts: Acts, other: Option<Acts>) -> String {
     let (acceleration_of, size) = (acceleration(acts), found.abs());
     let is_significant = size >= SIGN_SIGNIFICANCE;

@@ -234,8 +234,8 @@ impl FoundChannels<'_> {
         }
     }
 
-    /// Marks the moments of inertia as unsure unless that about z is the largest, as in every
-    /// aircraft: recorders differ in the order of the axes.
+    /// Marks the moments of inertia as unsure unless the moment about z is the largest, as in every
+    /// aircraft. Recorders differ in the order of the axes.
     fn mark_unsure_inertias(&mut self) {
         let largest = |signal: &str| {
             let own = self.channels.iter().find(|c| c.signal == signal)?;

@@ -81,7 +81,8 @@ impl Step {
 }
 
 impl<'a> Excursions<'a> {
-    /// Size of the motion of a column in its unit.
+    /// Measures the motion of a column, in the column's unit: range and largest change within a
+    /// step's time (both without rare extremes), and noise.
     #[must_use]
     pub fn of(grid: &Grid, column: &'a str, kind: Input, unit: Unit) -> Excursions<'a> {
         let values = grid.columns.get(column).map_or(&[][..], Vec::as_slice);

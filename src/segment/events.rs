@@ -10,8 +10,8 @@ use super::segmented::Segmented;
 use super::settings::QualityLimits;
 use super::{condition, problems};
 
-/// Difference up to which starts and ends of a found maneuver and an event agree, s: coarse enough
-/// for times that are read from a strip chart.
+/// Difference up to which starts and ends of a found maneuver and an event agree, s. It is coarse
+/// enough for times read from a strip chart.
 const AGREEMENT_S: f64 = 1.0;
 
 /// Share of the shorter window above which an event replaces a maneuver, also one of the other

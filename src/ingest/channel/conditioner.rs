@@ -1,5 +1,6 @@
-//! One channel on its way from the recorder's numbers to a signal: converted, unwrapped, cleaned of
-//! stuck values and spikes, its gaps bridged or left missing, every sample marked.
+//! One channel on its way from the recorder's numbers to a signal. It is converted, unwrapped, and
+//! cleaned of stuck values and spikes. Gaps are bridged or left missing, and every sample is
+//! flagged.
 //!
 //! Samples come in pieces of any length and leave as soon as later samples cannot change them. What
 //! is decided about a sample depends on its surroundings and on the character of its spell, never

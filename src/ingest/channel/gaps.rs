@@ -19,7 +19,7 @@ pub enum Bridge {
 /// a straight line by less than 100 ft, and its Mach number by less than 0.02.
 const SLOW_BRIDGE_S: f64 = 3.0;
 
-/// Signals whose gaps of some seconds are bridged: of a maneuver they change only the gravity, the
+/// Signals whose gaps of some seconds are bridged. In a maneuver they affect only gravity, the
 /// gyroscopic moment, the place in the tunnel tables and the inertia.
 const SLOW: [&str; 12] = [
     s::RPM_LEFT,
@@ -93,10 +93,10 @@ impl Reach {
 
 /// Bridges the gaps (NaN) within reach in place and returns the flag of every sample.
 ///
-/// A gap at either end of the record has one side only and stays missing, unless it lies between
-/// two values of a slow channel, or is within the reach at an end: then the nearest value is held.
-/// `period` gives the channel's samples per recorded value at a sample: a gap that is no longer than
-/// this lies between two recorded values and is no fault.
+/// A gap at an end of the record has one neighbour only and stays missing, with two exceptions: it
+/// lies between two values of a slow channel, or it is within the reach at an end. It then takes
+/// the neighbour's value. `period` gives the channel's samples per recorded value at a sample. A
+/// gap that is no longer lies between two recorded values and is no fault.
 pub fn bridge_gaps(
     values: &mut [f64],
     reach: Reach,

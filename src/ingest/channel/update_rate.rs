@@ -22,9 +22,10 @@ const MOST_UPDATES: usize = 4;
 /// two samples apart.
 const SHORTEST_WITH_LOSSES: usize = 8;
 
-/// Share of the distances between recorded samples, or of the changes of a held value, that must
-/// fit a period: frames are lost and clocks slip now and then. Of changes at random half share a phase of the
-/// shortest period, two, so 19 of [`LEAST_CHANGES`] do by chance once in 25,000 spells.
+/// Fraction of the distances between recorded samples, or of the changes of a held value, that must
+/// fit a period. Frames are lost and clocks slip now and then. Of changes at random half share a
+/// phase of the shortest period, two, so 19 of [`LEAST_CHANGES`] do by chance once in 25,000
+/// spells.
 const FITTING_SHARE: f64 = 0.95;
 
 /// Least number of changes of value, or distances, from which a period is inferred.
@@ -140,8 +141,9 @@ fn changes(values: &[f64], first: usize) -> Vec<usize> {
     changes
 }
 
-/// Distance between the finite values of a channel that has few of them: equal for all within one
-/// sample, save lost updates, and more than one. Such is a slow channel in a short record.
+/// Distance between the finite values of a sparse channel. It is more than one sample and, except
+/// for lost updates, equal for all values within one sample. Such is a slow channel in a short
+/// record.
 fn period_of_few(values: &[f64]) -> Option<usize> {
     let distances = distances(values);
     let total: usize = distances.iter().sum();

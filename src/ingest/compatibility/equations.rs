@@ -7,9 +7,9 @@
 //! - φ̇ = p' + tan θ (q' sin φ + r' cos φ), θ̇ = q' cos φ − r' sin φ, ψ̇ = (q' sin φ + r' cos φ)/cos θ, with ω' = ω − n
 //! - ḣ = u sin θ − v sin φ cos θ − w cos φ cos θ
 //!
-//! An accelerometer on an arm r also feels ω̇ × r. So that no rate is differentiated, each velocity
-//! component of the state is that at the sensor of the component, `s_i` = (v + ω × `r_i`)_i, whose
-//! rate has no ω̇.
+//! An accelerometer on an arm r also feels ω̇ × r. Each velocity component of the state is the
+//! velocity at that component's sensor, `s_i` = (v + ω × `r_i`)_i. Its rate contains no ω̇, so that
+//! no body rate is differentiated.
 
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 

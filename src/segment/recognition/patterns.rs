@@ -11,7 +11,7 @@ use crate::segment::steps::swings::Swing;
 const FEWEST_SWINGS: usize = 4;
 
 /// Factor by which an interval between swings may exceed the one before and still count as not
-/// slower: the times of swings have errors of some samples.
+/// slower. The times of swings have errors of some samples.
 const INTERVAL_TOLERANCE: f64 = 1.1;
 
 /// Smallest share of intervals that are not slower than the one before: a step of feedback may

@@ -159,8 +159,8 @@ fn maneuver<'a>(
     })
 }
 
-/// Time of the first step of a maneuver, or of a smaller step to the other side before it: a
-/// deflection of a surface from trim that feedback made small.
+/// Time of the first step of a maneuver. If a smaller step to the other side precedes it, the time
+/// of that step: a deflection from trim that feedback made small.
 ///
 /// Steps up to the last one before the segment belong to another maneuver.
 fn opening_s(segment: &Segment, (previous_s, first_s): (f64, f64)) -> f64 {

@@ -59,8 +59,8 @@ impl<'a> Segment<'a> {
         (self.from_s - slack_s, self.to_s + slack_s)
     }
 
-    /// The steps of a signal that stand out from feedback: at least a share of its largest step,
-    /// reduced by the effect that turbulence may have. For a surface that the on-board system
+    /// Steps of a signal that stand out from feedback: at least a fraction of the signal's largest
+    /// step, reduced by the possible effect of turbulence. For a surface that the on-board system
     /// moves, only the uncommanded steps.
     pub fn steps_of(&self, signal: &str) -> Vec<&'a Step> {
         let detections = self.detections;

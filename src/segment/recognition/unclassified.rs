@@ -20,9 +20,9 @@ const CUT_AT_START_S: f64 = 1.0;
 /// Reports steps that no maneuver explains, unless they may be ordinary flying.
 ///
 /// They are reported if a signal moves to one side, to the other by more than in ordinary flying,
-/// and back. Ordinary flying moves the controls too: a few steps of the pilot, or steps among which
-/// no class has one of its inputs complete, are not reported. In a recording that may be one
-/// maneuver everything is reported.
+/// and back. Ordinary flying moves the controls too. Two cases are not reported: a few steps of the
+/// pilot, and steps among which no class has one of its inputs complete. In a recording that may be
+/// one maneuver everything is reported.
 pub(super) fn unexplained(search: &CutSearch, steps: (usize, usize)) -> Option<Unknown> {
     let segment = search.segment(steps);
     let nearest = search
@@ -95,8 +95,8 @@ pub(super) fn ambiguous(search: &CutSearch, segment: &Segment, names: String) ->
     unknown(search, segment, names, reason)
 }
 
-/// True for pilot steps beyond ordinary flying: at least [`FEWEST_PILOT_STEPS`], and at least half
-/// of the steps that the class requires of all its inputs together.
+/// `true` for pilot steps beyond ordinary flying: at least [`FEWEST_PILOT_STEPS`], and at least
+/// half of the steps that the class requires of all its inputs together.
 fn is_series(segment: &Segment, class: &Class) -> bool {
     let wanted: usize = class.recognition.steps.values().map(|c| c.at_least).sum();
     segment.count_explained(class) >= wanted.div_ceil(2).max(FEWEST_PILOT_STEPS)

@@ -35,10 +35,10 @@ const NEAR_MAXIMUM: f64 = 0.95;
 /// Detects the steps and the deflections of every signal that has a smallest step.
 ///
 /// The smallest step is the one in the settings, or `steps_over_noise` times the noise of the
-/// signal's own changes if that is larger, since feedback moves a surface in turbulence. In a
-/// recording that is a single maneuver it is limited to the share of the largest change below which
-/// steps count as feedback. Deflections are all changes of at least `deflection_share` of the
-/// smallest step; every step is one.
+/// signal's changes if that is larger. Feedback moves a surface in turbulence. In a recording that
+/// is a single maneuver it is limited to the share of the largest change below which steps count as
+/// feedback. Deflections are all changes of at least `deflection_share` of the smallest step; every
+/// step is one.
 pub(in crate::segment) fn detect(record: &Record, settings: &Settings) -> (Steps, Steps) {
     let window = Window::of(record, settings);
     let (mut steps, mut deflections) = (Steps::default(), Steps::default());
@@ -271,8 +271,8 @@ const SIDE: usize = 64;
 /// Least number of finite samples of a level that leaves out its largest and smallest: two remain.
 const FEWEST_TO_TRIM: f64 = 4.0;
 
-/// The level that begins at each sample: the mean of its finite samples without the largest and the
-/// smallest; NaN where fewer than half are finite.
+/// Level that begins at each sample: the mean of its finite samples without the largest and the
+/// smallest. NaN if fewer than half are finite.
 fn levels(values: &[f64], length: usize) -> Vec<f64> {
     let mut levels = vec![f64::NAN; (values.len() + 1).saturating_sub(length)];
     let side_by_side = pulp::Arch::new();
