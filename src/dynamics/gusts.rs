@@ -1,10 +1,11 @@
-//! Equations of an axis in moving air: its states, and the rates that the aerodynamics feel.
+//! Equations of an axis in moving air: its states, and the body rates relative to the air.
 //!
-//! The first state is the flow angle with gusts included, which the vane and the aerodynamics
-//! sense. A rotary gust g makes the aerodynamics feel the rate q + g, while the gyro and the
-//! kinematics keep q. In the state vector the felt rates follow the axis's own states. A gust is
-//! constant during a step of the integration, so a felt rate has the acceleration of its own rate;
-//! between steps gusts decay and grow ([`InGusts::decayed`]).
+//! The first state is the flow angle with gusts included. The vane measures it, and the
+//! aerodynamics depend on it. With a rotary gust g the aerodynamics depend on the rate q + g
+//! relative to the air; the gyro and the kinematics have q. In the state vector the rates relative
+//! to the air follow the states of the axis in still air. A gust is constant during a step of the
+//! integration, so both rates of a pair have the same acceleration. Between steps gusts decay and
+//! grow ([`InGusts::decayed`]).
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -19,16 +20,16 @@ use super::motion::Motion;
 use crate::aero::{Axis, Regressor};
 use crate::aircraft::Aircraft;
 
-/// Equations of an axis whose last states are the rates that the aerodynamics feel.
+/// Equations of an axis whose last states are the body rates relative to the air.
 pub trait InGusts<const NX: usize>: Equations<NX> {
     /// Index of the state that is the flow angle, gusts included.
     const ANGLE: usize = 0;
     /// Index of the output that measures the flow angle.
     const VANE: usize = 0;
-    /// Pairs of states (rate of the gyro, rate that the aerodynamics feel), one for each rotary gust.
+    /// Pairs of states (rate of the gyro, rate relative to the air), one for each rotary gust.
     const FELT_RATES: &'static [(usize, usize)];
 
-    /// Number of states without the felt rates.
+    /// Number of states without the rates relative to the air.
     #[must_use]
     fn own_states() -> usize {
         NX - Self::FELT_RATES.len()
@@ -45,11 +46,11 @@ pub trait InGusts<const NX: usize>: Equations<NX> {
     }
 }
 
-/// The longitudinal axis with the pitch rate that the aerodynamics feel.
+/// Longitudinal axis with the pitch rate relative to the air as a further state.
 #[derive(Clone, Copy, Debug)]
 pub struct LongitudinalInGusts;
 
-/// The lateral-directional axis with the roll and yaw rates that the aerodynamics feel.
+/// Lateral-directional axis with the roll and yaw rates relative to the air as further states.
 #[derive(Clone, Copy, Debug)]
 pub struct LateralInGusts;
 
@@ -61,13 +62,13 @@ impl InGusts<6> for LateralInGusts {
     const FELT_RATES: &'static [(usize, usize)] = &[(1, 4), (2, 5)];
 }
 
-/// The axis's own states, without the felt rates.
+/// States without the rates relative to the air.
 #[inline(always)]
 fn own<const N: usize, const M: usize>(x: &SVector<f64, M>) -> SVector<f64, N> {
     SVector::from_fn(|i, _| x[i])
 }
 
-/// State with the felt rates equal to the gyro's.
+/// State with the rates relative to the air equal to the gyro's.
 #[inline(always)]
 fn with_felt<const N: usize, const M: usize>(
     x: &SVector<f64, N>,
@@ -83,7 +84,7 @@ fn with_felt<const N: usize, const M: usize>(
     wide
 }
 
-/// Rates of all states: a felt rate accelerates as its own rate does.
+/// Rates of all states: a rate relative to the air accelerates as the gyro's rate does.
 #[inline(always)]
 fn wide_rates<const N: usize, const M: usize>(own: &Rates<N>, felt: &[(usize, usize)]) -> Rates<M> {
     let (mut by_state, mut by_coefficient) = (SMatrix::zeros(), SMatrix::zeros());
@@ -108,7 +109,7 @@ fn wide_rates<const N: usize, const M: usize>(own: &Rates<N>, felt: &[(usize, us
     }
 }
 
-/// Outputs, which read no felt rate.
+/// Outputs, which depend on no rate relative to the air.
 #[inline(always)]
 fn wide_outputs<const N: usize, const M: usize>(own: &Outputs<N>) -> Outputs<M> {
     let mut by_state = SMatrix::<f64, OUTPUTS, M>::zeros();

@@ -8,10 +8,10 @@
 //! f_y = q̄S CY/m
 //! ```
 //!
-//! f_x and f_z are taken as measured, brought to the c.g. In 3.1 they stand as C_D sin β and
-//! T cos α sin β, with a minus sign: thrust turns the path towards the nose. Moments follow Euler's
-//! equations about x and z for a symmetric airframe. The engines' angular momentum H along +x has the
-//! yawing moment +q H.
+//! f_x and f_z are the measured forces, transferred to the c.g. Eq. 3.1 writes them as C_D sin β
+//! and T cos α sin β, with a minus sign: thrust turns the path towards the nose. Moments follow
+//! Euler's equations about x and z for a symmetric airframe. The engines' angular momentum H along
+//! +x has the yawing moment +q H.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"

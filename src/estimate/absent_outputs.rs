@@ -2,8 +2,8 @@
 //! maneuver shows through them alone.
 //!
 //! Normal and side force also turn the flight path, so α and β determine their derivatives without
-//! `an` and `ay`. The axial force turns it by its share sin α only, which does not separate it from the
-//! normal force: without `ax` its derivatives have the tunnel's values.
+//! `an` and `ay`. The axial force turns it by its share sin α only, which does not separate axial
+//! from normal force. Without `ax` the derivatives of the axial force have the tunnel's values.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -46,8 +46,8 @@ fn reason(absent: Output) -> String {
     format!("`{}` is not recorded", absent.signal())
 }
 
-/// The absent output without which a derivative of the class is not estimated, or not held as the
-/// class holds it: `ax` for the axial force, `an` or `ax` for a regressor that contains the measured α̇.
+/// Absent output that a derivative needs in order to have the class's status. The axial force needs
+/// `ax`; a regressor with the measured α̇ needs `an` or `ax`.
 fn output_that_hides(task: &Task, derivative: &Derivative) -> Option<Output> {
     let is_free = match task.status(&derivative.name)? {
         Status::Estimated => true,

@@ -1,9 +1,10 @@
 //! Change of the derivatives over the angles of attack that a maneuver sweeps.
 //!
-//! The build-up has one value of each derivative in a maneuver. In the wind tunnel's tables t(α) it changes:
-//! along a derivative's regressor r the coefficient has the further term (t(α) − t(ᾱ)) r, along α itself the
-//! term T(α) − T(ᾱ) − T'(ᾱ) (α − ᾱ). T is the tabulated sum of constant and α t with the slope t at its points, or
-//! without such a sum the integral of t. Held derivatives change as estimated ones do.
+//! The build-up has one value of each derivative in a maneuver. In the wind tunnel's tables t(α) it
+//! changes. For a regressor r other than α the coefficient gains the term (t(α) − t(ᾱ)) r. For α
+//! itself it gains T(α) − T(ᾱ) − T'(ᾱ) (α − ᾱ). T is the tabulated sum of the constant and α t,
+//! with the slope t at its points. Without such a sum T is the integral of t. Held derivatives
+//! change as estimated ones do.
 //!
 //! Slopes of two kinds act in a maneuver:
 //!
@@ -77,7 +78,7 @@ impl AlphaSlopes {
         slopes
     }
 
-    /// Model with the slopes held at these values, in their order.
+    /// Model with the slopes added as held derivatives; `values[i]` belongs to slope `i`.
     pub fn held_in<'s>(&'s self, model: &Model<'s>, values: &[f64]) -> Model<'s> {
         let mut held = model.clone();
         let both = || self.slopes.iter().zip(values);
@@ -176,8 +177,8 @@ impl AlphaSlope {
     }
 }
 
-/// Changes of the coefficients over α by the derivatives that are free in `wide`: one standard deviation of each
-/// derivative's own change, then the changes in the tunnel.
+/// Changes of the coefficients over α by the derivatives that are free in `wide`: first one
+/// standard deviation of each derivative's change, then the changes in the tunnel.
 fn changes<const NX: usize, E: Equations<NX>>(
     task: &Task,
     alphas: &[f64],
@@ -212,8 +213,8 @@ fn changes<const NX: usize, E: Equations<NX>>(
 /// One standard deviation of a derivative's own change from the mean `at` of the angles to each sample; along α
 /// itself, of the coefficient's.
 ///
-/// The error of the table has the standard uncertainty u, and fades over the length ℓ as in the posterior of
-/// the campaign: over a small distance d it changes by √3 u d/ℓ.
+/// The table's error has the standard uncertainty u and the correlation length ℓ of the posterior's
+/// prior. Over a small distance d it changes by √3 u d/ℓ.
 fn own_change(task: &Task, derivative: &Derivative, alphas: &[f64], at: f64) -> Vec<f64> {
     let length = task.context.settings.tunnel_error_length_deg;
     let slope = 3f64.sqrt() * task.held_uncertainty(derivative) / length;

@@ -128,7 +128,8 @@ impl AlphaRange {
     }
 }
 
-/// Value of a quantity at a place between two angles.
+/// Linear interpolation between the entries `low` and `low + 1`; `share` is the fraction of the
+/// step above `low`.
 fn interpolate(quantity: &[f64], (low, share): (usize, f64)) -> f64 {
     quantity[low] + share * (quantity[low + 1] - quantity[low])
 }

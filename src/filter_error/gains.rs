@@ -164,9 +164,9 @@ impl<const NX: usize> PatternGain<NX> {
 
     /// Slope of the gain K along a parameter.
     ///
-    /// P is the covariance of the prediction, C the slopes of the outputs along the states, S the
-    /// covariance of the innovations, and d a slope along the parameter: dK = (dP Cᵀ + P dCᵀ − K
-    /// dS) S⁻¹.
+    /// P is the covariance of the prediction, C the sensitivity of the outputs to the states, S the
+    /// covariance of the innovations. With d for a slope along the parameter, dK = (dP Cᵀ + P dCᵀ −
+    /// K dS) S⁻¹.
     #[inline(always)]
     fn slopes_along(
         &self,

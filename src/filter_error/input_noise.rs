@@ -1,6 +1,6 @@
 //! Noise of the measured inputs as noise of the states. The equations take surfaces and dynamic
-//! pressure as exact, so their white noise moves the computed aircraft; through a moment it is
-//! integrated to slow errors.
+//! pressure as exact. Their white noise therefore moves the computed aircraft; through a moment it
+//! is integrated to slow errors.
 //!
 //! Let n be the error of an input at one sample, and e the change of the coefficients c per unit of
 //! this input. The error changes the coefficients by e n, and the state x during a step Δt by Γ e

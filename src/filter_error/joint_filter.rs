@@ -188,8 +188,9 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
         sum
     }
 
-    /// Least value of each parameter; `resolutions` are the least standard deviations of each
-    /// maneuver's outputs.
+    /// Lower limits of the parameters during the iteration: none for derivatives, biases and
+    /// initial states. The limits of the noise parameters follow from `resolutions`, the smallest
+    /// standard deviation of each output of each maneuver.
     #[must_use]
     pub fn floors(&self, resolutions: &[[f64; OUTPUTS]]) -> Vec<f64> {
         let own = vec![f64::NEG_INFINITY; self.first_noise()];
@@ -201,8 +202,9 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
         own.into_iter().chain(noise).collect()
     }
 
-    /// Marks parameters as fixed: all noise if it is known; else the noise of outputs that never count,
-    /// and corner and correlations of those rotary gusts whose size is fixed.
+    /// Fixes noise parameters that the data do not determine: all of them if the noise is known.
+    /// Otherwise the noise of outputs that never count, and corner and correlations of rotary gusts
+    /// of fixed size.
     pub(super) fn fix_noise(&self, free: &mut [bool]) {
         if self.noise_is_known {
             free[self.first_noise()..].fill(false);

@@ -1,9 +1,9 @@
 //! Changes of the gradient by errors of the instruments, to first order in the errors.
 //!
-//! An instrument in error changes the recorded inputs and outputs. At the same parameters and the
-//! same gain, let f and y be the changes of the rates and of the computed outputs at a sample, both
-//! at the filter's own corrected state, and z the change of the measured outputs. The change s of
-//! the predicted state and the change v of the innovations then obey
+//! An instrument in error changes the recorded inputs and outputs. Let f be the change of the
+//! rates, y of the computed outputs and z of the measured outputs, at one sample. f and y are taken
+//! at the filter's corrected state, with unchanged parameters and gain. The change s of the
+//! predicted state and the change v of the innovations then obey
 //!
 //! ```text
 //! v(k) = z(k) − y(k) − C s(k)

@@ -2,8 +2,8 @@
 //! 5).
 //!
 //! Output error attributes the effects of gusts to the derivatives. Filter error adds noise of the
-//! air to the states between samples, and a filter of steady gain K corrects the predicted state x̂
-//! to x̃ by the measurements z:
+//! air to the states between samples. A filter of steady gain K corrects the predicted state x̂ to
+//! x̃ by the measurements z:
 //!
 //! ```text
 //! prediction   x̂(k+1) = f(T x̃(k))

@@ -1,11 +1,11 @@
-//! One pass of the filter over a maneuver, in the kernel of output error: the same steps, with a
-//! correction of states and sensitivities between them.
+//! One pass of the filter over a maneuver, in the kernel of output error. The steps are the same,
+//! with a correction of states and sensitivities between them.
 //!
-//! Let s and y be the sensitivities of the predicted state and outputs to one parameter, v the
-//! innovations, and d a slope along the parameter. The corrected state x̃ then has, after the decay
-//! T of the rotary gusts, the sensitivity T (s − K y + dK v) + dT x̃. K y has a minus sign because
-//! an innovation falls as its prediction rises.  The sums receive L⁻¹ y and L⁻¹ v. With S = L Lᵀ
-//! the covariance of the innovations, L⁻¹ v is white with unit variance.
+//! Let s and y be the sensitivities of the predicted state and outputs to one parameter. Let v be
+//! the innovations, and d a slope along the parameter. The corrected state x̃ then has, after the
+//! decay T of the rotary gusts, the sensitivity T (s − K y + dK v) + dT x̃. K y has a minus sign
+//! because an innovation falls as its prediction rises. The sums receive L⁻¹ y and L⁻¹ v. With S =
+//! L Lᵀ the covariance of the innovations, L⁻¹ v is white with unit variance.
 #![expect(
     clippy::inline_always,
     reason = "compiled into one loop for the processor at hand"

@@ -58,8 +58,9 @@ impl FilterResponse {
         }
     }
 
-    /// Sets the cost to ½ Σ (v' S⁻¹ v + log|S|), and adds the parts of gradient and information that come
-    /// from the slopes of S, where the gains have any. `pattern_of` has the pattern of each sample.
+    /// Sets the cost to ½ Σ (v' S⁻¹ v + log|S|). Adds the parts of gradient and information that
+    /// come from the slopes of S, if the gains have slopes. `pattern_of` has the pattern of each
+    /// sample.
     pub(super) fn add_covariance<const NX: usize>(
         &mut self,
         gains: &[PatternGain<NX>],
@@ -130,8 +131,8 @@ fn innovation_products(
     sum
 }
 
-/// Traces of the slopes S_i of the innovations' covariance S along the parameters i: tr(S⁻¹ S_i S⁻¹
-/// S_j), row by row, and tr(E S⁻¹ S_j) in a last row, with E the matrix `excess`.
+/// Traces of the slopes S_i of the innovations' covariance S along the parameters i. The rows have
+/// tr(S⁻¹ S_i S⁻¹ S_j); a last row has tr(E S⁻¹ S_j), with E the matrix `excess`.
 fn covariance_traces<const NX: usize>(gain: &PatternGain<NX>, excess: &Outputs) -> AlignedMatrix {
     const ENTRIES: usize = OUTPUTS * OUTPUTS;
     let count = gain.slopes.len();

@@ -14,8 +14,8 @@
 //! | V = H_ss − H_sf H_ff⁻¹ H_fs | information on the slopes with f eliminated |
 //! | G = H_ff⁻¹ H_fs | change of the estimates with the slopes, with reversed sign |
 //!
-//! For one share λ the slopes have the mean ŝ and the covariance P, the estimates of f change by −G
-//! (ŝ − s₀) with the covariance G P G', and the data have the likelihood p:
+//! For a given λ the slopes have the mean ŝ and the covariance P. The estimates of f change by −G
+//! (ŝ − s₀), with the covariance G P G'. The data have the likelihood p:
 //!
 //! ```text
 //! P = D (1 + D V D)⁻¹ D        ŝ = m + P (g_s − V m)

@@ -39,8 +39,8 @@ pub struct CoefficientPosterior {
     pub weights: BTreeMap<usize, f64>,
     /// Terms that each maneuver estimates, by its index in the evidence.
     pub estimated: BTreeMap<usize, Vec<usize>>,
-    /// Differences from the tunnel of the values that a maneuver holds, by the posterior of the
-    /// other flights. The key is the maneuver's id.
+    /// Posterior of the held derivatives' differences from the tunnel, computed from the other
+    /// flights only. Keyed by maneuver id.
     pub held: BTreeMap<String, HeldDifferences>,
     /// Agreement of each flight with the others.
     pub flights: BTreeMap<String, Agreement>,
@@ -88,7 +88,8 @@ pub struct Data {
     /// Flights in the order of their ids.
     pub flights: Vec<FlightData>,
     flight_ids: Vec<String>,
-    /// Class and observation of each maneuver that takes part.
+    /// Index of the class, and observation, of each maneuver that estimates a term of this
+    /// coefficient.
     observations: Vec<(usize, Observation)>,
     /// Maneuvers of each flight: index in the evidence, and index among the observations.
     places: Vec<Vec<(usize, usize)>>,

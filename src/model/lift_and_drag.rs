@@ -61,9 +61,9 @@ struct HeldErrors {
 }
 
 impl Model {
-    /// Lift and drag of a longitudinal maneuver whose normal and axial force are estimated, and
-    /// their slopes along the regressors; empty for others. Held derivatives have the values of the
-    /// posterior of the other flights, or of the tunnel.
+    /// Rows of one longitudinal maneuver: total C_L and C_D, then their slopes along each
+    /// regressor. Empty unless the constants of CN and CA are estimated. Held derivatives have the
+    /// posterior values of the other flights, or the tunnel's.
     #[must_use]
     pub fn lift_and_drag(
         &self,

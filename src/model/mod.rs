@@ -2,10 +2,10 @@
 //! tunnel is the prior, and the maneuvers are the evidence.
 //!
 //! Each coefficient is one Gaussian problem. Its unknowns are the differences of its derivatives
-//! from the tunnel at the points of a grid ([`prior`]), linear between them. A maneuver is evidence
-//! with its whole corrected covariance, the exact effect of its held values, and the calibration
-//! errors that it shares with its flight ([`observation`]). Sizes and lengths of the differences
-//! are the most probable ones ([`scales`]); their remaining uncertainty is added to the covariance
+//! from the tunnel at the points of a grid ([`prior`]), linear between them. A maneuver counts with
+//! its whole corrected covariance, the exact effect of its held values, and the calibration errors
+//! that it shares with its flight ([`observation`]). Sizes and lengths of the differences are the
+//! most probable ones ([`scales`]); their remaining uncertainty is added to the covariance
 //! ([`open_scales`]). A maneuver that the others contradict has a lower weight ([`posterior`]).
 
 mod settings;

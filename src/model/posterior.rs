@@ -35,8 +35,8 @@ pub fn information(flights: &[FlightData], weights: &[f64], unknowns: usize) -> 
 
 /// Posterior of the unknowns for a prior covariance given by its root R.
 ///
-/// With the information matrix Λ and vector η of the data ([`Information`]), the prior covariance R
-/// Rᵀ gives the posterior covariance P = R (I + Rᵀ Λ R)⁻¹ Rᵀ and the mean P η.
+/// Let Λ and η be the information matrix and vector of the data ([`Information`]). With the prior
+/// covariance R Rᵀ, the posterior covariance is P = R (I + Rᵀ Λ R)⁻¹ Rᵀ and the mean P η.
 pub struct SolvedPosterior<'a> {
     root: &'a BlockRoot,
     /// Cholesky factor L of I + Rᵀ Λ R = L Lᵀ.
@@ -133,9 +133,9 @@ pub struct LeftOut {
 /// | F = A P Aᵀ | covariance of the fitted values A m |
 /// | V | covariance of y less its prediction from the other data |
 ///
-/// If the flight is left out, y less its prediction has the precision V⁻¹ = Σ⁻¹ − Σ⁻¹ F Σ⁻¹ and the
-/// value V Σ⁻¹ r. If only some of its rows are left out, their blocks of V⁻¹ and Σ⁻¹ r replace the
-/// whole ones.
+/// With the flight left out, the difference between y and its prediction has the precision V⁻¹ =
+/// Σ⁻¹ − Σ⁻¹ F Σ⁻¹ and the value V Σ⁻¹ r. If only some of its rows are left out, their blocks of
+/// V⁻¹ and Σ⁻¹ r replace the whole ones.
 #[derive(Clone, Debug)]
 pub struct LeavingOut {
     /// Precision V⁻¹.

@@ -76,8 +76,8 @@ impl PriorCovariance {
     }
 }
 
-/// Factor of `shape` for a size s: s² over the correlation 1 + `OFFSET` at distance zero, so that
-/// the variance at a point is s² times its shape.
+/// Factor of `shape` for a size s: s² over the correlation 1 + `OFFSET` at distance zero. The
+/// variance at a point is thus s² times its shape.
 #[must_use]
 pub fn variance_factor(scale: &Scale) -> f64 {
     scale.size * scale.size / (1.0 + OFFSET)

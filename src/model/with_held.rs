@@ -25,7 +25,7 @@ pub struct WithHeld<'a> {
     evidence: &'a Evidence<'a>,
     /// Differences of the held derivatives from the tunnel.
     held: BTreeMap<&'a str, f64>,
-    /// Change of each parameter.
+    /// Change of each estimated parameter due to the new held values.
     change: DVector<f64>,
     /// Change of the parameters' covariance.
     covariance: DMatrix<f64>,

@@ -296,8 +296,8 @@ impl<'a> AboutTrim<'a> {
         change
     }
 
-    /// Change of the coefficients from the trim, with its slopes along the flow, and along each
-    /// derivative raised by the same amount at every angle of attack.
+    /// Change of the coefficients from the trim, with its slopes along the flow and along each
+    /// derivative. A derivative is raised by the same amount at every angle of attack.
     #[must_use]
     pub fn change_with_slopes(&mut self, flow: &Flow, recorded: &[f64]) -> CoefficientSlopes {
         let change = self.change(flow, recorded);

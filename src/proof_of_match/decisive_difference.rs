@@ -1,8 +1,8 @@
 //! Difference that decides whether a repeat flight passes, as a linear function of the derivatives.
 //!
-//! To first order the outputs of a repeat flight differ from a model's by four parts: the mean
-//! difference, the effects of the derivatives' deviations, the effects of the start's errors, and
-//! the sensors' noise. At one sample the difference is therefore normal, and its nearest limit is a
+//! To first order the outputs of a repeat flight and of a model differ by four parts: the mean
+//! difference, the effect of the derivatives' deviations, the effect of the start's errors, and
+//! sensor noise. At one sample the difference is therefore normal, and its nearest limit is a
 //! number of standard deviations away: its distance. The decisive difference is
 //!
 //! 1. of an alternative: the difference at the sample with the smallest distance;
@@ -82,8 +82,8 @@ impl PredictedDutchRoll<'_> {
 }
 
 impl MeanRun {
-    /// The decisive difference of the run of a model at every `stride`-th sample, and of its Dutch
-    /// roll if that is available; `None` if a run departs or no tolerance can be judged.
+    /// Decisive difference of a model's run at every `stride`-th sample, and of its Dutch roll if
+    /// available. `None` if a run departs or no tolerance can be judged.
     #[must_use]
     pub fn decisive(
         &self,

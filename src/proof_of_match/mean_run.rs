@@ -1,5 +1,5 @@
-//! Free run at the mean of a posterior, with the slopes of its outputs along the derivatives and the
-//! parameters of its start, and the deficiency of a flight against it.
+//! Free run at the mean of a posterior, with the sensitivities of its outputs to the derivatives
+//! and the start's parameters. Also the deficiency of a flight against this run.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -15,9 +15,9 @@ use crate::numerics::sample_count::whole_steps;
 /// Longest step of the run with slopes, s. Probabilities differ by 0.2 % rms from those of steps of a quarter.
 const LONGEST_STEP_S: f64 = 0.1;
 
-/// Root mean square of the differences between flight and mean up to which posterior, start and noise
-/// explain them, in standard deviations: few directions carry the deviations, so that they reach two
-/// by chance.
+/// Limit of the rms difference between flight and mean run, in standard deviations of what
+/// posterior, start and noise explain. Few directions carry the deviations, so two is reached by
+/// chance.
 const EXPLAINED_DEVIATIONS: f64 = 2.0;
 
 /// Run about which flights repeat, with the slopes of its outputs.
@@ -66,9 +66,9 @@ impl MeanRun {
         self.slopes.split_at(self.derivatives.len())
     }
 
-    /// Deficiency of the run at every `stride`-th sample, whose outputs are `mean`: measured less
-    /// computed outputs, reduced by the share of their mean square that deviations of the derivatives,
-    /// start and noise explain. `roots` are those of the covariances of derivatives and start.
+    /// Deficiency of the run with the outputs `mean`, at every `stride`-th sample: measured less
+    /// computed outputs. It is reduced by the fraction of their mean square that derivatives, start
+    /// and noise explain. `roots` are those of the covariances of derivatives and start.
     #[must_use]
     pub fn deficiency(
         &self,

@@ -15,8 +15,7 @@ use crate::rigid_body::{Loading, Mass};
 /// Least number of samples of a maneuver that can be flown again.
 const FEWEST_SAMPLES: usize = 20;
 
-/// Least time over which the trim is matched, s: half a second at 40 Hz gives a rate's slope to a
-/// tenth of a degree per second squared.
+/// Shortest time for matching the trim, s. At 40 Hz, 0.5 s gives the slope of a rate to 0.1 deg/s².
 const LEAST_TRIM_S: f64 = 0.5;
 
 /// Least noise of each output, standard deviation, in the order of the outputs: finer than any

@@ -7,9 +7,9 @@
 //! follow from the slopes of one free run. The noise of the sensors is white and independent, so
 //! its part of the probability is exact for each draw.
 //!
-//! A flight may differ from the mean by more than these parts explain, for example if a derivative
-//! varies in a way that the posterior smooths, or the equations lack an effect. This *deficiency*
-//! belongs to the aircraft, so a repeat flight shows it again.
+//! A flight may differ from the mean by more than these parts explain. A derivative may vary in a
+//! way that the posterior smooths, or the equations may lack an effect. This *deficiency* belongs
+//! to the aircraft, so a repeat flight shows it again.
 
 use pulp::Arch;
 
@@ -76,8 +76,8 @@ impl Probabilities {
     }
 }
 
-/// Draws repeat flights about the mean of a posterior, whose run in short steps is `mean`; `None`
-/// if the start is not determined or the axis has no posterior.
+/// Draws repeat flights about the mean of a posterior; `mean` is the run at the mean in short
+/// steps. `None` if the start is not determined or the axis has no posterior.
 #[must_use]
 pub fn repeats(
     (simulation, start): (&Simulation, &MatchedStart),

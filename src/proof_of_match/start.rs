@@ -2,8 +2,8 @@
 //!
 //! As in a qualification test guide, the simulator is trimmed to the aircraft before it runs free.
 //! Initial state and the six coefficients at trim are chosen so that the simulation fits all
-//! outputs best up to the first input, weighted by their noise. After that the model alone changes
-//! the coefficients.
+//! outputs best up to the first input. The outputs are weighted by their noise. After that the
+//! model alone changes the coefficients.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -20,7 +20,8 @@ pub type Vector = SVector<f64, STATES>;
 pub type ByCoefficient = SMatrix<f64, STATES, COEFFICIENTS>;
 
 /// Linear equations of an axis, with their slopes along each value of the posterior. The rates of
-/// the states x with the pitch control u are A x + B u, or with a lag A x + B u + m α̇.
+/// the states x with the pitch control u are A x + B u. With a term along the rate of the angle of
+/// attack they are A x + B u + m α̇.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearModel {
     /// Matrix A without aerodynamics.

@@ -1,6 +1,5 @@
-//! First-order changes of a body's motion: of its air data and of the rate of its state, by the
-//! exact slopes of the equations at an instant. Several changes are computed together in the lanes
-//! of vectors.
+//! First-order changes of a body's air data and of the rate of its state, by the exact slopes of
+//! the equations at an instant. Several changes are computed together in the lanes of vectors.
 #![expect(
     clippy::inline_always,
     reason = "compiled into free runs for the processor at hand"

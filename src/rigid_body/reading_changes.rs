@@ -105,8 +105,8 @@ impl ReadingSlopes {
 }
 
 impl VaneSlopes {
-    /// Slopes of a vane. Its angle does not change if speed and rates grow by the same factor, so
-    /// its slope along the speed follows from those along the rates.
+    /// Slopes of a vane. A vane's angle does not change if speed and rates grow by the same factor.
+    /// Its slope along the speed therefore follows from the slopes along the rates.
     fn new(reading: &Reading, flow: &Flow) -> VaneSlopes {
         let by_rates = reading.by_rates;
         let along: f64 = by_rates

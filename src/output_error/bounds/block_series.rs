@@ -95,7 +95,8 @@ impl BlockSeries {
         }
     }
 
-    /// Series extended to more parameters; `places` has the index of each own parameter.
+    /// Series over `parameters` parameters: the sensitivity to parameter `j` of this series moves
+    /// to column `places[j]`, and the other columns are zero.
     #[must_use]
     pub fn widened(&self, places: &[usize], parameters: usize) -> BlockSeries {
         let mut sensitivities = AlignedMatrix::zeros(self.blocks(), parameters);

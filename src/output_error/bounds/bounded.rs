@@ -1,5 +1,5 @@
-//! Data that the bounds (1.7) need besides the likelihood: residuals with their sensitivities in
-//! blocks, and the noise of signals that the equations take as exact.
+//! Data that the bounds (1.7) need in addition to the likelihood: residuals with their
+//! sensitivities in blocks, and the noise of signals that the equations take as exact.
 
 use nalgebra::DMatrix;
 

@@ -4,9 +4,9 @@
 //!
 //! Let S be the sensitivities, W the weights, v the residuals and H = Σ Sᵀ W S the information
 //! matrix. The estimates solve Σ Sᵀ W v = 0. An error of one standard deviation changes the
-//! residuals at the same parameters to v′, so the estimates change by H⁻¹ Σ Sᵀ W (v′ − v), to first
-//! order in the error. A surface's scale error or bias is equivalent to its derivatives in error,
-//! so v′ − v follows from sensitivities. For other errors it is integrated.
+//! residuals from v to v′ at unchanged parameters. To first order the estimates change by H⁻¹ Σ Sᵀ
+//! W (v′ − v). A surface's scale error or bias is equivalent to its derivatives in error, so v′ − v
+//! follows from sensitivities. For other errors it is integrated.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -21,8 +21,9 @@
 //!
 //! R C Sᵀ + S Cᵀ R − S K Sᵀ.
 //!
-//! R is found in rounds: the absorbed part for the present R is added to the covariance of the
-//! residuals, and an autoregressive process is fitted to the sum, until R settles.
+//! R is found by iteration. Each round adds the absorbed part, computed with the present R, to the
+//! residuals' covariance. It fits an autoregressive process to the sum. The rounds end when R has
+//! settled.
 //!
 //! # Cost
 //!
@@ -49,8 +50,8 @@ const SETTLED: f64 = 0.01;
 /// Change of the absorbed variance, as a share of the variance, below which settled white noise is
 /// not computed again. A bound is accurate to some hundredths only.
 const UNCHANGED: f64 = 1e-3;
-/// Least share of the noise variance that remains in the residuals for which white noise is found
-/// in one round: the residuals' variance is divided by the share.
+/// Smallest fraction of the noise variance that remains in the residuals for which white noise is
+/// found in one round, by dividing the residuals' variance by the fraction.
 const MOSTLY_LEFT: f64 = 0.95;
 
 /// Estimated noise of each output, in the order of the outputs.

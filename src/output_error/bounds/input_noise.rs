@@ -3,10 +3,10 @@
 //! integrated to slow errors. Derivatives follow these, but they are hardly visible in the
 //! residuals beside the sensors' own noise.
 //!
-//! An error of one surface sample changes the gradient Σ Sᵀ W v of the cost directly through the
-//! outputs, and indirectly through the later states. Let S be the sensitivities, W the weights and
-//! v the residuals. An adjoint λ = ∂(gradient)/∂(state), integrated backwards, contains both
-//! effects. If g_k is the change of the gradient with the surface at sample k, white noise of
+//! An error of one surface sample changes the gradient Σ Sᵀ W v of the cost in two ways: directly
+//! through the outputs, and indirectly through the later states. Let S be the sensitivities, W the
+//! weights and v the residuals. An adjoint λ = ∂(gradient)/∂(state), integrated backwards, contains
+//! both effects. Let g_k be the change of the gradient with the surface at sample k. White noise of
 //! variance σ² adds σ² Σ_k g_k g_kᵀ to the gradient's covariance. Surfaces act through three
 //! coefficients, so three vectors g per sample suffice for any number of surfaces.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]

@@ -43,8 +43,8 @@ const LONGEST_BRIDGE_S: f64 = 0.1;
 const STILL: f64 = 1e-9;
 
 /// Starting values with the derivatives from equation error: by [`regression`], with the constant
-/// from the mean; if that has no result, by least squares in time. Derivatives that the data do not
-/// determine stay near `prior`, as do biases and initial states.
+/// from the mean. Without a result of the regression, by least squares in time. Derivatives that
+/// the data do not determine stay near `prior`, as do biases and initial states.
 #[must_use]
 pub fn start<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>, prior: &[f64]) -> Vec<f64> {
     start_from(case, prior, &regression(case, case, &BTreeMap::new()))
@@ -87,7 +87,8 @@ fn is_measured<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>, coefficien
     output.is_some_and(|output| case.measurements.have(output))
 }
 
-/// Shifts the constant of a coefficient so that its mean is the implied one.
+/// Shifts the constant so that the mean of the coefficient's build-up equals the mean implied by
+/// the measured accelerations.
 fn shift_constant<const NX: usize, E: Equations<NX>>(
     case: &Case<NX, E>,
     coefficient: usize,
