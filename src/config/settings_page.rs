@@ -127,7 +127,7 @@ fn yaml(path: &[&str], value: &str) -> String {
     }
 }
 
-/// Names that the parser accepts at a path, taken from its error about an unknown name; `None` if
+/// Names that the parser accepts at a path, taken from its error about an unknown name. `None` if
 /// it takes a single value or any name.
 fn expected(file: fn(&Source) -> Option<String>, path: &[&str]) -> Option<Vec<String>> {
     let text = yaml(&[path, &["no_such_key"]].concat(), "0");

@@ -64,7 +64,7 @@ settings! {
         /// Derivatives for simulators.
         #[serde(default)]
         pub export: export::Settings,
-        /// Report and published nights.
+        /// Settings of the report and of the published nights.
         #[serde(default)]
         pub report: ReportSettings,
         /// Resources on a batch cluster.
@@ -102,8 +102,8 @@ pub struct AircraftFile {
     pub instruments: BTreeMap<String, InstrumentErrors>,
 }
 
-/// Line of the channel map: a column with its signal; a formula or a table with its signal; or a column
-/// that only formulas and tables use, without one.
+/// Line of the channel map: a column, a formula or a table with its signal; or a column without a
+/// signal that only formulas and tables use.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ChannelLine {

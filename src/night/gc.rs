@@ -32,8 +32,8 @@ struct ServedReports {
 /// set. The store may serve several folders of reports; the nights of all of them count.
 ///
 /// # Errors
-/// A store in use; reports that cannot be found, or a night whose manifest cannot be read, since
-/// their needs are unknown; a disk that fails.
+/// A store in use; a disk that fails; reports that cannot be found, or a night whose manifest
+/// cannot be read, because the artefacts they need are unknown.
 pub fn gc(config: &Config, remove: bool, wait: Duration) -> Result<Unneeded> {
     let store = Store::open(&config.store, wait)?;
     let served = served_reports(config, &store, remove, wait)?;

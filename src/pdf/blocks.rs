@@ -21,7 +21,7 @@ const CHAPTER_SIZE: f32 = 13.0;
 const SECTION_SIZE: f32 = 10.5;
 /// Gap between children side by side, pt.
 const GAP: f32 = 16.0;
-/// Largest size of a drawing's unit, pt.
+/// Largest scale of a drawing, pt per unit of its coordinates.
 const LARGEST_UNIT: f32 = 1.0;
 const LIST_INDENT: f32 = 11.0;
 const DEFINITION_INDENT: f32 = 90.0;

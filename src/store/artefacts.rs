@@ -322,8 +322,8 @@ impl Store {
         }
     }
 
-    /// `true` if the folder has an artefact whose seal fits, or only the object store has it, with this
-    /// size.
+    /// `true` if the local file has a valid seal, or, without a local file, if the object store has
+    /// the artefact in this size.
     #[must_use]
     pub fn is_intact(&self, name: &ArtefactName, bytes: u64) -> bool {
         if self.has_file(name) {

@@ -1,5 +1,5 @@
-//! A maneuver in the form for equation error in the frequency domain: the spectra of the
-//! coefficients that the measured motion implies, and of their regressors.
+//! A maneuver prepared for equation error in the frequency domain: spectra of the coefficients that
+//! the measured motion implies, and of their regressors.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;

@@ -66,8 +66,9 @@ fn no_channel(source: &Source, name: &str, user: &str, near: &str) -> Error {
     source.error(name, what)
 }
 
-/// Signal that was meant by a misspelt name. A typing error stands in one place of the configuration
-/// and is like a name that is right, or it stands in the channel map, whose signal nothing else uses.
+/// Signal that was meant by a misspelt name. A typing error occurs in one place of the
+/// configuration and resembles a correct name; or it occurs in the channel map, and nothing else
+/// uses the signal.
 fn meant<'a>(config: &'a Config, name: &str) -> Option<&'a str> {
     if is_given(config, name) || signal::is_own(name) {
         return None;

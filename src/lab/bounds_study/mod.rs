@@ -124,8 +124,8 @@ impl BoundsStudy {
         self.coverage.extend(rows);
     }
 
-    /// Estimates maneuvers under the conditions that the theory assumes, from other starting
-    /// values.
+    /// Repeats the estimation of simulated records from other starting values. The records meet the
+    /// assumptions of the theory (`assumed_condition`).
     fn vary_starts(
         &mut self,
         campaign: &SimulatedCampaign,

@@ -1,6 +1,6 @@
-//! Dependence of the minimum on the starting values: each record is estimated by output error from the true
-//! values, from twice and half of them, and from ineffective surfaces. Filter error does not start from
-//! tabulated values.
+//! Dependence of the minimum on the starting values. Each record is estimated by output error from
+//! the true values, from twice and half the true values, and from ineffective surfaces. Filter
+//! error does not start from tabulated values.
 
 use rayon::prelude::*;
 

@@ -76,8 +76,9 @@ impl Aerodynamics {
 
     /// Values of the derivatives at an angle of attack, deg, and a Mach number.
     ///
-    /// Between the points of its table a derivative is linear. A sum of constant and slope times α is the cubic through
-    /// its points with the tabulated slopes, so that the slope is the coefficient's derivative along α.
+    /// Between the points of its table a derivative is linear. A sum of constant and slope times α
+    /// is the cubic through its points with the tabulated slopes. The slope is thus the
+    /// coefficient's derivative along α.
     #[must_use]
     pub fn values(&self, alpha_deg: f64, mach: f64) -> Vec<f64> {
         let places = 0..self.buildup.derivatives.len();

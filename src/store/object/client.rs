@@ -1,8 +1,8 @@
 //! The connection to a bucket: requests of the `object_store` crate, each awaited by its thread.
 //!
-//! The crate retries with backoff for up to half a minute. After [`SILENT_REQUESTS`] requests in a row
-//! without an answer no more are made in this run, so a dead endpoint costs one minute and not one
-//! for each flight.
+//! The crate retries with backoff for up to half a minute. After [`SILENT_REQUESTS`] requests in a
+//! row without an answer, this run makes no more. A dead endpoint thus costs one minute, and not
+//! one for each flight.
 
 use std::collections::BTreeMap;
 use std::ops::Range;

@@ -7,9 +7,9 @@ use crate::error::Error;
 /// Failure of a request, and whether to try again.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Failure {
-    /// Another try may succeed: no answer, or the object was replaced meanwhile.
+    /// A retry may succeed: no answer, or the object was replaced meanwhile.
     Passing(String),
-    /// Another try will fail as well: no such bucket, no right to it, or no credentials.
+    /// A retry fails too: no such bucket, no permission, or no credentials.
     Lasting(String),
 }
 
