@@ -80,7 +80,7 @@ impl Error {
         }
     }
 
-    /// True if a repetition may succeed without a change by the analyst.
+    /// `true` if a repetition may succeed without a change by the analyst.
     #[must_use]
     pub fn is_transient(&self) -> bool {
         match self {

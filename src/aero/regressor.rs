@@ -65,8 +65,8 @@ impl Regressor {
         }
     }
 
-    /// True if the regressor is at most linear in α̇: no magnitude contains α̇, and no product has
-    /// it in both factors. The motion then follows from the loads by a linear equation.
+    /// `true` if the regressor is at most linear in α̇: no magnitude contains α̇, and no product
+    /// has it in both factors. The motion then follows from the loads by a linear equation.
     fn is_linear_in_alpha_rate(&self) -> bool {
         match self {
             Regressor::Magnitude(of) => !of.has_alpha_rate(),
@@ -78,7 +78,7 @@ impl Regressor {
         }
     }
 
-    /// True if any part of the regressor is α̇.
+    /// `true` if any part of the regressor is α̇.
     #[must_use]
     pub fn has_alpha_rate(&self) -> bool {
         self.leaves().contains(&&Regressor::AlphaRate)

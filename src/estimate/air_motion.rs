@@ -30,7 +30,7 @@ pub(super) struct Filtered {
     pub noise: Noise,
     /// −log of the likelihood.
     pub cost: f64,
-    /// True if gusts account for a drift of the attitude.
+    /// `true` if gusts account for a drift of the attitude.
     pub attitude_drifts: bool,
     /// Lag-one correlation of each output's innovations.
     autocorrelation: [f64; OUTPUTS],
@@ -55,7 +55,7 @@ pub(super) enum Air {
     Unknown(NoMinimum),
 }
 
-/// Returns true if filter error is to estimate a maneuver with this fit by output error.
+/// `true` if filter error is to estimate a maneuver with this fit by output error.
 pub(super) fn needs_filter(method: Method, measurements: &Measurements, fit: &Fit) -> bool {
     match method {
         Method::OutputError => false,
@@ -184,7 +184,7 @@ fn minimise_from_two_starts<const NX: usize, E: Equations<NX>, const NG: usize, 
     least.ok_or_else(|| why().unwrap_or(NoMinimum::Diverges))
 }
 
-/// True if, in the filter of one maneuver, a rotary gust exceeds the share [`MOSTLY`] of the rate
+/// `true` if, in the filter of one maneuver, a rotary gust exceeds the share [`MOSTLY`] of the rate
 /// to which it adds.
 fn is_mostly_air<const NX: usize, const NG: usize, G: InGusts<NG>>(
     filters: &[Filter<NG, G>],

@@ -171,7 +171,7 @@ impl CoefficientChange {
 }
 
 impl AlphaSlope {
-    /// Returns true if the derivative belongs to the lines of the slope's coefficient.
+    /// `true` if the derivative belongs to the lines of the slope's coefficient.
     fn has_line_in(&self, derivative: &Derivative) -> bool {
         self.term.coefficient == derivative.coefficient
     }

@@ -18,8 +18,8 @@ use crate::units::{DEG, Unit};
 pub(super) struct Explanation<'a> {
     /// Outputs of the equations; `None` if they diverge.
     pub outputs: Option<&'a [[f64; OUTPUTS]]>,
-    /// True if gusts explain a drift of the attitude: it integrates the rates, and the rotary gusts
-    /// in them.
+    /// `true` if gusts explain a drift of the attitude: it integrates the rates, and the rotary
+    /// gusts in them.
     pub attitude_drifts: bool,
     pub second_opinion: &'a Regression,
 }

@@ -49,7 +49,7 @@ impl HeldSlopes {
         pass.slope_effect(bounds, &self.names, &self.values, &self.priors)
     }
 
-    /// True if no derivative changes over α.
+    /// `true` if no derivative changes over α.
     pub fn is_constant(&self) -> bool {
         self.values.iter().all(|v| *v == 0.0)
     }

@@ -42,7 +42,7 @@ fn derivatives_at_rest(task: &Task) -> BTreeSet<String> {
     at_rest.map(|derivative| derivative.name.clone()).collect()
 }
 
-/// True for a signal that shows no more than noise in the maneuver.
+/// `true` for a signal that shows no more than noise in the maneuver.
 fn is_at_rest(task: &Task, name: &str) -> bool {
     let samples = task.record.values(name).and_then(|v| v.get(task.range()));
     samples.is_some_and(is_noise)

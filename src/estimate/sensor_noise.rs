@@ -15,8 +15,8 @@ use crate::output_error::{Fit, Measurements, Outcome};
 /// Raftery 1995).
 const VERY_STRONG: f64 = 5.0;
 
-/// True if coloured noise of the sensors explains the residuals of output error better than moving
-/// air does. It is never so if the innovations of the filter are white.
+/// `true` if coloured noise of the sensors explains the residuals of output error better than
+/// moving air does. It is never so if the innovations of the filter are white.
 pub(super) fn explains(
     measurements: &Measurements,
     output_error: &Fit,

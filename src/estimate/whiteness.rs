@@ -19,12 +19,12 @@ pub(super) fn sample_noise(measurements: &Measurements, output: usize) -> f64 {
     differences::noise_of_second(median(sizes).unwrap_or(0.0))
 }
 
-/// True for a fit by output error whose residuals show no motion of the air.
+/// `true` for a fit by output error whose residuals show no motion of the air.
 pub(super) fn is_white(measurements: &Measurements, fit: &Fit) -> bool {
     fit.outcome == Outcome::Converged && are_white(measurements, &fit.response.outputs)
 }
 
-/// True if the residuals of every output are as white noise.
+/// `true` if the residuals of every output are as white noise.
 pub(super) fn are_white(measurements: &Measurements, computed: &[[f64; OUTPUTS]]) -> bool {
     let correlations = lag_one(measurements, computed);
     correlations.iter().all(|r| *r < COLOURED)

@@ -141,7 +141,7 @@ impl FilterBounds {
         symmetric::raise_variances(corrected, &self.covariance)
     }
 
-    /// Returns true if a change of the parameters is large beside their bounds.
+    /// `true` if a change of the parameters is large beside their bounds.
     #[must_use]
     pub fn are_exceeded_by(&self, change: &DVector<f64>, share: f64) -> bool {
         let variances = self.covariance.diagonal();

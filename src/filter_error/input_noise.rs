@@ -54,7 +54,7 @@ impl<const NX: usize> InputNoise<NX> {
         InputNoise { effects }
     }
 
-    /// True if the inputs are exact.
+    /// `true` if the inputs are exact.
     pub fn is_zero(&self) -> bool {
         self.effects.is_empty()
     }

@@ -203,7 +203,7 @@ impl Noise {
         NoiseParameter::all(gusts).into_iter().map(value).collect()
     }
 
-    /// Returns true if all noise of the process is at its floor.
+    /// `true` if all noise of the process is at its floor.
     #[must_use]
     pub fn is_still(&self) -> bool {
         // Parameters are logarithms, whose rounding the factor covers.
@@ -211,7 +211,7 @@ impl Noise {
         self.angle <= AT * LEAST_ANGLE && self.gusts.iter().all(|g| *g <= AT * LEAST_GUST)
     }
 
-    /// True for moving air whose rotary gusts are consistent with the random walk of the angle.
+    /// `true` for moving air whose rotary gusts are consistent with the random walk of the angle.
     /// Rotary gusts without gusts of the angle are a misfit of the rates instead.
     #[must_use]
     pub fn is_of_air(&self, gusts: usize, step_s: f64) -> bool {

@@ -270,7 +270,7 @@ impl<'a> AboutTrim<'a> {
         }
     }
 
-    /// True if the coefficients depend on the rate of the angle of attack.
+    /// `true` if the coefficients depend on the rate of the angle of attack.
     #[must_use]
     pub fn have_lag(&self) -> bool {
         self.has_lag

@@ -124,7 +124,7 @@ fn replaces(given: &Maneuver, found: &Maneuver, step_s: f64) -> bool {
     shares_most || given.axis == found.axis && has_input
 }
 
-/// True if the analyst's maneuver covers more than half of an excitation that fits no class.
+/// `true` if the analyst's maneuver covers more than half of an excitation that fits no class.
 fn explains(given: &Maneuver, unknown: &Unknown) -> bool {
     let lasting_s = unknown.end_s - unknown.start_s;
     overlap_s(given, unknown.start_s, unknown.end_s) > REPLACING_SHARE * lasting_s

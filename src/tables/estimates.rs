@@ -249,7 +249,7 @@ impl EstimateRow {
             .filter(|_| self.status == Status::Held)
     }
 
-    /// True for a row of maneuvers estimated together.
+    /// `true` for a row of maneuvers estimated together.
     #[must_use]
     pub fn is_joint(&self) -> bool {
         self.flight_id == JOINT_FLIGHT

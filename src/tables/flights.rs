@@ -80,7 +80,7 @@ words! {
 }
 
 impl ChannelVerdict {
-    /// True unless the channel has a fault.
+    /// `true` unless the channel has a fault.
     #[must_use]
     pub fn passed(&self) -> bool {
         !matches!(self, ChannelVerdict::Fault(_))
@@ -124,7 +124,7 @@ words! {
 }
 
 impl CheckVerdict {
-    /// True unless the relation is violated.
+    /// `true` unless the relation is violated.
     #[must_use]
     pub fn passed(self) -> bool {
         matches!(self, CheckVerdict::Ok | CheckVerdict::NotExcited)
@@ -319,14 +319,14 @@ words! {
 }
 
 impl InstrumentVerdict {
-    /// True unless the instrument has a fault, in this flight or in every flight.
+    /// `true` unless the instrument has a fault, in this flight or in every flight.
     #[must_use]
     pub fn passed(&self) -> bool {
         use InstrumentVerdict::{Fault, WrongInEveryFlight};
         !matches!(self, Fault(_) | WrongInEveryFlight)
     }
 
-    /// True where the flight determines no error of the instrument.
+    /// `true` if the flight determines no error of the instrument.
     #[must_use]
     pub fn is_unknown(&self) -> bool {
         matches!(

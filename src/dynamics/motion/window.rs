@@ -118,7 +118,7 @@ impl Window {
         (per_sample * self.samples).saturating_sub(per_sample - 1)
     }
 
-    /// Returns true if a point is a sample.
+    /// `true` if a point is a sample.
     #[must_use]
     pub fn is_sample(&self, point: usize) -> bool {
         point.is_multiple_of(self.points_per_sample)
@@ -157,7 +157,7 @@ impl Window {
         self.samples == 0
     }
 
-    /// Returns true if all signals of the motion are those of another window: only surfaces differ.
+    /// `true` if all signals of the motion are those of another window: only surfaces differ.
     #[must_use]
     pub fn shares_motion_with(&self, other: &Window) -> bool {
         let slopes = RATES.map(slope_name);
@@ -308,7 +308,7 @@ fn slope_name(name: &str) -> String {
     format!("slope of {name}")
 }
 
-/// Returns true if a value is missing. One pass over all values vectorises; a search does not.
+/// `true` if a value is missing. One pass over all values vectorises; a search does not.
 fn has_missing(values: &[f64]) -> bool {
     Arch::new().dispatch(|| {
         values

@@ -111,7 +111,7 @@ impl Aerodynamics {
         value.map_or(0.0, |v| v.value)
     }
 
-    /// True if the loads depend on the rate of the angle of attack.
+    /// `true` if the loads depend on the rate of the angle of attack.
     #[must_use]
     pub fn have_lag(&self) -> bool {
         self.buildup.lags().next().is_some()

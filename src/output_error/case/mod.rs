@@ -39,7 +39,7 @@ pub struct Measurements {
 }
 
 impl Measurements {
-    /// Returns true if a sample of an output counts.
+    /// `true` if a sample of an output counts.
     #[must_use]
     pub fn have(&self, output: usize) -> bool {
         self.used.iter().any(|used| used[output])

@@ -77,8 +77,8 @@ pub fn start_from<const NX: usize, E: Equations<NX>>(
     values
 }
 
-/// Returns true if the measured motion implies a coefficient: a moment, or a force whose accelerometer
-/// is recorded.
+/// `true` if the measured motion implies a coefficient: a moment, or a force whose accelerometer is
+/// recorded.
 fn is_measured<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>, coefficient: usize) -> bool {
     let Some(accelerometer) = E::AXIS.coefficients()[coefficient].accelerometer() else {
         return true;
@@ -113,7 +113,7 @@ fn shift_constant<const NX: usize, E: Equations<NX>>(
     values[constant] += error / count as f64;
 }
 
-/// Returns true if a free derivative is the constant of its coefficient: its regressor is one.
+/// `true` if a free derivative is the constant of its coefficient: its regressor is one.
 fn is_constant<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>, derivative: usize) -> bool {
     let term = case.terms[derivative];
     let column = case.columns[term.column].iter();

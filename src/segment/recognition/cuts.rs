@@ -257,7 +257,7 @@ fn changes_of(signal: &str, steps: &[SequenceStep]) -> Vec<f64> {
         .collect()
 }
 
-/// True for a signal that does not end near its beginning, by those of its changes that stand out
+/// `true` for a signal that does not end near its beginning, by those of its changes that stand out
 /// from feedback.
 fn ends_away(changes: &[f64], outstanding_share: f64) -> bool {
     let largest = changes.iter().map(|c| c.abs()).fold(0.0, f64::max);

@@ -56,7 +56,7 @@ pub(in crate::segment) fn without_overlaps<'a>(
     Recognition { found, unknown }
 }
 
-/// Returns true if the inputs of two candidates overlap.
+/// `true` if the inputs of two candidates overlap.
 fn overlap(a: &FoundManeuver, b: &FoundManeuver) -> bool {
     a.first_s <= b.last_s && a.last_s >= b.first_s
 }

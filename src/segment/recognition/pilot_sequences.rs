@@ -95,8 +95,8 @@ impl ControlState {
         from_trim.abs() < self.smallest_deflection.max(TRIM_SHARE * self.largest_step)
     }
 
-    /// True if the control's steps cancel, or if its level is back at trim, since trim drifts in a
-    /// turn. A whole reversal leads to the other side at any level.
+    /// `true` if the control's steps cancel, or if its level is back at trim, since trim drifts in
+    /// a turn. A whole reversal leads to the other side at any level.
     fn rests(&self) -> bool {
         let reversed = self.last_step > (1.0 - TRIM_SHARE) * self.largest_step;
         self.is_near_trim(self.moved) || (self.is_near_trim(self.level - self.trim) && !reversed)
@@ -135,7 +135,7 @@ impl<'a> GrowingSequence<'a> {
         };
     }
 
-    /// True if a control that is held away from trim returns to it with this step.
+    /// `true` if a control that is held away from trim returns to it with this step.
     fn returns_to_trim(&self, signal: &str, step: &Step) -> bool {
         self.controls.get(signal).is_some_and(|c| c.is_return(step))
     }

@@ -138,7 +138,7 @@ fn largest(levels: &[f64], window: Window) -> f64 {
 /// decay.
 const MANEUVER_ALONE_S: f64 = 45.0;
 
-/// True for a recording that may hold one maneuver and little else.
+/// `true` for a recording that may hold one maneuver and little else.
 pub(in crate::segment) fn is_maneuver_alone(record: &Record) -> bool {
     record.samples as f64 * record.step_s <= MANEUVER_ALONE_S
 }
