@@ -73,7 +73,7 @@ fn load() -> anyhow::Result<BenchFlight> {
 fn case(bench: &BenchFlight, free: bool) -> Result<Case<3, Longitudinal>, String> {
     let derivatives: Vec<_> = bench
         .config
-        .buildup
+        .aero_model
         .derivatives_of(Axis::Longitudinal)
         .collect();
     let tunnel = |name: &str| {
@@ -96,7 +96,7 @@ fn case(bench: &BenchFlight, free: bool) -> Result<Case<3, Longitudinal>, String
     let samples = range.len();
     let surfaces = bench
         .config
-        .buildup
+        .aero_model
         .derivatives
         .iter()
         .filter_map(|d| d.regressor.surface());
@@ -122,7 +122,7 @@ fn case(bench: &BenchFlight, free: bool) -> Result<Case<3, Longitudinal>, String
 fn responses(c: &mut Criterion, bench: &BenchFlight) -> Result<(), String> {
     let values: BTreeMap<String, f64> = bench
         .config
-        .buildup
+        .aero_model
         .derivatives
         .iter()
         .filter_map(|d| {
@@ -183,7 +183,7 @@ fn stages(c: &mut Criterion) -> anyhow::Result<()> {
     });
     let context = Context::new(
         &config.aircraft,
-        &config.buildup,
+        &config.aero_model,
         &config.tunnel,
         &config.estimate,
     );

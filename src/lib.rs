@@ -15,7 +15,7 @@
 //!    [`maneuver::Class`]. The equations of motion give the delays of the surfaces, from all
 //!    maneuvers together.
 //! 5. **Case.** A [`dynamics::motion::Window`] is the maneuver's part of the record. An
-//!    [`output_error::Case`] adds the [`aero::Buildup`]: regressors, free and held derivatives,
+//!    [`output_error::Case`] adds the [`aero::AeroModel`]: regressors, free and held derivatives,
 //!    measured outputs.
 //! 6. **Estimate.** [`output_error::newton_raphson`] minimises the cost of the case to a
 //!    [`output_error::Fit`], and [`output_error::cramer_rao`] bounds it. In moving air

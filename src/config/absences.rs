@@ -169,7 +169,7 @@ impl<'a> Recorder<'a> {
         let config = self.config;
         let has = |signal: &str| self.has_signal(signal);
         let of_recognition = absent_signals(&config.classes, &config.segment, has);
-        let derivatives = config.buildup.derivatives.iter();
+        let derivatives = config.aero_model.derivatives.iter();
         let of_model = derivatives.flat_map(|d| d.regressor.signals());
         let of_instruments = config.estimate.calibration.keys().map(String::as_str);
         let used = of_recognition.iter().map(|absent| absent.signal.as_str());
@@ -232,7 +232,7 @@ impl<'a> Recorder<'a> {
 
     /// Derivatives of a class's axis whose regressors contain a surface.
     fn derivatives_of(&self, surface: &str, class: &Class) -> impl Iterator<Item = &Derivative> {
-        let derivatives = self.config.buildup.derivatives_of(class.axis);
+        let derivatives = self.config.aero_model.derivatives_of(class.axis);
         derivatives.filter(move |d| d.regressor.signals().any(|s| s == surface))
     }
 
@@ -249,7 +249,7 @@ impl<'a> Recorder<'a> {
             let own = absent.iter().find(|absent| absent.signal == name);
             own.is_some_and(|absent| !absent.unrecognised.is_empty())
         };
-        let derivatives = config.buildup.derivatives_of(class.axis);
+        let derivatives = config.aero_model.derivatives_of(class.axis);
         let of_model = derivatives.flat_map(|d| d.regressor.signals());
         let of_model = of_model.filter(|name| !signal::is_own(name) && !has(name));
         let mut lost: BTreeSet<&str> = of_model.filter(|name| self.needs(class, name)).collect();

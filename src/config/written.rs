@@ -8,7 +8,7 @@ use serde::Deserialize;
 use super::cluster::ClusterSettings;
 use super::instruments::InstrumentErrors;
 use crate::aero::{
-    Axis, Bias, Buildup, Coefficient, Combined, Derivative, Output, Regressor, wind_tunnel,
+    AeroModel, Axis, Bias, Coefficient, Combined, Derivative, Output, Regressor, wind_tunnel,
 };
 use crate::aircraft::Aircraft;
 use crate::maneuver::class::Recognition;
@@ -186,7 +186,7 @@ impl DerivativeLine {
 impl ModelFile {
     /// Build-up of the file. The error has the name of a derivative, and the fault of its
     /// regressor.
-    pub fn buildup(self) -> Result<Buildup, (String, String)> {
+    pub fn aero_model(self) -> Result<AeroModel, (String, String)> {
         let file = self;
         let combined = |line: CombinedLine| Combined {
             name: line.name,
@@ -194,7 +194,7 @@ impl ModelFile {
             slope: line.slope,
         };
         let derivatives = file.derivatives.into_iter();
-        Ok(Buildup {
+        Ok(AeroModel {
             derivatives: derivatives
                 .map(DerivativeLine::derivative)
                 .collect::<Result<_, _>>()?,

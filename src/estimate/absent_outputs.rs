@@ -30,9 +30,9 @@ pub(super) fn class_of_recorded_outputs(task: &Task) -> (Class, BTreeMap<String,
 /// output alone, each with the reason.
 fn unseen(task: &Task) -> BTreeMap<String, String> {
     let axis = task.class.axis;
-    let derivatives = task.context.buildup.derivatives_of(axis);
+    let derivatives = task.context.aero_model.derivatives_of(axis);
     let of_derivatives = derivatives.map(|d| (&d.name, output_that_hides(task, d)));
-    let biases = task.context.buildup.biases_of(axis);
+    let biases = task.context.aero_model.biases_of(axis);
     let biases = biases.filter(|b| task.status(&b.name) == Some(Status::Estimated));
     let of_biases = biases.map(|b| (&b.name, Some(b.output).filter(|o| task.is_absent(*o))));
     of_derivatives
@@ -60,7 +60,7 @@ fn output_that_hides(task: &Task, derivative: &Derivative) -> Option<Output> {
 }
 
 fn is_axial_force(task: &Task, name: &str) -> bool {
-    let derivative = task.context.buildup.derivative(name);
+    let derivative = task.context.aero_model.derivative(name);
     derivative
         .is_some_and(|d| d.coefficient == Coefficient::CA && task.absent_of_regressor(d).is_none())
 }

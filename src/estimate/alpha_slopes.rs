@@ -191,7 +191,7 @@ fn changes<const NX: usize, E: Equations<NX>>(
         CoefficientChange::none(&format!("{coefficient:?}"), coefficient, alphas)
     });
     for (j, name) in wide.names.iter().take(wide.derivatives()).enumerate() {
-        let derivative = task.context.buildup.derivative(name);
+        let derivative = task.context.aero_model.derivative(name);
         let Some(derivative) = derivative.filter(|d| d.regressor != Regressor::Constant) else {
             continue;
         };

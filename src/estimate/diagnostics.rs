@@ -78,7 +78,7 @@ impl<'m, const NX: usize, E: Equations<NX>> Diagnostics<'_, 'm, NX, E> {
             .collect();
         // In the order of the model, held or not, so that a pair has one name in all maneuvers.
         acting.sort_by_key(|d| {
-            let mut derivatives = self.task.context.buildup.derivatives.iter();
+            let mut derivatives = self.task.context.aero_model.derivatives.iter();
             derivatives.position(|other| other.name == d.name)
         });
         let all = Model {

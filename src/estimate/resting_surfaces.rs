@@ -33,7 +33,7 @@ pub(super) fn class_of_moving_surfaces(task: &Task) -> (Class, BTreeSet<String>)
 
 /// Derivatives to be estimated whose surfaces rest.
 fn derivatives_at_rest(task: &Task) -> BTreeSet<String> {
-    let derivatives = task.context.buildup.derivatives_of(task.class.axis);
+    let derivatives = task.context.aero_model.derivatives_of(task.class.axis);
     let at_rest = derivatives.filter(|derivative| {
         let mut signals = derivative.regressor.signals();
         task.status(&derivative.name) == Some(Status::Estimated)

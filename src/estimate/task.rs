@@ -34,7 +34,7 @@ impl<'a> Task<'a> {
     /// True for the constant of a coefficient.
     pub(super) fn is_constant(&self, name: &str) -> bool {
         self.context
-            .buildup
+            .aero_model
             .derivative(name)
             .is_some_and(|d| d.regressor == Regressor::Constant)
     }
@@ -74,7 +74,7 @@ impl<'a> Task<'a> {
             initial_state: basis.settings.initial_state,
             ..Model::default()
         };
-        for derivative in basis.buildup.derivatives_of(self.class.axis) {
+        for derivative in basis.aero_model.derivatives_of(self.class.axis) {
             match self.status(&derivative.name) {
                 Some(Status::Estimated) => model.free.push(derivative),
                 Some(Status::Held) => model.held.push((derivative, self.held_value(derivative)?)),
@@ -92,7 +92,7 @@ impl<'a> Task<'a> {
         }
         let free = |bias: &&Bias| self.status(&bias.name) == Some(Status::Estimated);
         model.biases = basis
-            .buildup
+            .aero_model
             .biases_of(self.class.axis)
             .filter(free)
             .collect();
@@ -132,7 +132,7 @@ impl<'a> Task<'a> {
         let mut model = self.class_model()?;
         model.free = self
             .context
-            .buildup
+            .aero_model
             .derivatives_of(self.class.axis)
             .filter(|d| active(d))
             .collect();

@@ -159,13 +159,13 @@ fn inputs(contents: &ExportContents, tables: &[ExportTable], xml: &mut Xml) {
             Mark::Input,
         );
     }
-    let has_lag = contents.buildup.lags().next().is_some();
+    let has_lag = contents.aero_model.lags().next().is_some();
     let is_used = |rate: &Regressor| *rate != Regressor::AlphaRate || has_lag;
     for (_, id, words) in RATES.iter().filter(|(rate, ..)| is_used(rate)) {
         variable(xml, id, id, "rad", words, Mark::Input);
     }
     let mut surfaces: Vec<&str> = contents
-        .buildup
+        .aero_model
         .derivatives
         .iter()
         .flat_map(|d| d.regressor.signals())

@@ -71,7 +71,7 @@ pub fn plan_next_flight(
     let qualities = specification.map(|specification| qualities::JudgedAircraft {
         model: &campaign.model,
         aircraft: &config.aircraft,
-        buildup: &config.buildup,
+        aero_model: &config.aero_model,
         tunnel: &config.tunnel,
         specification,
     });
@@ -96,7 +96,7 @@ pub fn plan_next_flight(
             covariances: &campaign.covariances,
             contributions: &campaign.model.rows.contributions,
         },
-        buildup: &config.buildup,
+        aero_model: &config.aero_model,
         tunnel: &config.tunnel,
         settings: &config.model,
         qualities,

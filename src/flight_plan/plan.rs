@@ -8,7 +8,7 @@ use super::experience::{CampaignHistory, noise_factors, with_noise};
 use super::goal_points::{GoalBasis, GoalPoint, Matches, Target};
 use super::goals::Goal;
 use super::rehearsal::Rehearsed;
-use crate::aero::{Buildup, Condition, WindTunnel};
+use crate::aero::{AeroModel, Condition, WindTunnel};
 use crate::estimate::Covariance;
 use crate::model::{self, Evidence, Model, Outlook, OutlookPoint};
 use crate::qualities::{self, FlownConditions};
@@ -23,7 +23,7 @@ pub struct CampaignState<'a> {
     pub model: &'a Model,
     pub evidence: &'a [Evidence<'a>],
     pub history: CampaignHistory<'a>,
-    pub buildup: &'a Buildup,
+    pub aero_model: &'a AeroModel,
     pub tunnel: &'a WindTunnel,
     pub settings: &'a model::Settings,
     /// Flying qualities whose levels may be goals, with the flown conditions.
@@ -162,7 +162,7 @@ fn outlooks(state: &CampaignState, kept: &[KeptCard], points: &[GoalPoint]) -> V
     state.model.outlook(
         (state.evidence, &planned),
         &asked,
-        (state.buildup, state.tunnel),
+        (state.aero_model, state.tunnel),
         state.settings,
     )
 }

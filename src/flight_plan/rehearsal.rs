@@ -114,7 +114,7 @@ pub fn derivatives(
     mut posterior: WindTunnel,
     estimates: &[EstimateRow],
 ) -> WindTunnel {
-    for derivative in &config.buildup.derivatives {
+    for derivative in &config.aero_model.derivatives {
         let name = derivative.name.as_str();
         if posterior.has(name) {
             continue;

@@ -22,7 +22,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, RowDVector};
 
 use super::campaign_model::Model;
 use super::evidence::Evidence;
-use crate::aero::{Axis, Buildup, Coefficient, Derivative, DerivativeUnit, Regressor};
+use crate::aero::{AeroModel, Axis, Coefficient, Derivative, DerivativeUnit, Regressor};
 use crate::aircraft::Aircraft;
 use crate::maneuver::{Maneuver, Means, Status};
 use crate::tables::{EstimateRow, LiftAndDragRow};
@@ -39,7 +39,7 @@ pub struct PublishedManeuver<'a> {
     pub estimates: &'a [EstimateRow],
     pub means: &'a Means,
     pub aircraft: &'a Aircraft,
-    pub buildup: &'a Buildup,
+    pub aero_model: &'a AeroModel,
 }
 
 /// Weights of all normal and axial derivatives in lift and drag.
@@ -101,7 +101,7 @@ impl Model {
 
 impl PublishedManeuver<'_> {
     fn derivatives(&self) -> Vec<&Derivative> {
-        let longitudinal = self.buildup.derivatives_of(Axis::Longitudinal);
+        let longitudinal = self.aero_model.derivatives_of(Axis::Longitudinal);
         longitudinal
             .filter(|d| !d.coefficient.is_moment())
             .collect()

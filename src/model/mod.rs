@@ -39,7 +39,7 @@ mod tests;
 
 use rayon::prelude::*;
 
-use crate::aero::{Axis, Buildup, Coefficient, WindTunnel};
+use crate::aero::{AeroModel, Axis, Coefficient, WindTunnel};
 use coefficient::CoefficientPosterior;
 use evidence::in_order;
 use term::TermSources;
@@ -57,14 +57,14 @@ pub use settings::Settings;
 #[must_use]
 pub fn model(
     evidence: &[Evidence],
-    buildup: &Buildup,
+    aero_model: &AeroModel,
     tunnel: &WindTunnel,
     settings: &Settings,
 ) -> Model {
     let evidence = in_order(evidence);
     let tunnel = tunnel.clamped();
     let basis = TermSources {
-        buildup,
+        aero_model,
         tunnel: &tunnel,
         settings,
     };

@@ -24,7 +24,7 @@ use super::posterior::{gaussian, information};
 use super::settings::Settings;
 use super::term::{PosteriorTerm, TermSources, between_points};
 use super::unknowns::{SparseRow, Unknowns, covariance_between, is_of_campaign};
-use crate::aero::{Buildup, Condition, WindTunnel};
+use crate::aero::{AeroModel, Condition, WindTunnel};
 use crate::numerics::root::EXACT;
 use crate::output_error::error_effect::SharedError;
 
@@ -67,20 +67,20 @@ pub struct Outlook {
 
 impl Model {
     /// Outlook of each coefficient on planned maneuvers of one flight and on points. `evidence`,
-    /// `buildup`, `tunnel` and `settings` must be the ones from which the posterior was made. A
+    /// `aero_model`, `tunnel` and `settings` must be the ones from which the posterior was made. A
     /// coefficient whose covariance is not finite is left out.
     #[must_use]
     pub fn outlook(
         &self,
         (evidence, planned): (&[Evidence], &[Evidence]),
         points: &[OutlookPoint],
-        (buildup, tunnel): (&Buildup, &WindTunnel),
+        (aero_model, tunnel): (&AeroModel, &WindTunnel),
         settings: &Settings,
     ) -> Vec<Outlook> {
         let evidence = in_order(evidence);
         let tunnel = tunnel.clamped();
         let basis = TermSources {
-            buildup,
+            aero_model,
             tunnel: &tunnel,
             settings,
         };

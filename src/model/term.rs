@@ -11,7 +11,7 @@ use super::grid::{Grid, refined};
 use super::prior::{DerivativePrior, TableOnGrid};
 use super::scale_prior::Scale;
 use super::settings::Settings;
-use crate::aero::{Buildup, Coefficient, Condition, Derivative, Regressor, WindTunnel};
+use crate::aero::{AeroModel, Coefficient, Condition, Derivative, Regressor, WindTunnel};
 use crate::maneuver::Status;
 use crate::numerics::order_statistics::median;
 use crate::tables::PriorSource;
@@ -47,7 +47,7 @@ pub fn between_points(
 /// Data from which the terms follow.
 #[derive(Clone, Copy, Debug)]
 pub struct TermSources<'a> {
-    pub buildup: &'a Buildup,
+    pub aero_model: &'a AeroModel,
     /// Tunnel, constant beyond its ends.
     pub tunnel: &'a WindTunnel,
     pub settings: &'a Settings,
@@ -58,7 +58,7 @@ impl TermSources<'_> {
     #[must_use]
     pub fn terms(&self, coefficient: Coefficient, evidence: &[Evidence]) -> Vec<PosteriorTerm> {
         let of_coefficient = |d: &&Derivative| d.coefficient == coefficient;
-        let derivatives = self.buildup.derivatives.iter().filter(of_coefficient);
+        let derivatives = self.aero_model.derivatives.iter().filter(of_coefficient);
         let alphas = self.alphas_deg(coefficient, evidence);
         derivatives
             .filter_map(|derivative| self.term(derivative, &alphas, evidence))
@@ -69,12 +69,12 @@ impl TermSources<'_> {
     /// grids.
     #[must_use]
     pub fn count_points(&self, coefficient: Coefficient, evidence: &[Evidence]) -> usize {
-        let derivatives = self.buildup.derivatives.iter();
+        let derivatives = self.aero_model.derivatives.iter();
         let alphas = self.alphas_deg(coefficient, evidence).len();
         derivatives
             .filter(|derivative| derivative.coefficient == coefficient)
             .map(|derivative| {
-                let sums = self.buildup.combined.iter();
+                let sums = self.aero_model.combined.iter();
                 let own = sums.filter(|sum| sum.constant == derivative.name);
                 let names = own.map(|sum| &sum.name).chain([&derivative.name]);
                 let tables = names.map(|name| {
@@ -89,15 +89,22 @@ impl TermSources<'_> {
     /// Angles of attack of a coefficient's grids: the breakpoints of its tables, the flown range, and
     /// points between.
     fn alphas_deg(&self, coefficient: Coefficient, evidence: &[Evidence]) -> Vec<f64> {
-        let names = self.buildup.derivatives.iter();
+        let names = self.aero_model.derivatives.iter();
         let names = names
             .filter(|d| d.coefficient == coefficient)
             .map(|d| &d.name)
-            .chain(self.buildup.combined.iter().map(|c| &c.name).filter(|sum| {
-                let constant = self.buildup.combined.iter().find(|c| c.name == **sum);
-                let constant = constant.and_then(|c| self.buildup.derivative(&c.constant));
-                constant.is_some_and(|d| d.coefficient == coefficient)
-            }));
+            .chain(
+                self.aero_model
+                    .combined
+                    .iter()
+                    .map(|c| &c.name)
+                    .filter(|sum| {
+                        let constant = self.aero_model.combined.iter().find(|c| c.name == **sum);
+                        let constant =
+                            constant.and_then(|c| self.aero_model.derivative(&c.constant));
+                        constant.is_some_and(|d| d.coefficient == coefficient)
+                    }),
+            );
         let tabulated: Vec<f64> = names
             .flat_map(|name| self.tunnel.alphas_deg(name))
             .collect();
@@ -122,7 +129,7 @@ impl TermSources<'_> {
         evidence: &[Evidence],
     ) -> Option<PosteriorTerm> {
         let is_constant = derivative.regressor == Regressor::Constant;
-        let sum = self.buildup.combined.iter();
+        let sum = self.aero_model.combined.iter();
         let mut sum = sum.clone().find(|c| c.constant == derivative.name);
         let is_tabulated = |name: &str| self.tunnel.root_mean_square(name) > 0.0;
         if is_tabulated(&derivative.name) && sum.is_some_and(|s| !is_tabulated(&s.name)) {
@@ -147,7 +154,7 @@ impl TermSources<'_> {
         Some(PosteriorTerm {
             derivative: derivative.name.clone(),
             slope: sum.map(|s| s.slope.clone()),
-            unit: self.buildup.unit_of(name)?.name(),
+            unit: self.aero_model.unit_of(name)?.name(),
             prior,
             breakpoints_deg,
         })

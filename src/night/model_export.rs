@@ -55,7 +55,7 @@ pub fn export(
     let contents = ExportContents {
         title: &config.title,
         aircraft: &config.aircraft,
-        buildup: &config.buildup,
+        aero_model: &config.aero_model,
         tunnel: &config.tunnel,
         posterior: &campaign.model.rows.posterior,
         correlations: &correlations,
@@ -123,7 +123,11 @@ fn write(
     atomic::place(&section, jsbsim::section(contents, &tables).as_bytes())?;
     let tables_of_rows =
         ["flight_updated.csv", "flight_updated.parquet"].map(|name| folder.join(name));
-    let names = contents.buildup.derivatives.iter().map(|d| d.name.clone());
+    let names = contents
+        .aero_model
+        .derivatives
+        .iter()
+        .map(|d| d.name.clone());
     Ok(Exported {
         files: tables_of_rows.into_iter().chain([dml, section]).collect(),
         from_flight: rows.iter().filter(|r| r.is_flight == 1).count(),

@@ -11,7 +11,7 @@ use super::ingested::Flight;
 use super::model_stage::by_maneuver;
 use super::step::{ComputedArtefact, Step};
 use super::step_runner::StepRunner;
-use crate::aero::{Buildup, WindTunnel};
+use crate::aero::{AeroModel, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::config::Config;
 use crate::error::Result;
@@ -32,7 +32,7 @@ pub struct MatchKey<'a> {
     ingest: &'a str,
     maneuver: &'a Maneuver,
     aircraft: &'a Aircraft,
-    model: &'a Buildup,
+    model: &'a AeroModel,
     specification: &'a Specification,
     /// Fingerprint of all models' derivatives, and of the posterior with its covariance.
     derivatives: &'a str,
@@ -70,7 +70,7 @@ impl<'a> Step for MatchStep<'a> {
             ingest: &self.record.flight.fingerprint,
             maneuver: self.maneuver,
             aircraft: self.basis.aircraft,
-            model: self.basis.buildup,
+            model: self.basis.aero_model,
             specification: self.basis.specification,
             derivatives: self.derivatives,
             own: self.own.clone(),
@@ -218,7 +218,7 @@ impl Databases {
     ) -> ProofInputs<'a> {
         ProofInputs {
             aircraft: &config.aircraft,
-            buildup: &config.buildup,
+            aero_model: &config.aero_model,
             models: &self.models,
             posterior: &self.posterior,
             tunnel: &self.tunnel,

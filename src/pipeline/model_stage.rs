@@ -19,9 +19,9 @@ pub const MODEL_VERSION: u32 = 5;
 /// Computes the posterior from the maneuvers that converged.
 pub fn fit_model(config: &Config, campaign: &mut Campaign) {
     let evidence = evidence(campaign);
-    let found = model::model(&evidence, &config.buildup, &config.tunnel, &config.model);
+    let found = model::model(&evidence, &config.aero_model, &config.tunnel, &config.model);
     let problems: Vec<_> = found.failed.iter().map(failed).collect();
-    let sums = &config.buildup.combined;
+    let sums = &config.aero_model.combined;
     let read_held = |rows: &[EstimateRow]| match config.estimate.held_values {
         HeldValues::Posterior => with_held(rows, &found, &evidence, sums),
         HeldValues::Tunnel => rows.to_vec(),
@@ -75,7 +75,7 @@ fn lift_and_drag(
             estimates: estimates.get(id)?,
             means: means.get(id)?,
             aircraft: &config.aircraft,
-            buildup: &config.buildup,
+            aero_model: &config.aero_model,
         };
         Some(model.lift_and_drag(&flown, by_posterior))
     };

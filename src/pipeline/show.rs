@@ -205,7 +205,7 @@ fn maneuvers_of(campaign: &Campaign, id: &str) -> Vec<Maneuver> {
 /// Sorts the configured signals into groups: surfaces have derivatives, pilot controls have counted
 /// steps, flags are up or down in a class.
 fn groups(config: &Config) -> SignalGroups {
-    let derivatives = config.buildup.derivatives.iter();
+    let derivatives = config.aero_model.derivatives.iter();
     let signals = derivatives.flat_map(|d| d.regressor.signals());
     let surfaces = unique(signals.map(str::to_owned));
     let stepping = config

@@ -9,7 +9,7 @@ use super::estimate_step::LazyRecord;
 use super::ingested::Flight;
 use super::step::{ComputedArtefact, Step};
 use super::step_runner::StepRunner;
-use crate::aero::{Buildup, WindTunnel};
+use crate::aero::{AeroModel, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::config::Config;
 use crate::error::Result;
@@ -28,7 +28,7 @@ pub struct SurfacesKey<'a> {
     ingest: &'a str,
     maneuvers: &'a [&'a Maneuver],
     aircraft: &'a Aircraft,
-    model: &'a Buildup,
+    model: &'a AeroModel,
     tunnel: &'a WindTunnel,
 }
 
@@ -56,7 +56,7 @@ impl<'a> Step for SurfacesStep<'a> {
             ingest: &self.flight.fingerprint,
             maneuvers: self.maneuvers,
             aircraft: &self.config.aircraft,
-            model: &self.config.buildup,
+            model: &self.config.aero_model,
             tunnel: &self.config.tunnel,
         }
     }
@@ -67,7 +67,7 @@ impl<'a> Step for SurfacesStep<'a> {
         let parts: Result<Vec<(Record, &Maneuver)>> = self.maneuvers.iter().map(part).collect();
         let basis = AircraftModel {
             aircraft: &self.config.aircraft,
-            buildup: &self.config.buildup,
+            aero_model: &self.config.aero_model,
             tunnel: &self.config.tunnel,
         };
         let evidence = surfaces::flight_evidence(self.flight.id(), &parts?, basis);

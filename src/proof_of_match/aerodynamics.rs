@@ -10,7 +10,7 @@
 use nalgebra::Vector3;
 
 use super::derivative_table::DerivativeTable;
-use crate::aero::{Axis, Buildup, Coefficient, Derivative, Regressor};
+use crate::aero::{AeroModel, Axis, Coefficient, Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::flight::signal;
 use crate::rigid_body::AirData;
@@ -28,8 +28,8 @@ pub const MOMENT: [usize; 3] = [4, 1, 5];
 /// Recorded signals of a build-up, each once: surfaces and vanes. The flow itself comes from the
 /// simulation.
 #[must_use]
-pub fn recorded_signals(buildup: &Buildup) -> Vec<&str> {
-    let all = buildup
+pub fn recorded_signals(aero_model: &AeroModel) -> Vec<&str> {
+    let all = aero_model
         .derivatives
         .iter()
         .flat_map(|d| d.regressor.signals());
@@ -136,11 +136,11 @@ impl<'a> Aerodynamics<'a> {
     #[must_use]
     pub fn new(
         aircraft: &'a Aircraft,
-        buildup: &Buildup,
+        aero_model: &AeroModel,
         table: DerivativeTable,
     ) -> Aerodynamics<'a> {
-        let derivatives = buildup.derivatives.iter();
-        let recorded = recorded_signals(buildup);
+        let derivatives = aero_model.derivatives.iter();
+        let recorded = recorded_signals(aero_model);
         let term = |d: &Derivative| {
             let factors = Factors {
                 aircraft,
@@ -152,7 +152,7 @@ impl<'a> Aerodynamics<'a> {
         Aerodynamics {
             aircraft,
             terms: derivatives.map(term).collect(),
-            has_lag: buildup.lags().next().is_some(),
+            has_lag: aero_model.lags().next().is_some(),
             table,
         }
     }

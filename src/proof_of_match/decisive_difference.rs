@@ -23,7 +23,7 @@ use super::mean_run::{MeanRun, acting_derivatives};
 use super::outputs::output_index;
 use super::recording::ManeuverRecording;
 use super::specification::Tolerance;
-use crate::aero::{Buildup, Condition};
+use crate::aero::{AeroModel, Condition};
 use crate::model::{LocalPosterior, LocalValue};
 use crate::tables::MatchedQuantity;
 
@@ -57,10 +57,10 @@ impl PredictedDutchRoll<'_> {
     fn difference(
         &self,
         posterior: &LocalPosterior,
-        buildup: &Buildup,
+        aero_model: &AeroModel,
         tolerance: &Tolerance,
     ) -> Option<LinearDifference> {
-        let moving = acting_derivatives(posterior, buildup);
+        let moving = acting_derivatives(posterior, aero_model);
         let deviation = |(value, derivative): &(usize, usize)| {
             (*derivative, posterior.covariance[(*value, *value)].sqrt())
         };
@@ -89,7 +89,7 @@ impl MeanRun {
         &self,
         flown: (&ManeuverRecording, &FreeRun),
         dutch_roll: Option<PredictedDutchRoll>,
-        (posterior, buildup): (&LocalPosterior, &Buildup),
+        (posterior, aero_model): (&LocalPosterior, &AeroModel),
         judged: &[Judged],
     ) -> Option<LinearDifference> {
         if flown.1.has_departed || self.run.has_departed {
@@ -97,7 +97,7 @@ impl MeanRun {
         }
         let worst = |own: &Judged| {
             if own.tolerance.quantity.is_of_dutch_roll() {
-                let difference = dutch_roll?.difference(posterior, buildup, &own.tolerance)?;
+                let difference = dutch_roll?.difference(posterior, aero_model, &own.tolerance)?;
                 return Some((difference.distance(&posterior.covariance), difference));
             }
             self.worst(flown, posterior, own)

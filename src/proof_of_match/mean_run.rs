@@ -8,7 +8,7 @@ use super::linear_run::{Histories, LinearRun, Parameter};
 use super::outputs::{COUNT, Outputs};
 use super::recording::ManeuverRecording;
 use super::start::MatchedStart;
-use crate::aero::{Axis, Buildup, Regressor};
+use crate::aero::{AeroModel, Axis, Regressor};
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
 use crate::numerics::sample_count::whole_steps;
 
@@ -39,12 +39,12 @@ impl MeanRun {
     pub fn fly(
         (simulation, start): (&Simulation, &MatchedStart),
         posterior: &LocalPosterior,
-        (buildup, axis): (&Buildup, Axis),
+        (aero_model, axis): (&AeroModel, Axis),
     ) -> Option<MeanRun> {
         let covariance = start.covariance.as_ref()?;
         let recording = simulation.recording;
         let stride = stride(recording);
-        let derivatives = acting_derivatives(posterior, buildup);
+        let derivatives = acting_derivatives(posterior, aero_model);
         let own = start_parameters(axis);
         let moved = derivatives.iter().map(|(_, d)| Parameter::Derivative(*d));
         let parameters: Vec<Parameter> = moved.chain(own.map(Parameter::Start)).collect();
@@ -130,12 +130,15 @@ fn stride(recording: &ManeuverRecording) -> usize {
 /// Indices of the derivatives that affect a simulation, among the values of a posterior and in the
 /// build-up.
 #[must_use]
-pub fn acting_derivatives(posterior: &LocalPosterior, buildup: &Buildup) -> Vec<(usize, usize)> {
+pub fn acting_derivatives(
+    posterior: &LocalPosterior,
+    aero_model: &AeroModel,
+) -> Vec<(usize, usize)> {
     let index = |value: &LocalValue| {
         let is_slope = value.kind == LocalKind::Derivative && !value.is_mach_slope;
-        let mut derivatives = buildup.derivatives.iter();
+        let mut derivatives = aero_model.derivatives.iter();
         let index = derivatives.position(|d| is_slope && d.name == value.derivative)?;
-        (buildup.derivatives[index].regressor != Regressor::Constant).then_some(index)
+        (aero_model.derivatives[index].regressor != Regressor::Constant).then_some(index)
     };
     let values = posterior.values.iter().enumerate();
     values.filter_map(|(i, v)| Some((i, index(v)?))).collect()

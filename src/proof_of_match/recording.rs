@@ -2,7 +2,7 @@
 
 use super::aerodynamics::recorded_signals;
 use super::outputs::{COUNT, MATCHED, Outputs};
-use crate::aero::Buildup;
+use crate::aero::AeroModel;
 use crate::aircraft::{Aircraft, Thrust};
 use crate::dynamics::Motion;
 use crate::dynamics::motion::{MassProperties, Window};
@@ -67,7 +67,7 @@ impl ManeuverRecording {
     pub fn new(
         record: &Record,
         maneuver: &Maneuver,
-        (aircraft, buildup): (&Aircraft, &Buildup),
+        (aircraft, aero_model): (&Aircraft, &AeroModel),
         longest_trim_s: f64,
     ) -> Result<ManeuverRecording, String> {
         let first = record.sample_at(maneuver.start_s);
@@ -76,7 +76,7 @@ impl ManeuverRecording {
         if samples < FEWEST_SAMPLES {
             return Err(format!("it has {samples} samples only"));
         }
-        let signals = recorded_signals(buildup);
+        let signals = recorded_signals(aero_model);
         let mass = MassProperties::Recorded;
         let window = Window::cut(
             aircraft,

@@ -22,7 +22,7 @@ use super::outputs::{Outputs, output_index};
 use super::recording::ManeuverRecording;
 use super::specification::Tolerance;
 use super::start::MatchedStart;
-use crate::aero::{Axis, Buildup};
+use crate::aero::{AeroModel, Axis};
 use crate::model::LocalPosterior;
 use crate::numerics::normal;
 use crate::numerics::random::RandomStream;
@@ -83,7 +83,7 @@ pub fn repeats(
     (simulation, start): (&Simulation, &MatchedStart),
     mean: &FreeRun,
     (posterior, modes): (&LocalPosterior, Option<&LateralModes>),
-    model: (&Buildup, Axis),
+    model: (&AeroModel, Axis),
     draws: usize,
 ) -> Option<Repeats> {
     let about = MeanRun::fly((simulation, start), posterior, model)?;

@@ -279,7 +279,7 @@ pub fn linearised(
     let fixed = BTreeMap::new();
     let flight = SteadyFlight {
         aircraft: basis.aircraft,
-        buildup: basis.buildup,
+        aero_model: basis.aero_model,
         trim,
         controls: Controls {
             feedback: match airframe {

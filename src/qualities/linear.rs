@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DVector, SMatrix, SVector};
 
 use super::trim::Trim;
-use crate::aero::{Buildup, Coefficient, Derivative, Regressor};
+use crate::aero::{AeroModel, Coefficient, Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::dynamics::COEFFICIENTS;
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
@@ -175,7 +175,7 @@ pub struct Controls<'a> {
 #[derive(Clone, Copy, Debug)]
 pub struct SteadyFlight<'a> {
     pub aircraft: &'a Aircraft,
-    pub buildup: &'a Buildup,
+    pub aero_model: &'a AeroModel,
     pub trim: &'a Trim,
     pub controls: Controls<'a>,
 }
@@ -188,7 +188,7 @@ impl SteadyFlight<'_> {
         let values = posterior.values.iter();
         values
             .map(|value| {
-                let derivative = self.buildup.derivative(&value.derivative);
+                let derivative = self.aero_model.derivative(&value.derivative);
                 derivative.map_or_else(Effect::default, |derivative| {
                     self.effect(value, derivative, posterior, states)
                 })

@@ -94,7 +94,7 @@ impl SteadyFlight<'_> {
             rigid: without.by_state,
             slopes: vec![],
             control_slopes: vec![],
-            lag: self.buildup.lags().next().map(|_| Lag {
+            lag: self.aero_model.lags().next().map(|_| Lag {
                 alpha: ALPHA,
                 slopes: vec![],
             }),

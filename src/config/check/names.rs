@@ -91,7 +91,7 @@ fn meant<'a>(config: &'a Config, name: &str) -> Option<&'a str> {
 /// class.
 fn places(config: &Config) -> Vec<BTreeSet<&str>> {
     let settings = &config.segment;
-    let derivatives = config.buildup.derivatives.iter();
+    let derivatives = config.aero_model.derivatives.iter();
     let of_classes = config.classes.iter().map(|class| {
         let names = class.recognition.signals();
         names.collect()

@@ -17,7 +17,7 @@ use super::estimated::rejected_fit;
 use super::joint::{self, bins};
 use super::prediction::{self, predicting_maneuvers};
 use super::*;
-use crate::aero::{Axis, Bias, Buildup, Derivative, Output, WindTunnel};
+use crate::aero::{AeroModel, Axis, Bias, Derivative, Output, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::{MassProperties, Window};
 use crate::dynamics::tests::aircraft;
@@ -32,7 +32,7 @@ use crate::tables::{EstimateRow, FitRow, Outcome, Participation, PredictionStatu
 /// The aircraft, model, class and settings of the tests.
 struct Bench {
     aircraft: Aircraft,
-    buildup: Buildup,
+    aero_model: AeroModel,
     tunnel: WindTunnel,
     settings: Settings,
     class: Class,
@@ -60,7 +60,7 @@ fn bench() -> Bench {
     };
     Bench {
         aircraft: aircraft(),
-        buildup: Buildup {
+        aero_model: AeroModel {
             derivatives,
             biases,
             combined: vec![],
@@ -75,12 +75,12 @@ impl Bench {
     fn context(&self) -> Context<'_> {
         let Bench {
             aircraft,
-            buildup,
+            aero_model,
             tunnel,
             settings,
             ..
         } = self;
-        Context::new(aircraft, buildup, tunnel, settings)
+        Context::new(aircraft, aero_model, tunnel, settings)
     }
 
     /// Case of a record in which the true derivatives are free, with their values.

@@ -85,7 +85,7 @@ impl World {
                 ..flown.maneuver
             };
             let mut estimated = estimate_maneuver(&self.config, &record, &maneuver, &[]);
-            estimated.means = means(&record, &maneuver, &self.config.buildup);
+            estimated.means = means(&record, &maneuver, &self.config.aero_model);
             (maneuver, estimated)
         };
         cards.par_iter().enumerate().map(fly).collect()
@@ -93,12 +93,12 @@ impl World {
 
     pub fn model(&self, evidence: &[Evidence]) -> Model {
         let Config {
-            buildup,
+            aero_model,
             tunnel,
             model: settings,
             ..
         } = &self.config;
-        model(evidence, buildup, tunnel, settings)
+        model(evidence, aero_model, tunnel, settings)
     }
 
     /// Plan of the next flight from what was flown.
@@ -114,7 +114,7 @@ impl World {
         let settings = self.shipped.cards.aircraft.clone();
         let derivatives = derivatives(config, posterior, &rows);
         let simulator =
-            Simulator::new(&config.aircraft, &config.buildup, derivatives, settings).unwrap();
+            Simulator::new(&config.aircraft, &config.aero_model, derivatives, settings).unwrap();
         let basis = RehearsalBasis {
             config,
             simulator: &simulator,
@@ -139,7 +139,7 @@ impl World {
                 covariances: &covariances,
                 contributions: &model.rows.contributions,
             },
-            buildup: &config.buildup,
+            aero_model: &config.aero_model,
             tunnel: &config.tunnel,
             settings: &config.model,
             qualities: None,

@@ -115,7 +115,7 @@ impl BoundsStudy {
             progress.advance(&point.card.flight_id);
         }
         let scales = Scales {
-            buildup: &campaign.config.buildup,
+            aero_model: &campaign.config.aero_model,
             truth: &campaign.config.tunnel,
         };
         let rows = condition_rows::condition_rows(&condition.name, &measured, scales);
@@ -141,8 +141,8 @@ impl BoundsStudy {
         for point in points {
             let starts = StudyManeuver::new(campaign, point.class, &point.card, &condition)
                 .and_then(|maneuver| {
-                    let buildup = &campaign.config.buildup;
-                    starts::starts(&maneuver, buildup, count, point.seed(campaign))
+                    let aero_model = &campaign.config.aero_model;
+                    starts::starts(&maneuver, aero_model, count, point.seed(campaign))
                 });
             match starts {
                 Ok(rows) => self.starts.extend(rows),

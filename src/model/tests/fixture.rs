@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::aero::wind_tunnel::TunnelPoint;
-use crate::aero::{Buildup, Coefficient, Combined, Derivative, Regressor, WindTunnel};
+use crate::aero::{AeroModel, Coefficient, Combined, Derivative, Regressor, WindTunnel};
 use crate::estimate::Covariance;
 use crate::maneuver::{Maneuver, Status};
 use crate::model::{Evidence, Model, Settings, model};
@@ -23,14 +23,14 @@ pub struct Flown {
     pub covariance: Covariance,
 }
 
-pub fn buildup() -> Buildup {
+pub fn aero_model() -> AeroModel {
     let regressors = [Regressor::Constant, Regressor::Alpha, Regressor::PitchRate];
     let derivative = |(name, regressor): (&str, Regressor)| Derivative {
         name: name.into(),
         coefficient: Coefficient::CN,
         regressor,
     };
-    Buildup {
+    AeroModel {
         derivatives: NAMES.into_iter().zip(regressors).map(derivative).collect(),
         biases: vec![],
         combined: vec![Combined {
@@ -142,7 +142,7 @@ pub fn exact() -> Settings {
 
 pub fn posterior(flown: &[Flown], tunnel: &WindTunnel, settings: &Settings) -> Model {
     let evidence: Vec<Evidence> = flown.iter().map(Flown::evidence).collect();
-    model(&evidence, &buildup(), tunnel, settings)
+    model(&evidence, &aero_model(), tunnel, settings)
 }
 
 /// Value and standard deviation of a derivative at an angle of attack.

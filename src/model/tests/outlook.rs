@@ -3,7 +3,7 @@
 use approx::assert_relative_eq;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::fixture::{Flown, at, buildup, diagonal, exact, posterior, tunnel};
+use super::fixture::{Flown, aero_model, at, diagonal, exact, posterior, tunnel};
 use crate::aero::{Axis, Condition};
 use crate::model::{Evidence, Model, Outlook, OutlookPoint, PointQuantity, Settings};
 use crate::output_error::error_effect::SharedError;
@@ -55,8 +55,8 @@ fn outlook_on(
 ) -> Outlook {
     let flown: Vec<Evidence> = flown.iter().map(Flown::evidence).collect();
     let planned: Vec<Evidence> = planned.iter().map(Flown::evidence).collect();
-    let (buildup, tunnel) = (buildup(), tunnel(None));
-    let basis = (&buildup, &tunnel);
+    let (aero_model, tunnel) = (aero_model(), tunnel(None));
+    let basis = (&aero_model, &tunnel);
     model
         .outlook((&flown, &planned), points, basis, &settings())
         .remove(0)

@@ -3,7 +3,7 @@
 use approx::assert_relative_eq;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::fixture::{Flown, NAMES, buildup, diagonal, exact, maneuver, posterior, tunnel};
+use super::fixture::{Flown, NAMES, aero_model, diagonal, exact, maneuver, posterior, tunnel};
 use crate::aero::wind_tunnel::{self, Third};
 use crate::aero::{Coefficient, Condition, WindTunnel};
 use crate::maneuver::Maneuver;
@@ -49,9 +49,9 @@ pub fn campaign() -> Vec<Flown> {
 /// Terms and data of a campaign.
 pub fn data(flown: &[Flown], settings: &Settings) -> (Vec<PosteriorTerm>, Data) {
     let evidence: Vec<Evidence> = flown.iter().map(Flown::evidence).collect();
-    let (buildup, tunnel) = (buildup(), tunnel(None));
+    let (aero_model, tunnel) = (aero_model(), tunnel(None));
     let basis = TermSources {
-        buildup: &buildup,
+        aero_model: &aero_model,
         tunnel: &tunnel,
         settings,
     };

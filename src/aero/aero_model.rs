@@ -1,5 +1,5 @@
-//! Build-up of the six coefficients: derivatives, sensor biases estimated with them, and sums that the
-//! wind tunnel tabulates instead of their parts.
+//! Aerodynamic model: build-up of the six coefficients from derivatives, sensor biases estimated with
+//! them, and sums that the wind tunnel tabulates instead of their parts.
 
 use serde::{Deserialize, Serialize};
 
@@ -35,15 +35,15 @@ pub struct Combined {
     pub slope: String,
 }
 
-/// The aerodynamic model of one aircraft.
+/// Aerodynamic model of one aircraft, as in `model.yaml`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Buildup {
+pub struct AeroModel {
     pub derivatives: Vec<Derivative>,
     pub biases: Vec<Bias>,
     pub combined: Vec<Combined>,
 }
 
-impl Buildup {
+impl AeroModel {
     #[must_use]
     pub fn derivative(&self, name: &str) -> Option<&Derivative> {
         self.derivatives.iter().find(|d| d.name == name)
