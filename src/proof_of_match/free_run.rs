@@ -2,7 +2,7 @@
 //! used.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
-use super::aerodynamics::{AboutTrim, Aerodynamics, COEFFICIENTS, Flow, SimulationTrim};
+use super::aerodynamics::{AboutTrim, AeroInputs, Aerodynamics, COEFFICIENTS, SimulationTrim};
 use super::load_changes::LoadSlopes;
 use super::outputs::{Outputs, outputs};
 use super::recording::ManeuverRecording;
@@ -245,7 +245,7 @@ impl RunEquations<'_> {
         } else {
             0.0
         };
-        let flow = Flow::new(&instant.air, state.rates.into(), alpha_rate);
+        let flow = AeroInputs::new(&instant.air, state.rates.into(), alpha_rate);
         let recorded = self.simulation.recording.signals(point);
         let slopes = self.aerodynamics.change_with_slopes(&flow, recorded);
         let loads = LoadSlopes::new(
@@ -270,7 +270,7 @@ impl RunEquations<'_> {
         let inputs = recording.inputs(point);
         let mut air = AirData::new(&state.velocity, state.position.z);
         air.qbar_psf *= self.start.density_ratio;
-        let flow = Flow::new(&air, state.rates.into(), alpha_rate);
+        let flow = AeroInputs::new(&air, state.rates.into(), alpha_rate);
         let change = self.aerodynamics.change(&flow, recording.signals(point));
         let coefficients = self.coefficients(change);
         let model = &self.simulation.aerodynamics;

@@ -8,7 +8,7 @@ use std::array::from_fn;
 
 use pulp::Simd;
 
-use super::aerodynamics::{Aerodynamics, COEFFICIENTS, FORCE, Flow, FlowSlopes, MOMENT};
+use super::aerodynamics::{AeroInputs, Aerodynamics, COEFFICIENTS, FORCE, FlowSlopes, MOMENT};
 use crate::numerics::lanes::{Lanes, combination, each};
 use crate::rigid_body::{AirChange, BodySlopes, Instant, StateChange};
 use crate::units::DEG;
@@ -59,9 +59,9 @@ impl LoadSlopes {
         let area = qbar * aerodynamics.area();
         let (force, moment) = aerodynamics.loads(coefficients, qbar);
         for slopes in &mut by_flow {
-            slopes[Flow::ALPHA] *= DEG;
-            slopes[Flow::BETA] *= DEG;
-            slopes[Flow::QBAR] *= qbar;
+            slopes[AeroInputs::ALPHA] *= DEG;
+            slopes[AeroInputs::BETA] *= DEG;
+            slopes[AeroInputs::QBAR] *= qbar;
         }
         let mut slopes = LoadSlopes {
             coefficients: by_flow,
@@ -78,7 +78,7 @@ impl LoadSlopes {
     /// Slopes of α̇ = (u ẇ − w u̇)/(u² + w²), with u and w the velocities along body x and z. u̇
     /// and ẇ are linear in α̇.
     fn lag(&self, instant: &Instant) -> Lag {
-        let along = |i: usize| self.coefficients[i][Flow::ALPHA_RATE];
+        let along = |i: usize| self.coefficients[i][AeroInputs::ALPHA_RATE];
         let force: [f64; 3] = from_fn(|i| self.force_by_own[i] * along(FORCE[i].0));
         let moment = from_fn(|i| self.moment_by_own[i] * along(MOMENT[i]));
         let [u, _, w]: [f64; 3] = instant.state.velocity.into();

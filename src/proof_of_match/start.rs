@@ -7,7 +7,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::aerodynamics::{AboutTrim, COEFFICIENTS, Flow, SimulationTrim};
+use super::aerodynamics::{AboutTrim, AeroInputs, COEFFICIENTS, SimulationTrim};
 use super::free_run::{FreeRun, STATES, Simulation, Start};
 use super::linear_run::{LinearRun, Parameter};
 use super::outputs::COUNT;
@@ -158,9 +158,9 @@ fn state(motion: &Motion) -> [f64; STATES] {
     ]
 }
 
-/// Flow of a measured motion, with the Mach number of the standard atmosphere.
-fn flow(simulation: &Simulation, motion: &Motion) -> Flow {
-    Flow {
+/// Inputs of a measured motion, with the Mach number of the standard atmosphere.
+fn flow(simulation: &Simulation, motion: &Motion) -> AeroInputs {
+    AeroInputs {
         mach: motion.velocity / air(simulation.recording.altitude_ft).sound_ft_s,
         alpha_deg: DEG * motion.alpha,
         beta_deg: DEG * motion.beta,
