@@ -23,7 +23,7 @@ use super::equations::{COEFFICIENTS, Equations, Outputs, Rates};
 use super::lever::lever;
 use super::motion::Motion;
 use crate::aero::{Axis, Regressor};
-use crate::aircraft::{Aircraft, Flow, Position, Vane, VaneModel};
+use crate::aircraft::{Aircraft, Position, Vane, VaneFlow, VaneModel};
 use crate::numerics::trig::sin_cos;
 use crate::units::{DEG, G0_FT_S2};
 
@@ -295,7 +295,7 @@ impl Equations<4> for Lateral {
                 .vane
                 .beta_small(x[BETA], sensors.vane_by_rates, rates),
             VaneModel::Exact => {
-                let flow = Flow {
+                let flow = VaneFlow {
                     alpha: sensors.alpha,
                     beta: x[BETA],
                     velocity: sensors.velocity,

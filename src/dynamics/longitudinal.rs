@@ -23,7 +23,7 @@ use super::equations::{COEFFICIENTS, Equations, OUTPUTS, Outputs, Rates};
 use super::lever::lever;
 use super::motion::Motion;
 use crate::aero::{Axis, Regressor};
-use crate::aircraft::{Aircraft, Flow, Position, Vane, VaneModel};
+use crate::aircraft::{Aircraft, Position, Vane, VaneFlow, VaneModel};
 use crate::numerics::trig::sin_cos;
 use crate::units::{DEG, G0_FT_S2};
 
@@ -272,7 +272,7 @@ impl Equations<3> for Longitudinal {
                     .alpha_small(x[ALPHA], sensors.vane_by_rates, rates)
             }
             VaneModel::Exact => {
-                let flow = Flow {
+                let flow = VaneFlow {
                     alpha: x[ALPHA],
                     beta: sensors.beta,
                     velocity: sensors.velocity,

@@ -9,7 +9,7 @@ use pulp::Simd;
 
 use super::changes::{AirChange, Down, StateChange};
 use super::readings::Instant;
-use crate::aircraft::{Aircraft, Flow, Position, Reading};
+use crate::aircraft::{Aircraft, Position, Reading, VaneFlow};
 use crate::numerics::lanes::{Lanes, combination, each};
 use crate::units::{DEG, G0_FT_S2};
 
@@ -107,7 +107,7 @@ impl ReadingSlopes {
 impl VaneSlopes {
     /// Slopes of a vane. A vane's angle does not change if speed and rates grow by the same factor.
     /// Its slope along the speed therefore follows from the slopes along the rates.
-    fn new(reading: &Reading, flow: &Flow) -> VaneSlopes {
+    fn new(reading: &Reading, flow: &VaneFlow) -> VaneSlopes {
         let by_rates = reading.by_rates;
         let along: f64 = by_rates
             .iter()

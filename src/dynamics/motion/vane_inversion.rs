@@ -6,7 +6,7 @@
 
 use pulp::{Simd, WithSimd};
 
-use crate::aircraft::{Flow, Position, Sensors};
+use crate::aircraft::{Position, Sensors, VaneFlow};
 use crate::flight::signal;
 use crate::units::RAD;
 
@@ -38,7 +38,7 @@ impl WithSimd for VaneInversion<'_> {
         let mut angles = Vec::with_capacity(self.points);
         let [alpha, beta, velocity, p, q, r, x_ft, y_ft, z_ft] = self.signals;
         for i in 0..self.points {
-            let read = Flow {
+            let read = VaneFlow {
                 alpha: alpha[i] * RAD,
                 beta: beta[i] * RAD,
                 velocity: velocity[i],

@@ -16,7 +16,7 @@
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::parameters::{INPUTS, OUTPUTS, input, output};
-use crate::aircraft::{Aircraft, Flow, Position};
+use crate::aircraft::{Aircraft, Position, VaneFlow};
 use crate::dynamics::lever;
 use crate::earth::{Air, air, air_gradients};
 use crate::numerics::trig::sin_cos;
@@ -284,8 +284,8 @@ fn air_at(altitude_ft: f64, temperature_ratio: f64) -> Air {
 
 /// Flow of a velocity in body axes.
 #[inline(always)]
-fn flow(v: Vector3<f64>, speed: f64, omega: Vector3<f64>) -> Flow {
-    Flow {
+fn flow(v: Vector3<f64>, speed: f64, omega: Vector3<f64>) -> VaneFlow {
+    VaneFlow {
         alpha: v.z.atan2(v.x),
         beta: (v.y / speed).clamp(-1.0, 1.0).asin(),
         velocity: speed,
