@@ -10,7 +10,7 @@ use std::path::Path;
 use criterion::{Criterion, criterion_group, criterion_main};
 use harvest::aero::Axis;
 use harvest::config::{Config, Overrides};
-use harvest::dynamics::motion::{MassProperties, Window};
+use harvest::dynamics::motion::{ManeuverSignals, MassProperties};
 use harvest::dynamics::{Longitudinal, OUTPUTS};
 use harvest::estimate::{self, Context};
 use harvest::flight::Record;
@@ -100,7 +100,7 @@ fn case(bench: &BenchFlight, free: bool) -> Result<Case<3, Longitudinal>, String
         .derivatives
         .iter()
         .filter_map(|d| d.regressor.surface());
-    let window = Window::cut(
+    let window = ManeuverSignals::cut(
         &bench.config.aircraft,
         &bench.record,
         range,

@@ -14,7 +14,7 @@
 //! 4. **Maneuver.** [`segment::maneuvers`] finds each [`maneuver::Maneuver`] in the record and its
 //!    [`maneuver::Class`]. The equations of motion give the delays of the surfaces, from all
 //!    maneuvers together.
-//! 5. **Case.** A [`dynamics::motion::Window`] is the maneuver's part of the record. An
+//! 5. **Case.** A [`dynamics::motion::ManeuverSignals`] is the maneuver's part of the record. An
 //!    [`output_error::Case`] adds the [`aero::AeroModel`]: regressors, free and held derivatives,
 //!    measured outputs.
 //! 6. **Estimate.** [`output_error::newton_raphson`] minimises the cost of the case to a

@@ -21,7 +21,7 @@ use super::task::Task;
 use super::tunnel_change::{AlphaRange, TunnelChange};
 use crate::aero::{Coefficient, Derivative, Regressor};
 use crate::dynamics::Equations;
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::filter_error::bounds::WidePass;
 use crate::filter_error::slopes::SlopePrior;
 use crate::numerics::mean::mean;
@@ -34,8 +34,8 @@ pub(super) struct AlphaSlopes {
     pub slopes: Vec<AlphaSlope>,
     /// Derivatives along α and constants, one pair per coefficient, that take the slopes' lines.
     lines: Vec<[Derivative; 2]>,
-    /// Window of the maneuver, with the signals of the slopes.
-    pub window: Window,
+    /// Signals of the maneuver, with those of the slopes.
+    pub window: ManeuverSignals,
 }
 
 /// Slope of a coefficient or derivative.
@@ -62,7 +62,7 @@ impl AlphaSlopes {
     /// Slopes over α of the derivatives that are free in `wide`, along the motion as measured.
     pub fn new<const NX: usize, E: Equations<NX>>(
         task: &Task,
-        window: &Window,
+        window: &ManeuverSignals,
         wide: &Case<NX, E>,
     ) -> AlphaSlopes {
         let motion = window.motion(task.context.aircraft);

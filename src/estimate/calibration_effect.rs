@@ -5,7 +5,7 @@ use nalgebra::DVector;
 use super::context::Context;
 use super::prepared_case::PreparedCase;
 use crate::aircraft::Aircraft;
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{Equations, OUTPUTS};
 use crate::output_error::calibration_errors::{FittedManeuver, Misreading};
 use crate::output_error::{Diverged, Fit, calibration_errors};
@@ -40,7 +40,10 @@ pub(super) fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
 }
 
 /// Errors of one standard deviation each of the signals of a window.
-pub(super) fn misreadings<'a>(context: &'a Context<'a>, window: &Window) -> Vec<Misreading<'a>> {
+pub(super) fn misreadings<'a>(
+    context: &'a Context<'a>,
+    window: &ManeuverSignals,
+) -> Vec<Misreading<'a>> {
     // A signal that the maneuver does not use has no effect.
     let is_used = |signal: &str| !window.signal(signal).is_empty();
     let calibration = context.settings.calibration.iter();

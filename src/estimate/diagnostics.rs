@@ -6,7 +6,7 @@ use super::estimated::Estimated;
 use super::task::Task;
 use crate::aero::{Derivative, Regressor};
 use crate::dynamics::Equations;
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::flight::signal;
 use crate::maneuver::Status;
 use crate::output_error::identifiability::{Collinearity, collinearity, correlation, excitation};
@@ -26,7 +26,7 @@ struct RegressorHistory<'a> {
 pub(super) struct Diagnostics<'d, 'm, const NX: usize, E: Equations<NX>> {
     pub task: &'d Task<'m>,
     pub case: &'d Case<NX, E>,
-    pub window: &'d Window,
+    pub window: &'d ManeuverSignals,
     pub model: &'d Model<'m>,
 }
 
@@ -226,7 +226,7 @@ fn pairs(count: usize) -> impl Iterator<Item = (usize, usize)> {
 }
 
 /// A signal at the samples, without the interpolated points between them.
-fn samples(window: &Window, name: &str) -> Vec<f64> {
+fn samples(window: &ManeuverSignals, name: &str) -> Vec<f64> {
     window.signal(name).iter().step_by(2).copied().collect()
 }
 

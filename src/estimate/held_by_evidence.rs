@@ -13,7 +13,7 @@ use super::fitting::{StartingPoints, fit_output_error};
 use super::task::Task;
 use crate::aero::{Derivative, Regressor};
 use crate::dynamics::Equations;
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::maneuver::{Class, Status};
 use crate::numerics::digits::rounded;
 use crate::output_error::coloured::ResidualNoise;
@@ -83,7 +83,7 @@ impl Choice {
 /// The choice of a maneuver's held derivatives.
 struct Choosing<'t, 'a, const NX: usize, E: Equations<NX>> {
     task: &'t Task<'a>,
-    window: Window,
+    window: ManeuverSignals,
     /// Model with every candidate free.
     all_free: Model<'a>,
     wide: Case<NX, E>,
@@ -99,7 +99,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
             .iter()
             .chain(all_free.held.iter().map(|(d, _)| d))
             .flat_map(|d| d.regressor.signals());
-        let window = Window::cut(
+        let window = ManeuverSignals::cut(
             task.context.aircraft,
             task.record,
             range.clone(),

@@ -5,7 +5,7 @@ use super::settings::Settings;
 use super::task::Task;
 use super::whiteness::sample_noise;
 use crate::aero::Output;
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
 use crate::filter_error::filter::Filter;
 use crate::output_error::surface_noise::noisy_surfaces;
@@ -15,7 +15,7 @@ use crate::output_error::{Measurements, Model, NoisyInputs};
 pub(super) fn new_filter<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
     task: &Task,
     prepared: &PreparedCase<NX, E>,
-    window: &Window,
+    window: &ManeuverSignals,
     model: &Model,
 ) -> Filter<NG, G> {
     let measurements = prepared.case.measurements.clone();
@@ -28,7 +28,7 @@ pub(super) fn new_filter<const NX: usize, E: Equations<NX>, const NG: usize, G: 
 pub(super) fn noisy_inputs<const NX: usize, E: Equations<NX>>(
     task: &Task,
     prepared: &PreparedCase<NX, E>,
-    window: &Window,
+    window: &ManeuverSignals,
     model: &Model,
 ) -> NoisyInputs {
     NoisyInputs {

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::estimated::{Estimated, rejected_fit};
 use super::task::Task;
 use crate::aero::{Combined, Output};
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::maneuver::Status;
 use crate::output_error::theil::OutputAgreement;
 use crate::output_error::{Fit, Measurements};
@@ -171,7 +171,7 @@ impl<'t, 'a> RowMaker<'t, 'a> {
         &self,
         measured: &Measurements,
         fit: &Fit,
-        window: &Window,
+        window: &ManeuverSignals,
         surfaces: &[&str],
     ) -> History {
         let outputs = self.task.class.axis.outputs().into_iter().enumerate();

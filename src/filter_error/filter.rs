@@ -18,7 +18,7 @@ use super::noise::{Noise, NoiseParameter, NoisePrior};
 use super::pass::{Corrections, FilterPass, LaneBlocks, LaneGain, PassOutputs, RowSink};
 use super::response::FilterResponse;
 use crate::aircraft::Aircraft;
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{InGusts, OUTPUTS};
 use crate::numerics::simd::AlignedBuffer;
 use crate::output_error::case::blocks::samples_per_block;
@@ -51,7 +51,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     #[must_use]
     pub fn new(
         aircraft: &Aircraft,
-        window: &Window,
+        window: &ManeuverSignals,
         measurements: Measurements,
         model: &Model,
         biases: &[Option<f64>],
@@ -65,7 +65,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     pub fn with_model(
         &self,
         aircraft: &Aircraft,
-        window: &Window,
+        window: &ManeuverSignals,
         model: &Model,
         biases: &[Option<f64>],
     ) -> Self {

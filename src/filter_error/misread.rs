@@ -28,7 +28,7 @@ use super::gains::{Pattern, PatternGain};
 use super::pass::{RecordedPass, RecordedStep};
 use super::response::FilterResponse;
 use crate::aircraft::Aircraft;
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
 use crate::numerics::matrix::AlignedMatrix;
 use crate::output_error::calibration_errors::Misreading;
@@ -38,7 +38,7 @@ use crate::output_error::{Case, Diverged, InitialState, Measurements, Model};
 #[derive(Clone, Copy, Debug)]
 pub struct Recorded<'a> {
     pub aircraft: &'a Aircraft,
-    pub window: &'a Window,
+    pub window: &'a ManeuverSignals,
     pub model: &'a Model<'a>,
 }
 
@@ -117,7 +117,7 @@ struct SampleValues<const NX: usize> {
 
 /// Equations of a maneuver at its samples, with all derivatives held at their values.
 struct SampleEquations<'a, const NX: usize, E: Equations<NX>> {
-    window: Window,
+    window: ManeuverSignals,
     model: Model<'a>,
     /// Maneuver as recorded.
     exact: Case<NX, E>,

@@ -5,7 +5,7 @@ use super::outputs::{COUNT, MATCHED, Outputs};
 use crate::aero::AeroModel;
 use crate::aircraft::{Aircraft, Thrust};
 use crate::dynamics::Motion;
-use crate::dynamics::motion::{MassProperties, Window};
+use crate::dynamics::motion::{ManeuverSignals, MassProperties};
 use crate::flight::Record;
 use crate::maneuver::Maneuver;
 use crate::numerics::differences;
@@ -78,7 +78,7 @@ impl ManeuverRecording {
         }
         let signals = recorded_signals(aero_model);
         let mass = MassProperties::Recorded;
-        let window = Window::cut(
+        let window = ManeuverSignals::cut(
             aircraft,
             record,
             range.clone(),
@@ -167,7 +167,7 @@ fn inputs(motion: &Motion) -> SimulationInputs {
 }
 
 /// Values of some signals, point by point.
-fn by_point(window: &Window, names: &[&str]) -> Vec<f64> {
+fn by_point(window: &ManeuverSignals, names: &[&str]) -> Vec<f64> {
     let signals: Vec<&[f64]> = names.iter().map(|name| window.signal(name)).collect();
     let at = |point: usize| {
         let signals = signals.iter();

@@ -9,7 +9,7 @@ use nalgebra::Complex;
 use super::fourier::{Band, Shifted, Spectrum};
 use crate::aero::{AeroModel, Axis, Derivative, Regressor, WindTunnel};
 use crate::aircraft::Aircraft;
-use crate::dynamics::motion::{MassProperties, Window, slope_reach};
+use crate::dynamics::motion::{ManeuverSignals, MassProperties, slope_reach};
 use crate::dynamics::{COEFFICIENTS, Equations, Lateral, Longitudinal};
 use crate::flight::{Record, signal};
 use crate::maneuver::Maneuver;
@@ -71,7 +71,7 @@ impl ManeuverData {
         let derivatives = derivatives(record, E::AXIS, basis.aero_model);
         let surfaces = surfaces_of(&derivatives);
         let signals = surfaces.iter().map(String::as_str);
-        let window = Window::cut(
+        let window = ManeuverSignals::cut(
             basis.aircraft,
             record,
             range,

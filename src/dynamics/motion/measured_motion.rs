@@ -1,4 +1,4 @@
-//! Measured motion along a window: the signals of each point in the units of the equations.
+//! Measured motion of a maneuver: the signals of each point in the units of the equations.
 #![expect(
     clippy::inline_always,
     reason = "laid out by vectors for the processor at hand"
@@ -9,7 +9,7 @@ use crate::aircraft::{Aircraft, Position};
 use crate::dynamics::lever::lever;
 use crate::units::{G0_FT_S2, RAD};
 
-/// Measured motion along a window.
+/// Measured motion of a maneuver.
 pub struct MeasuredMotion<'a, G: Fn(f64) -> f64> {
     pub(super) aircraft: &'a Aircraft,
     pub(super) signals: Signals<'a>,
@@ -46,7 +46,7 @@ impl<G: Fn(f64) -> f64> MeasuredMotion<'_, G> {
     }
 }
 
-/// Signals of a window, grouped by use.
+/// Signals of a maneuver, grouped by use.
 pub struct Signals<'a> {
     pub flow: &'a [[f64; 2]],
     pub velocity: &'a [f64],

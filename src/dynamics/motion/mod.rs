@@ -8,9 +8,9 @@ mod instant;
 mod local_slope;
 mod vane_inversion;
 mod measured_motion;
-mod window;
+mod maneuver_signals;
 
 pub use instant::Motion;
 pub use local_slope::slope_reach;
+pub use maneuver_signals::{ManeuverSignals, MassProperties};
 pub use measured_motion::MeasuredMotion;
-pub use window::{MassProperties, Window};

@@ -1,4 +1,4 @@
-//! Inversion of the vanes along a window: α and β at the c.g. from the local flow at the vanes.
+//! Inversion of the vanes over a maneuver: α and β at the c.g. from the local flow at the vanes.
 #![expect(
     clippy::inline_always,
     reason = "laid out by vectors for the processor at hand"

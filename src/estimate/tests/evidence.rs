@@ -9,7 +9,7 @@ use super::super::*;
 use crate::aero::wind_tunnel::TunnelPoint;
 use crate::aero::{AeroModel, Axis, Coefficient, Derivative, WindTunnel};
 use crate::dynamics::Longitudinal;
-use crate::dynamics::motion::{MassProperties, Window};
+use crate::dynamics::motion::{ManeuverSignals, MassProperties};
 use crate::dynamics::tests::aircraft;
 use crate::flight::record::Series;
 use crate::flight::{Mark, Record, signal};
@@ -37,7 +37,7 @@ fn fly(truth: Vec<(Derivative, f64)>, edit: impl Fn(&mut Record)) -> Flown {
         ..Model::default()
     };
     let surfaces = truth.iter().filter_map(|(d, _)| d.regressor.surface());
-    let window = Window::cut(
+    let window = ManeuverSignals::cut(
         &aircraft(),
         &record,
         0..SAMPLES,

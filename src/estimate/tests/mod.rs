@@ -19,7 +19,7 @@ use super::prediction::{self, predicting_maneuvers};
 use super::*;
 use crate::aero::{AeroModel, Axis, Bias, Derivative, Output, WindTunnel};
 use crate::aircraft::Aircraft;
-use crate::dynamics::motion::{MassProperties, Window};
+use crate::dynamics::motion::{ManeuverSignals, MassProperties};
 use crate::dynamics::tests::aircraft;
 use crate::dynamics::{Longitudinal, OUTPUTS};
 use crate::flight::record::Series;
@@ -92,7 +92,8 @@ impl Bench {
         };
         let surfaces = ["de_deg", "dpv_deg"];
         let recorded = MassProperties::Recorded;
-        let window = Window::cut(&self.aircraft, record, 0..SAMPLES, surfaces, recorded).unwrap();
+        let window =
+            ManeuverSignals::cut(&self.aircraft, record, 0..SAMPLES, surfaces, recorded).unwrap();
         let case = Case::new(&self.aircraft, &window, nothing_measured(), &model);
         let values = truth.iter().map(|(d, value)| (d.name.clone(), *value));
         (case, values.collect())

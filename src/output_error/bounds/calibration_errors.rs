@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::aero::{Coefficient, Derivative, Regressor};
 use crate::aircraft::Aircraft;
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{Equations, OUTPUTS};
 use crate::numerics::symmetric::inverse;
 use crate::output_error::case::{Case, InitialState, Model};
@@ -73,9 +73,9 @@ impl<'a> Misreading<'a> {
         ErrorEffect::new(error, deviation, change)
     }
 
-    /// Window as an instrument with the error would have recorded it.
+    /// Signals as an instrument with the error would have recorded it.
     #[must_use]
-    pub fn of_window(&self, window: &Window) -> Window {
+    pub fn of_window(&self, window: &ManeuverSignals) -> ManeuverSignals {
         let misread = window.misread(self.signal, self.scale, self.bias);
         if self.delay_s == 0.0 {
             return misread;
@@ -109,7 +109,7 @@ impl Calibration {
 #[derive(Debug)]
 pub struct FittedManeuver<'a, const NX: usize, E: Equations<NX>> {
     pub aircraft: &'a Aircraft,
-    pub window: &'a Window,
+    pub window: &'a ManeuverSignals,
     pub model: &'a Model<'a>,
     pub case: &'a Case<NX, E>,
     pub values: &'a [f64],
@@ -186,7 +186,7 @@ impl<const NX: usize, E: Equations<NX>> FittedManeuver<'_, NX, E> {
     /// Outputs of a window at the values of the fit, without the biases.
     fn computed(
         &self,
-        window: &Window,
+        window: &ManeuverSignals,
         held: &[(&Derivative, f64)],
     ) -> Result<Vec<[f64; OUTPUTS]>, Diverged> {
         let model = Model {

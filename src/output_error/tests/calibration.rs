@@ -19,7 +19,7 @@ fn model(truth: &[(Derivative, f64)]) -> Model<'_> {
 /// Maneuver without noise at its true parameters, with its window.
 struct Exact<const NX: usize, E: Equations<NX>> {
     truth: Vec<(Derivative, f64)>,
-    window: Window,
+    window: ManeuverSignals,
     case: Case<NX, E>,
     parameters: Vec<f64>,
     response: crate::output_error::Response,

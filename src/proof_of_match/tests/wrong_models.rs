@@ -3,7 +3,7 @@
 
 use super::fixture::{flown, shipped, specification, truth, verdict};
 use crate::aero::Regressor;
-use crate::dynamics::motion::{MassProperties, Window};
+use crate::dynamics::motion::{ManeuverSignals, MassProperties};
 use crate::flight::signal;
 use crate::lab::simulator::aerodynamics::Aerodynamics;
 use crate::lab::simulator::plant::{Plant, PlantInputs};
@@ -64,7 +64,7 @@ impl IndependentFlight {
         let first = record.sample_at(flown.maneuver.start_s);
         let range = first..record.sample_at(flown.maneuver.end_s) + 1;
         let surfaces = names.iter().map(String::as_str);
-        let window = Window::cut(
+        let window = ManeuverSignals::cut(
             aircraft,
             record,
             range.clone(),
