@@ -104,9 +104,9 @@ impl ObservedDifferences {
         mean.iter().all(|v| v.is_finite()).then_some(mean)
     }
 
-    /// Fit of the differences for some scales, from which the likelihood of the scales follows.
+    /// Marginal likelihood of some scales.
     #[must_use]
-    pub fn fit(&self, scales: &[Scale], least: f64) -> Option<Fit> {
+    pub fn marginal_likelihood(&self, scales: &[Scale], least: f64) -> Option<MarginalLikelihood> {
         let Information { matrix, vector } = &self.information;
         let root = self.root(scales, least);
         let mut halves = root.left(matrix);
@@ -115,7 +115,7 @@ impl ObservedDifferences {
         let mut seen = root.left_of(vector);
         lower.solve_lower_triangular_mut(&mut seen);
         let log_determinant: f64 = lower.diagonal().iter().map(|d| d.ln()).sum();
-        Some(Fit {
+        Some(MarginalLikelihood {
             value: log_determinant - 0.5 * seen.norm_squared(),
             innovation: vector - halves.tr_mul(&seen),
             information: matrix - square(&halves),
@@ -123,9 +123,9 @@ impl ObservedDifferences {
     }
 }
 
-/// Likelihood of scales, and the vectors and matrices from which its derivatives follow.
+/// Marginal likelihood of scales, and the vectors and matrices from which its derivatives follow.
 #[derive(Clone, Debug)]
-pub struct Fit {
+pub struct MarginalLikelihood {
     /// Minus the log of the marginal likelihood, without constants.
     pub value: f64,
     /// Innovation a = η − Λ P η, in the symbols of [`scales`](super::scales).

@@ -33,7 +33,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::observed_differences::{Fit, ObservedDifferences, ObservedTerm};
+use super::observed_differences::{MarginalLikelihood, ObservedDifferences, ObservedTerm};
 use super::scale_prior::Scale;
 use super::term::PosteriorTerm;
 use crate::numerics::minimise::{LocalExpansion, minimum};
@@ -91,21 +91,21 @@ pub fn negative_log_posterior(
     scales: &[Scale],
     least: f64,
 ) -> Option<LocalExpansion> {
-    let fit = observed.fit(scales, least)?;
+    let likelihood = observed.marginal_likelihood(scales, least)?;
     let both = observed.terms.iter().zip(scales);
     let changes: Vec<TermDerivatives> = both
-        .map(|(t, s)| TermDerivatives::new(t, s, &fit))
+        .map(|(t, s)| TermDerivatives::new(t, s, &likelihood))
         .collect();
     let n = 2 * changes.len();
     let mut local = LocalExpansion {
-        value: fit.value,
+        value: likelihood.value,
         gradient: DVector::zeros(n),
         curvature: DMatrix::zeros(n, n),
         expected: DMatrix::zeros(n, n),
     };
     for (i, (own, scale)) in changes.iter().zip(scales).enumerate() {
         for (j, other) in changes[..=i].iter().enumerate() {
-            own.add_pair(other, &fit, (2 * i, 2 * j), &mut local);
+            own.add_pair(other, &likelihood, (2 * i, 2 * j), &mut local);
         }
         own.add_single(scale, 2 * i, &mut local);
     }
@@ -128,12 +128,16 @@ struct TermDerivatives<'a> {
 }
 
 impl<'a> TermDerivatives<'a> {
-    fn new(term: &'a ObservedTerm, scale: &Scale, fit: &Fit) -> TermDerivatives<'a> {
+    fn new(
+        term: &'a ObservedTerm,
+        scale: &Scale,
+        likelihood: &MarginalLikelihood,
+    ) -> TermDerivatives<'a> {
         let slopes = term.covariance.slopes(scale);
         let (start, n) = (term.start, term.len());
-        let columns = fit.information.columns(start, n);
+        let columns = likelihood.information.columns(start, n);
         let own = columns.rows(start, n);
-        let a = fit.innovation.rows(start, n);
+        let a = likelihood.innovation.rows(start, n);
         let half = |c: &DMatrix<f64>| 0.5 * own.dot(c) - 0.5 * a.dot(&(c * a));
         let halves = [&slopes.value, &slopes.by_length, &slopes.by_length_twice].map(half);
         TermDerivatives {
@@ -149,13 +153,13 @@ impl<'a> TermDerivatives<'a> {
     fn add_pair(
         &self,
         other: &TermDerivatives,
-        fit: &Fit,
+        likelihood: &MarginalLikelihood,
         (i, j): (usize, usize),
         local: &mut LocalExpansion,
     ) {
         let (own, before) = (self.term, other.term);
         let at = (own.start, before.start);
-        let between = fit.information.view(at, (own.len(), before.len()));
+        let between = likelihood.information.view(at, (own.len(), before.len()));
         for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
             let image = other.information_changes[b].rows(own.start, own.len());
             let back = self.information_changes[a].rows(before.start, before.len());
