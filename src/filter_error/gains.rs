@@ -4,12 +4,12 @@
 use nalgebra::{Cholesky, SMatrix};
 
 use super::noise::{Noise, NoiseParameter};
-use super::riccati::{OutputSlopes, States, SteadyFilter, SystemSlope};
+use super::riccati::{OutputSlopes, StateMatrix, SteadyFilter, SystemSlope};
 use crate::dynamics::OUTPUTS;
 use crate::numerics::small::{product, product_transposed, sandwich};
 
-/// Square matrix of the outputs.
-pub(super) type Outputs = SMatrix<f64, OUTPUTS, OUTPUTS>;
+/// Square matrix over the outputs, such as a covariance.
+pub(super) type OutputMatrix = SMatrix<f64, OUTPUTS, OUTPUTS>;
 /// Gain: states by outputs.
 pub(super) type Gain<const NX: usize> = SMatrix<f64, NX, OUTPUTS>;
 
@@ -44,10 +44,10 @@ pub(super) fn patterns(used: &[[bool; OUTPUTS]]) -> (Vec<Pattern>, Vec<u8>) {
 pub(super) struct PatternGain<const NX: usize> {
     pub gain: Gain<NX>,
     /// Inverse S⁻¹ of the innovations' covariance; zero for outputs that do not count.
-    pub inverse: Outputs,
+    pub inverse: OutputMatrix,
     /// Matrix L⁻¹ with S = L Lᵀ, by which the innovations become white; zero for outputs that do
     /// not count.
-    pub whitening: Outputs,
+    pub whitening: OutputMatrix,
     pub log_determinant: f64,
     /// Slopes of gain and S along each parameter that has any.
     pub slopes: Vec<GainSlope<NX>>,
@@ -58,7 +58,7 @@ pub(super) struct PatternGain<const NX: usize> {
 pub(super) struct GainSlope<const NX: usize> {
     pub parameter: usize,
     pub gain: Gain<NX>,
-    pub innovations: Outputs,
+    pub innovations: OutputMatrix,
 }
 
 /// Change of the system along a parameter, numbered as in the filter.
@@ -123,8 +123,8 @@ impl<const NX: usize> PatternGain<NX> {
     pub fn none() -> Self {
         PatternGain {
             gain: Gain::zeros(),
-            inverse: Outputs::zeros(),
-            whitening: Outputs::zeros(),
+            inverse: OutputMatrix::zeros(),
+            whitening: OutputMatrix::zeros(),
             log_determinant: 0.0,
             slopes: vec![],
         }
@@ -132,7 +132,7 @@ impl<const NX: usize> PatternGain<NX> {
 
     #[inline(always)]
     fn for_pattern(
-        prediction: &States<NX>,
+        prediction: &StateMatrix<NX>,
         c: &OutputSlopes<NX>,
         noise: &Noise,
         pattern: &Pattern,
@@ -170,9 +170,9 @@ impl<const NX: usize> PatternGain<NX> {
     #[inline(always)]
     fn slopes_along(
         &self,
-        prediction: &States<NX>,
+        prediction: &StateMatrix<NX>,
         c: &OutputSlopes<NX>,
-        changes: &[(usize, OutputSlopes<NX>, States<NX>)],
+        changes: &[(usize, OutputSlopes<NX>, StateMatrix<NX>)],
         pattern: &Pattern,
     ) -> Vec<GainSlope<NX>> {
         let seen = product_transposed(prediction, c);
@@ -214,7 +214,7 @@ impl<const NX: usize> PatternGain<NX> {
     }
 }
 
-fn clear_unused(matrix: &mut Outputs, pattern: &Pattern) {
+fn clear_unused(matrix: &mut OutputMatrix, pattern: &Pattern) {
     for o in (0..OUTPUTS).filter(|o| !pattern.used[*o]) {
         matrix.row_mut(o).fill(0.0);
         matrix.column_mut(o).fill(0.0);

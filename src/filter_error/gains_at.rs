@@ -13,7 +13,7 @@ use super::gains::{
 use super::input_noise::InputNoise;
 use super::linearised::{Discrete, DiscreteSystem, Linearised};
 use super::noise::{Noise, NoiseParameter};
-use super::riccati::{NoisySystem, States, SteadyFilter};
+use super::riccati::{NoisySystem, StateMatrix, SteadyFilter};
 use crate::dynamics::{InGusts, OUTPUTS};
 use crate::numerics::small::product;
 
@@ -72,7 +72,11 @@ impl<const NX: usize, E: InGusts<NX>> WithSimd for GainsAt<'_, NX, E> {
 impl<const NX: usize, E: InGusts<NX>> GainsAt<'_, NX, E> {
     /// Slopes of the system along all parameters.
     #[inline(always)]
-    fn slopes(&self, discrete: &DiscreteSystem<NX>, decay: &States<NX>) -> Vec<ParameterSlope<NX>> {
+    fn slopes(
+        &self,
+        discrete: &DiscreteSystem<NX>,
+        decay: &StateMatrix<NX>,
+    ) -> Vec<ParameterSlope<NX>> {
         let of_inputs = self.input_noise.covariance_slopes(self.derivatives);
         let mut slopes = Vec::with_capacity(self.derivatives.len() + self.noise_parameters.len());
         for (parameter, (slope, q)) in discrete.slopes().iter().zip(of_inputs).enumerate() {
@@ -104,8 +108,8 @@ impl<const NX: usize, E: InGusts<NX>> GainsAt<'_, NX, E> {
 }
 
 /// Matrix T by which the rotary gusts of the state decay in a step.
-fn decay_matrix<const NX: usize, E: InGusts<NX>>(decay: f64) -> States<NX> {
-    let mut t = States::identity();
+fn decay_matrix<const NX: usize, E: InGusts<NX>>(decay: f64) -> StateMatrix<NX> {
+    let mut t = StateMatrix::identity();
     for &(rate, felt) in E::FELT_RATES {
         t[(felt, felt)] = decay;
         t[(felt, rate)] = 1.0 - decay;
@@ -114,8 +118,8 @@ fn decay_matrix<const NX: usize, E: InGusts<NX>>(decay: f64) -> States<NX> {
 }
 
 /// Slope of T along a parameter, from the slope of the decay.
-fn decay_matrix_slope<const NX: usize, E: InGusts<NX>>(slope: f64) -> States<NX> {
-    let mut t = States::zeros();
+fn decay_matrix_slope<const NX: usize, E: InGusts<NX>>(slope: f64) -> StateMatrix<NX> {
+    let mut t = StateMatrix::zeros();
     for &(rate, felt) in E::FELT_RATES {
         t[(felt, felt)] = slope;
         t[(felt, rate)] = -slope;
@@ -127,8 +131,8 @@ fn decay_matrix_slope<const NX: usize, E: InGusts<NX>>(slope: f64) -> States<NX>
 #[inline(always)]
 fn derivative_slope<const NX: usize>(
     slope: &Discrete<NX>,
-    q: States<NX>,
-    decay: &States<NX>,
+    q: StateMatrix<NX>,
+    decay: &StateMatrix<NX>,
 ) -> NoisySystem<NX> {
     NoisySystem {
         a: product(&slope.step, decay),

@@ -11,7 +11,7 @@
 
 use nalgebra::SVector;
 
-use super::riccati::States;
+use super::riccati::StateMatrix;
 use crate::dynamics::{COEFFICIENTS, Equations};
 use crate::output_error::Case;
 use crate::output_error::surface_noise::{DerivativeValue, NoisySurface};
@@ -60,8 +60,8 @@ impl<const NX: usize> InputNoise<NX> {
     }
 
     /// Covariance of the states' noise in a step with these free derivatives.
-    pub fn covariance(&self, derivatives: &[f64]) -> States<NX> {
-        let mut covariance = States::zeros();
+    pub fn covariance(&self, derivatives: &[f64]) -> StateMatrix<NX> {
+        let mut covariance = StateMatrix::zeros();
         for effect in &self.effects {
             let sum = effect.sum(derivatives);
             covariance += sum * sum.transpose();
@@ -70,8 +70,8 @@ impl<const NX: usize> InputNoise<NX> {
     }
 
     /// Slopes of [`Self::covariance`] along the derivatives.
-    pub fn covariance_slopes(&self, derivatives: &[f64]) -> Vec<States<NX>> {
-        let mut slopes = vec![States::zeros(); derivatives.len()];
+    pub fn covariance_slopes(&self, derivatives: &[f64]) -> Vec<StateMatrix<NX>> {
+        let mut slopes = vec![StateMatrix::zeros(); derivatives.len()];
         for effect in &self.effects {
             let sum = effect.sum(derivatives);
             for (j, own) in &effect.free {

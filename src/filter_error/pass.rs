@@ -18,7 +18,7 @@
 use nalgebra::{SMatrix, SVector};
 use pulp::{Simd, WithSimd};
 
-use super::gains::{Gain, Outputs, Pattern, PatternGain};
+use super::gains::{Gain, OutputMatrix, Pattern, PatternGain};
 use crate::dynamics::{InGusts, OUTPUTS};
 use crate::numerics::matrix::AlignedMatrix;
 use crate::numerics::row_products::Idle;
@@ -38,7 +38,7 @@ pub(super) struct LaneGain<const NX: usize> {
     gain: Gain<NX>,
     /// Matrix −K: change of the state's sensitivities with the outputs' sensitivities.
     reaction: Gain<NX>,
-    whitening: Outputs,
+    whitening: OutputMatrix,
     /// Slopes of the gain: state by state, output by output.
     slopes: LaneBlocks,
 }
