@@ -10,8 +10,8 @@ use std::marker::PhantomData;
 use nalgebra::SVector;
 use pulp::Arch;
 
+use super::gain_computation::GainComputation;
 use super::gains::{Pattern, PatternGain, patterns};
-use super::gains_at::GainsAt;
 use super::input_noise::InputNoise;
 use super::linearised::Linearised;
 use super::noise::{Noise, NoiseParameter, NoisePrior};
@@ -169,7 +169,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     /// # Errors
     /// [`Diverged`] when the state leaves its bounds or the filter has no finite gain.
     pub fn respond(&self, parameters: &[f64]) -> Result<FilterResponse, Diverged> {
-        let gains = self.gains(parameters)?;
+        let gains = self.gains_with_slopes(parameters)?;
         let mut response = FilterResponse::empty(self.samples(), self.parameters());
         let mut sums = NormalSums::new(
             &self.layout,
@@ -190,7 +190,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     /// # Errors
     /// [`Diverged`] when the state leaves its bounds or the filter has no finite gain.
     pub fn innovations(&self, parameters: &[f64]) -> Result<FilterResponse, Diverged> {
-        let gains = self.gains_alone(parameters)?;
+        let gains = self.gains_without_slopes(parameters)?;
         let mut response = FilterResponse::empty(self.samples(), self.parameters());
         self.run(parameters, &gains, &mut response, None::<&mut NormalSums>)?;
         self.add_covariance_part(parameters, &gains, &mut response);
@@ -345,22 +345,25 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     }
 
     /// Gains of all patterns with their slopes.
-    pub(super) fn gains(&self, parameters: &[f64]) -> Result<Vec<PatternGain<NX>>, Diverged> {
-        self.gains_at(parameters, true)
+    pub(super) fn gains_with_slopes(
+        &self,
+        parameters: &[f64],
+    ) -> Result<Vec<PatternGain<NX>>, Diverged> {
+        self.compute_gains(parameters, true)
     }
 
     /// Gains of all patterns without slopes.
-    fn gains_alone(&self, parameters: &[f64]) -> Result<Vec<PatternGain<NX>>, Diverged> {
-        self.gains_at(parameters, false)
+    fn gains_without_slopes(&self, parameters: &[f64]) -> Result<Vec<PatternGain<NX>>, Diverged> {
+        self.compute_gains(parameters, false)
     }
 
-    fn gains_at(
+    fn compute_gains(
         &self,
         parameters: &[f64],
         with_slopes: bool,
     ) -> Result<Vec<PatternGain<NX>>, Diverged> {
         let numbered = (self.first_noise()..).zip(self.noise_parameters.iter().copied());
-        let gains = Arch::new().dispatch(GainsAt::<NX, E> {
+        let gains = Arch::new().dispatch(GainComputation::<NX, E> {
             linearised: &self.linearised,
             input_noise: &self.input_noise,
             patterns: &self.patterns,

@@ -24,8 +24,8 @@ pub(super) struct Pattern {
 pub(super) fn patterns(used: &[[bool; OUTPUTS]]) -> (Vec<Pattern>, Vec<u8>) {
     let (mut patterns, mut of_sample) = (Vec::<Pattern>::new(), Vec::with_capacity(used.len()));
     for used in used {
-        let known = patterns.iter().position(|p| p.used == *used);
-        let pattern = known.unwrap_or_else(|| {
+        let position = patterns.iter().position(|p| p.used == *used);
+        let pattern = position.unwrap_or_else(|| {
             patterns.push(Pattern {
                 used: *used,
                 samples: 0,
@@ -82,21 +82,21 @@ pub(super) fn steady_variance_slopes(
 ) -> [f64; OUTPUTS] {
     let variances = steady_variances(noise, patterns);
     std::array::from_fn(|o| match parameter {
-        NoiseParameter::Output(own) if own == o => 2.0 * variances[o],
+        NoiseParameter::Output(output) if output == o => 2.0 * variances[o],
         _ => 0.0,
     })
 }
 
 /// Share of the samples in which an output counts.
 fn share(output: usize, patterns: &[Pattern], all: usize) -> f64 {
-    let own = patterns.iter().filter(|p| p.used[output]);
-    let own: usize = own.map(|p| p.samples).sum();
-    own.max(1) as f64 / all.max(1) as f64
+    let with_output = patterns.iter().filter(|p| p.used[output]);
+    let samples: usize = with_output.map(|p| p.samples).sum();
+    samples.max(1) as f64 / all.max(1) as f64
 }
 
 /// Gains of all patterns; `None` if the filter has no finite covariance.
 #[inline(always)]
-pub(super) fn gains<const NX: usize>(
+pub(super) fn gains_of_patterns<const NX: usize>(
     filter: &SteadyFilter<NX>,
     noise: &Noise,
     slopes: &[ParameterSlope<NX>],
@@ -110,10 +110,10 @@ pub(super) fn gains<const NX: usize>(
     }
     let mut gains = Vec::with_capacity(patterns.len());
     for pattern in patterns {
-        let mut own = PatternGain::for_pattern(&filter.prediction, c, noise, pattern)?;
-        own.slopes = own.slopes_along(&filter.prediction, c, &changes, pattern);
-        own.add_output_noise(noise, noise_parameters, pattern);
-        gains.push(own);
+        let mut pattern_gain = PatternGain::for_pattern(&filter.prediction, c, noise, pattern)?;
+        pattern_gain.slopes = pattern_gain.slopes_along(&filter.prediction, c, &changes, pattern);
+        pattern_gain.add_output_noise(noise, noise_parameters, pattern);
+        gains.push(pattern_gain);
     }
     Some(gains)
 }
@@ -175,11 +175,11 @@ impl<const NX: usize> PatternGain<NX> {
         changes: &[(usize, OutputSlopes<NX>, StateMatrix<NX>)],
         pattern: &Pattern,
     ) -> Vec<GainSlope<NX>> {
-        let seen = product_transposed(prediction, c);
+        let state_output = product_transposed(prediction, c);
         let mut slopes = Vec::with_capacity(changes.len());
         for (parameter, c_slope, p_slope) in changes {
             let cross = product_transposed(p_slope, c) + product_transposed(prediction, c_slope);
-            let mut innovations = product(c, &cross) + product(c_slope, &seen);
+            let mut innovations = product(c, &cross) + product(c_slope, &state_output);
             clear_unused(&mut innovations, pattern);
             let gain = product(&(cross - product(&self.gain, &innovations)), &self.inverse);
             slopes.push(GainSlope {

@@ -54,7 +54,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         recorded: &Recorded,
         errors: &[Misreading],
     ) -> Result<Vec<DVector<f64>>, Diverged> {
-        let gains = self.gains(parameters)?;
+        let gains = self.gains_with_slopes(parameters)?;
         let mut pass = RecordedPass::new(self.samples(), self.lanes());
         let mut response = FilterResponse::empty(self.samples(), self.parameters());
         self.run(parameters, &gains, &mut response, Some(&mut pass))?;

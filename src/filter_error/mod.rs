@@ -24,7 +24,7 @@
 //! | [`input_noise`] | noise of surfaces and dynamic pressure as noise of the states |
 //! | `riccati` | covariance of the prediction, and its slopes |
 //! | `gains` | gain and covariance of the innovations for each pattern of missing outputs |
-//! | `gains_at` | gains for given parameters, with their slopes along all of them |
+//! | `gain_computation` | gains for given parameters, with their slopes along all of them |
 //! | `pass` | one pass: innovations and their sensitivities, in the kernel of output error |
 //! | [`response`] | result of a pass: cost, gradient and information |
 //! | [`filter`] | a maneuver prepared |
@@ -37,7 +37,7 @@
 pub mod bounds;
 pub mod filter;
 mod gains;
-mod gains_at;
+mod gain_computation;
 mod input_noise;
 pub mod joint_filter;
 mod linearised;

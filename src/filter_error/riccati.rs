@@ -52,6 +52,8 @@ pub(super) struct SteadyFilter<const NX: usize> {
     pub prediction: StateMatrix<NX>,
     /// Covariance P⁺ of the corrected state.
     corrected: StateMatrix<NX>,
+    /// Gain K for the mean output noise. Only the slopes of P use it; the gains applied to samples are
+    /// in `gains`.
     gain: SMatrix<f64, NX, OUTPUTS>,
     pub system: NoisySystem<NX>,
     /// Closed loop Ā, and its powers 2, 4, 8, ….

@@ -45,7 +45,7 @@ fn shift_by_pass<const NX: usize, E: InGusts<NX>>(
     model: &Model,
     error: &Misreading,
 ) -> DVector<f64> {
-    let gains = filter.gains(at).unwrap();
+    let gains = filter.gains_with_slopes(at).unwrap();
     let mut pass = RecordedPass::new(filter.samples(), filter.lanes());
     let mut exact = FilterResponse::empty(filter.samples(), filter.parameters());
     filter.run(at, &gains, &mut exact, Some(&mut pass)).unwrap();

@@ -8,7 +8,8 @@ use nalgebra::SMatrix;
 use pulp::{Simd, WithSimd};
 
 use super::gains::{
-    ParameterSlope, Pattern, PatternGain, gains, steady_variance_slopes, steady_variances,
+    ParameterSlope, Pattern, PatternGain, gains_of_patterns, steady_variance_slopes,
+    steady_variances,
 };
 use super::input_noise::InputNoise;
 use super::linearised::{Discrete, DiscreteSystem, Linearised};
@@ -18,7 +19,7 @@ use crate::dynamics::{InGusts, OUTPUTS};
 use crate::numerics::small::product;
 
 /// Computation of the gains, compiled for the processor at hand.
-pub(super) struct GainsAt<'a, const NX: usize, E: InGusts<NX>> {
+pub(super) struct GainComputation<'a, const NX: usize, E: InGusts<NX>> {
     pub linearised: &'a Linearised<NX>,
     pub input_noise: &'a InputNoise<NX>,
     pub patterns: &'a [Pattern],
@@ -34,7 +35,7 @@ pub(super) struct GainsAt<'a, const NX: usize, E: InGusts<NX>> {
     pub equations: PhantomData<E>,
 }
 
-impl<const NX: usize, E: InGusts<NX>> WithSimd for GainsAt<'_, NX, E> {
+impl<const NX: usize, E: InGusts<NX>> WithSimd for GainComputation<'_, NX, E> {
     type Output = Option<Vec<PatternGain<NX>>>;
 
     #[inline(always)]
@@ -59,7 +60,7 @@ impl<const NX: usize, E: InGusts<NX>> WithSimd for GainsAt<'_, NX, E> {
         } else {
             SteadyFilter::solve_system(system)?
         };
-        gains(
+        gains_of_patterns(
             &filter,
             &self.noise,
             &slopes,
@@ -69,7 +70,7 @@ impl<const NX: usize, E: InGusts<NX>> WithSimd for GainsAt<'_, NX, E> {
     }
 }
 
-impl<const NX: usize, E: InGusts<NX>> GainsAt<'_, NX, E> {
+impl<const NX: usize, E: InGusts<NX>> GainComputation<'_, NX, E> {
     /// Slopes of the system along all parameters.
     #[inline(always)]
     fn slopes(
