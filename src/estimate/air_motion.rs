@@ -131,7 +131,7 @@ impl Filtered {
             second_opinion: member.second_opinion_on(&slope_fit.held),
             noise,
             cost: slope_fit.cost(),
-            attitude_drifts: noise.is_of_air(G::FELT_RATES.len(), case.step_s),
+            attitude_drifts: noise.is_of_air(G::AIR_RELATIVE_RATES.len(), case.step_s),
             autocorrelation: lag_one(&case.measurements, &fit.response.outputs),
             output_error_costs: [output_error.initial_cost, output_error.final_cost],
             likelihood_gain: white_cost(&case.measurements, output_error)
@@ -193,7 +193,7 @@ fn is_mostly_air<const NX: usize, const NG: usize, G: InGusts<NG>>(
 ) -> bool {
     filters.iter().any(|filter| {
         let gusts = filter.noise(&found.scored.parameters).gusts;
-        let mut rates = G::FELT_RATES.iter().zip(gusts);
+        let mut rates = G::AIR_RELATIVE_RATES.iter().zip(gusts);
         rates.any(|((rate, _), gust)| {
             let values = states.iter().map(|x| x[*rate]);
             let values = DVector::from_iterator(states.len(), values);

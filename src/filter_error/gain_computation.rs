@@ -111,9 +111,9 @@ impl<const NX: usize, E: InGusts<NX>> GainComputation<'_, NX, E> {
 /// Matrix T by which the rotary gusts of the state decay in a step.
 fn decay_matrix<const NX: usize, E: InGusts<NX>>(decay: f64) -> StateMatrix<NX> {
     let mut t = StateMatrix::identity();
-    for &(rate, felt) in E::FELT_RATES {
-        t[(felt, felt)] = decay;
-        t[(felt, rate)] = 1.0 - decay;
+    for &(rate, relative) in E::AIR_RELATIVE_RATES {
+        t[(relative, relative)] = decay;
+        t[(relative, rate)] = 1.0 - decay;
     }
     t
 }
@@ -121,9 +121,9 @@ fn decay_matrix<const NX: usize, E: InGusts<NX>>(decay: f64) -> StateMatrix<NX> 
 /// Slope of T along a parameter, from the slope of the decay.
 fn decay_matrix_slope<const NX: usize, E: InGusts<NX>>(slope: f64) -> StateMatrix<NX> {
     let mut t = StateMatrix::zeros();
-    for &(rate, felt) in E::FELT_RATES {
-        t[(felt, felt)] = slope;
-        t[(felt, rate)] = -slope;
+    for &(rate, relative) in E::AIR_RELATIVE_RATES {
+        t[(relative, relative)] = slope;
+        t[(relative, rate)] = -slope;
     }
     t
 }

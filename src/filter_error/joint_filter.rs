@@ -125,7 +125,7 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
     /// Derivatives, biases and initial states with the noise of each maneuver.
     #[must_use]
     pub fn with_noise(&self, own: &[f64], noise: &[Noise]) -> Vec<f64> {
-        let gusts = E::FELT_RATES.len();
+        let gusts = E::AIR_RELATIVE_RATES.len();
         let noise = noise.iter().flat_map(|noise| noise.parameters(gusts));
         own.iter().copied().chain(noise).collect()
     }
@@ -212,7 +212,11 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
         for (member, filter) in self.filters.iter().enumerate() {
             let noise = &mut free[self.noise_places(member)];
             fix_unmeasured(filter, noise);
-            fix_without_effect(filter.noise_parameters(), E::FELT_RATES.len(), noise);
+            fix_without_effect(
+                filter.noise_parameters(),
+                E::AIR_RELATIVE_RATES.len(),
+                noise,
+            );
         }
     }
 }

@@ -290,14 +290,14 @@ impl Noise {
     pub fn covariance<const NX: usize, E: InGusts<NX>>(&self, step_s: f64) -> SMatrix<f64, NX, NX> {
         let mut q = SMatrix::zeros();
         q[(E::ANGLE, E::ANGLE)] = self.angle.powi(2);
-        for (g, &(_, felt)) in E::FELT_RATES.iter().enumerate() {
+        for (g, &(_, relative)) in E::AIR_RELATIVE_RATES.iter().enumerate() {
             let variance = self.gust_variance(g, step_s);
             // With a share for each gust the matrix stays positive for any correlations.
-            let share = self.correlations[g] / (E::FELT_RATES.len() as f64).sqrt();
+            let share = self.correlations[g] / (E::AIR_RELATIVE_RATES.len() as f64).sqrt();
             let cross = share * self.angle * variance.sqrt();
-            q[(felt, felt)] = variance;
-            q[(E::ANGLE, felt)] = cross;
-            q[(felt, E::ANGLE)] = cross;
+            q[(relative, relative)] = variance;
+            q[(E::ANGLE, relative)] = cross;
+            q[(relative, E::ANGLE)] = cross;
         }
         q
     }
@@ -315,7 +315,7 @@ impl Noise {
             slope[(E::ANGLE, E::ANGLE)] = 2.0 * q[(E::ANGLE, E::ANGLE)];
         }
         let decay = self.decay(step_s);
-        for (g, &(_, felt)) in E::FELT_RATES.iter().enumerate() {
+        for (g, &(_, relative)) in E::AIR_RELATIVE_RATES.iter().enumerate() {
             // Relative slopes of the gust's standard deviation and of the correlation.
             let (of_gust, of_angle) = match parameter {
                 NoiseParameter::Gust(other) if other == g => (1.0, 0.0),
@@ -326,15 +326,15 @@ impl Noise {
                 NoiseParameter::Angle => (0.0, 1.0),
                 _ => (0.0, 0.0),
             };
-            let mut cross = (of_gust + of_angle) * q[(E::ANGLE, felt)];
+            let mut cross = (of_gust + of_angle) * q[(E::ANGLE, relative)];
             if parameter == NoiseParameter::Correlation(g) {
                 let unit = self.angle * self.gust_variance(g, step_s).sqrt();
-                let share = 1.0 / (E::FELT_RATES.len() as f64).sqrt();
+                let share = 1.0 / (E::AIR_RELATIVE_RATES.len() as f64).sqrt();
                 cross = (1.0 - self.correlations[g].powi(2)) * share * unit;
             }
-            slope[(felt, felt)] = 2.0 * of_gust * q[(felt, felt)];
-            slope[(E::ANGLE, felt)] = cross;
-            slope[(felt, E::ANGLE)] = cross;
+            slope[(relative, relative)] = 2.0 * of_gust * q[(relative, relative)];
+            slope[(E::ANGLE, relative)] = cross;
+            slope[(relative, E::ANGLE)] = cross;
         }
         slope
     }

@@ -302,11 +302,11 @@ impl<const NX: usize, E: InGusts<NX>> Correction<NX> for &ChunkCorrections<'_, N
         let decay = simd.splat_f64s(corrections.decay);
         for n in 0..N {
             let decay_slope = load::<S>(corrections.decay_row.slice(), lanes[n]);
-            for &(rate, felt) in E::FELT_RATES {
-                let gust = simd.sub_f64s(s[n][felt], s[n][rate]);
-                s[n][felt] = simd.mul_add_f64s(decay, gust, s[n][rate]);
-                let gust = simd.splat_f64s(self.gusts[k][felt]);
-                s[n][felt] = simd.mul_add_f64s(decay_slope, gust, s[n][felt]);
+            for &(rate, relative) in E::AIR_RELATIVE_RATES {
+                let gust = simd.sub_f64s(s[n][relative], s[n][rate]);
+                s[n][relative] = simd.mul_add_f64s(decay, gust, s[n][rate]);
+                let gust = simd.splat_f64s(self.gusts[k][relative]);
+                s[n][relative] = simd.mul_add_f64s(decay_slope, gust, s[n][relative]);
             }
         }
         // From the last output on, as the first ones are read till the end.
@@ -370,8 +370,8 @@ impl<'a, const NX: usize, E: InGusts<NX>> ChunkCorrections<'a, NX, E> {
             }
         }
         self.patterns[k] = pattern;
-        for &(rate, felt) in E::FELT_RATES {
-            self.gusts[k][felt] = corrected[felt] - corrected[rate];
+        for &(rate, relative) in E::AIR_RELATIVE_RATES {
+            self.gusts[k][relative] = corrected[relative] - corrected[rate];
         }
         (E::decayed(corrected, self.corrections.decay), white)
     }

@@ -65,7 +65,7 @@ fn prepared<const NX: usize, E: InGusts<NX>>(
     let values = values_by_name(truth);
     let mut own: Vec<f64> = filter.case.starting_values(|name| values[name]);
     own.extend(biases.iter().map(|_| 0.01));
-    own.extend(filter.case.start.iter().take(E::own_states()));
+    own.extend(filter.case.start.iter().take(E::states_in_still_air()));
     Simulated { filter, own }
 }
 
@@ -78,9 +78,9 @@ impl<const NX: usize, E: InGusts<NX>> Simulated<NX, E> {
         )
         .unwrap()
         .l();
-        let first = self.filter.first_noise() - E::own_states();
+        let first = self.filter.first_noise() - E::states_in_still_air();
         let mut x = SVector::<f64, NX>::zeros();
-        for i in 0..E::own_states() {
+        for i in 0..E::states_in_still_air() {
             x[i] = self.own[first + i];
         }
         x = E::decayed(x, 0.0);
