@@ -16,7 +16,7 @@ use crate::flight::is_stretch;
 use crate::lineage::{Lineage, Stage};
 use crate::maneuver::{Maneuver, Status};
 use crate::night::{RunOutcome, campaign_lineage, run};
-use crate::pipeline::{AbsentArtefacts, Campaign, Conductor, Progress, bring_maneuvers};
+use crate::pipeline::{AbsentArtefacts, Campaign, Conductor, Progress, load_or_make_maneuvers};
 use crate::recorder::FlightCorrections;
 use crate::store::archive::{self, FlightFiles};
 use crate::store::files;
@@ -279,7 +279,7 @@ fn estimate(
         })
     };
     let maneuvers: Result<Vec<&Maneuver>> = items.iter().map(maneuver).collect();
-    bring_maneuvers(
+    load_or_make_maneuvers(
         &conductor.runner,
         &campaign.flights,
         &maneuvers?,

@@ -180,7 +180,7 @@ pub fn context<'a>(config: &'a Config, delays: &'a [DelayCorrection]) -> Context
 /// A fault that stops the run.
 pub fn estimate(runner: &StepRunner, campaign: &mut Campaign) -> Result<Option<Vec<Estimated>>> {
     let all: Vec<&Maneuver> = campaign.maneuvers.iter().collect();
-    let brought = bring_maneuvers(runner, &campaign.flights, &all, &campaign.delays)?;
+    let brought = load_or_make_maneuvers(runner, &campaign.flights, &all, &campaign.delays)?;
     let mut missing = Vec::new();
     let mut estimates = Vec::new();
     for (maneuver, estimate) in campaign.maneuvers.iter().zip(brought) {
@@ -222,7 +222,7 @@ fn failure(estimated: &Estimated) -> Option<Failure> {
 ///
 /// # Errors
 /// A fault that stops the run.
-pub fn bring_maneuvers(
+pub fn load_or_make_maneuvers(
     runner: &StepRunner,
     flights: &[Flight],
     maneuvers: &[&Maneuver],
@@ -239,7 +239,7 @@ pub fn bring_maneuvers(
                 maneuver,
             })
             .collect();
-        runner.bring_all(&steps)
+        runner.load_or_make_all(&steps)
     };
     let brought: Result<Vec<Vec<_>>> = runner.with_progress("estimate", maneuvers.len(), || {
         flights.par_iter().map(of_flight).collect()

@@ -150,7 +150,10 @@ pub fn join(runner: &StepRunner, campaign: &mut Campaign, estimates: &[Estimated
             delays: &campaign.delays,
         })
         .collect();
-    let brought: Result<Vec<_>> = steps.par_iter().map(|step| runner.bring(step)).collect();
+    let brought: Result<Vec<_>> = steps
+        .par_iter()
+        .map(|step| runner.load_or_make(step))
+        .collect();
     for (bin, joined) in bins.iter().zip(brought?) {
         if let Some(joined) = joined {
             add_joined(campaign, joined.artefact);
@@ -273,7 +276,7 @@ pub fn predict(
             own,
             from,
         };
-        Ok(runner.bring(&step)?.map(|brought| brought.artefact))
+        Ok(runner.load_or_make(&step)?.map(|brought| brought.artefact))
     };
     let brought: Result<Vec<Option<Predicted>>> =
         sources.par_iter().enumerate().map(bring).collect();

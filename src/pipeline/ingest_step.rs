@@ -167,7 +167,7 @@ fn bring_flight(
 ) -> Result<Option<LoadedOrMade<IngestedFlight>>> {
     let id = &files.flight_id;
     match contents.fingerprint(id) {
-        Ok(content) => runner.bring(&IngestStep {
+        Ok(content) => runner.load_or_make(&IngestStep {
             runner,
             shares,
             files,

@@ -134,14 +134,14 @@ pub fn fly_again(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
                 own: own_estimates(campaign, &estimates, i),
             })
             .collect();
-        runner.bring_all(&steps)
+        runner.load_or_make_all(&steps)
     };
-    let brought: Result<Vec<Vec<_>>> =
+    let matched: Result<Vec<Vec<_>>> =
         runner.with_progress("match", campaign.maneuvers.len(), || {
             campaign.flights.par_iter().map(of_flight).collect()
         });
-    let brought = brought?.into_iter().flatten().flatten();
-    campaign.matched = brought.map(|brought| brought.artefact).collect();
+    let matched = matched?.into_iter().flatten().flatten();
+    campaign.matched = matched.map(|loaded| loaded.artefact).collect();
     Ok(())
 }
 

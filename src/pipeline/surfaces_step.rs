@@ -85,24 +85,24 @@ pub fn surfaces(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
         .iter()
         .filter(|f| f.is_accepted())
         .collect();
-    let bring = |flight: &&Flight| {
+    let evidence_of = |flight: &&Flight| {
         let of_flight = |m: &&Maneuver| m.flight_id == flight.id();
         let maneuvers: Vec<&Maneuver> = campaign.maneuvers.iter().filter(of_flight).collect();
-        let brought = runner.bring(&SurfacesStep {
+        let evidence = runner.load_or_make(&SurfacesStep {
             config: runner.config,
             store: &runner.store,
             flight,
             maneuvers: &maneuvers,
         });
         runner.advance(flight.id());
-        brought
+        evidence
     };
-    let brought: Result<Vec<_>> = runner.with_progress("surfaces", flights.len(), || {
-        flights.par_iter().map(bring).collect()
+    let loaded: Result<Vec<_>> = runner.with_progress("surfaces", flights.len(), || {
+        flights.par_iter().map(evidence_of).collect()
     });
     let ids: Vec<String> = flights.iter().map(|f| f.id().to_owned()).collect();
     let mut known = Vec::with_capacity(ids.len());
-    for (flight_id, evidence) in ids.into_iter().zip(brought?) {
+    for (flight_id, evidence) in ids.into_iter().zip(loaded?) {
         match evidence {
             Some(evidence) => known.push(evidence.artefact),
             None => campaign
