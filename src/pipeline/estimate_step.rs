@@ -126,7 +126,7 @@ impl<'a> Step for EstimateStep<'a> {
         let history = estimated.history.take().map(|h| report::thinned(&h));
         self.store.save(&name.sibling(Kind::History), &history)?;
         estimated.means = estimate::means(&record, self.maneuver, &self.config.aero_model);
-        Ok(ComputedArtefact::Settled(estimated))
+        Ok(ComputedArtefact::Final(estimated))
     }
 
     fn companions(&self, name: &ArtefactName, _: &Estimated) -> Vec<Companion> {

@@ -114,7 +114,7 @@ impl<'a> Step for JointStep<'a> {
             .map(|(member, fit)| (member.maneuver, format!("doubtful: {}", fit.reason)))
             .collect();
         let joint_id = &self.bin.joint_id;
-        Ok(ComputedArtefact::Settled(joint::estimate(
+        Ok(ComputedArtefact::Final(joint::estimate(
             joint_id,
             &members,
             &doubtful,
@@ -234,7 +234,7 @@ impl<'a> Step for PredictStep<'a> {
             }
             None => Predicted::not_predicted("the configuration has no such class", from.len()),
         };
-        Ok(ComputedArtefact::Settled(predicted))
+        Ok(ComputedArtefact::Final(predicted))
     }
 }
 

@@ -78,8 +78,10 @@ impl<'a> Step for IngestStep<'a> {
         let ingested = writing.ingest(self.files)?;
         drop(in_work);
         Ok(match self.passing_fault() {
-            None => ComputedArtefact::Settled(ingested),
-            Some(fault) => ComputedArtefact::Passing(IngestedFlight::rejected(self.item(), fault)),
+            None => ComputedArtefact::Final(ingested),
+            Some(fault) => {
+                ComputedArtefact::Temporary(IngestedFlight::rejected(self.item(), fault))
+            }
         })
     }
 

@@ -83,7 +83,7 @@ impl<'a> Step for MatchStep<'a> {
         if self.maneuver.is_rejected() {
             let reason = format!("rejected: {}", self.maneuver.quality.reason);
             let matched = proof_of_match::not_flown(self.basis, self.maneuver, &reason);
-            return Ok(ComputedArtefact::Settled(matched));
+            return Ok(ComputedArtefact::Final(matched));
         }
         let record = self.record.read_maneuver(self.maneuver)?;
         let condition = self.maneuver.condition(self.basis.tunnel);
@@ -98,7 +98,7 @@ impl<'a> Step for MatchStep<'a> {
         };
         let mut matched = proof_of_match::fly_again(self.basis, &flown);
         matched.history = matched.history.map(|h| crate::report::thinned(&h));
-        Ok(ComputedArtefact::Settled(matched))
+        Ok(ComputedArtefact::Final(matched))
     }
 }
 

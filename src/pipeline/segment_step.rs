@@ -88,7 +88,7 @@ impl<'a> Step for SegmentStep<'a> {
 
     fn make(&self, _: &ArtefactName) -> Result<ComputedArtefact<FoundManeuvers>> {
         let record = self.flight.open(self.store)?;
-        find_maneuvers(self.config, &record, &self.events).map(ComputedArtefact::Settled)
+        find_maneuvers(self.config, &record, &self.events).map(ComputedArtefact::Final)
     }
 }
 

@@ -89,11 +89,11 @@ impl<'a> StepRunner<'a> {
     fn make<S: Step>(&self, step: &S) -> Result<LoadedOrMade<S::Artefact>> {
         let name = step.name();
         let (artefact, is_stored) = match step.make(&name)? {
-            ComputedArtefact::Settled(artefact) => {
+            ComputedArtefact::Final(artefact) => {
                 self.store.save(&name, &artefact)?;
                 (artefact, true)
             }
-            ComputedArtefact::Passing(artefact) => (artefact, false),
+            ComputedArtefact::Temporary(artefact) => (artefact, false),
         };
         Ok(LoadedOrMade {
             name,

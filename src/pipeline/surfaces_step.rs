@@ -71,7 +71,7 @@ impl<'a> Step for SurfacesStep<'a> {
             tunnel: &self.config.tunnel,
         };
         let evidence = surfaces::flight_evidence(self.flight.id(), &parts?, basis);
-        Ok(ComputedArtefact::Settled(evidence))
+        Ok(ComputedArtefact::Final(evidence))
     }
 }
 
