@@ -164,7 +164,7 @@ impl FoundChannels<'_> {
         if !stated {
             evidence += "; its unit follows from its range alone";
         }
-        let rate = rate(input.acts).signal();
+        let rate = rate(input.axis).signal();
         let own_rate = self.channels.iter().find(|c| c.signal == rate);
         let rate_is_sure = own_rate.is_some_and(|c| c.is_sure);
         if input.is_sure && !rate_is_sure {
