@@ -7,7 +7,9 @@ use anyhow::Context;
 use clap::{Args, ValueEnum};
 
 use super::bars::Bars;
-use super::options::{ATTENTION, Options, Patience, REJECTED, TRY_AGAIN, exit_code, start_threads};
+use super::options::{
+    ATTENTION, Options, REJECTED, TRY_AGAIN, WaitOptions, exit_code, start_threads,
+};
 use super::run_summary::print_summary;
 use crate::cluster::plan::{Dealt, Shard, ShardPlan, array};
 use crate::cluster::scripts::{self, CampaignCommands, LARGEST_ARRAY};
@@ -55,7 +57,7 @@ pub struct MergeOptions {
     #[command(flatten)]
     options: Options,
     #[command(flatten)]
-    patience: Patience,
+    wait_options: WaitOptions,
     /// The plan of maneuvers
     #[arg(long, value_name = "FILE")]
     plan: PathBuf,
@@ -139,10 +141,10 @@ impl ShareOptions {
         &self,
         until: Stage,
         options: &Options,
-        patience: &Patience,
+        wait_options: &WaitOptions,
     ) -> Option<anyhow::Result<ExitCode>> {
         let (plan, shard) = (self.plan.as_deref()?, self.shard?);
-        Some(match compute(plan, shard, until, options, patience) {
+        Some(match compute(plan, shard, until, options, wait_options) {
             Err(error)
                 if error
                     .downcast_ref::<Error>()
@@ -165,7 +167,7 @@ fn compute(
     shard: Shard,
     until: Stage,
     options: &Options,
-    patience: &Patience,
+    wait_options: &WaitOptions,
 ) -> anyhow::Result<ExitCode> {
     start_threads(options.threads)?;
     let config = options.load()?;
@@ -183,7 +185,7 @@ fn compute(
         &plan,
         shard,
         until,
-        patience.wait(),
+        wait_options.longest_wait(),
         &Bars::new(options.quiet, None),
     )?;
     if !options.quiet {
@@ -224,7 +226,7 @@ pub fn merge(options: &MergeOptions) -> anyhow::Result<ExitCode> {
     let config = options.options.load()?;
     let bars = Bars::new(options.options.quiet, None);
     let plan = shard::read_plan(&options.plan)?;
-    match shard::merge(&config, &plan, options.patience.wait(), &bars) {
+    match shard::merge(&config, &plan, options.wait_options.longest_wait(), &bars) {
         Err(error) if error.is_transient() => Ok(ask_for_another_try(&error.into())),
         Err(error) => Err(error.into()),
         Ok(outcome) => {
