@@ -120,7 +120,7 @@ impl Simulation<'_> {
     /// Flies the first `samples` samples, every `stride`-th of which is a step.
     #[must_use]
     pub fn fly(&self, start: &Start, samples: usize, stride: usize) -> FreeRun {
-        self.fly_with(start, (samples, stride), &mut Alone)
+        self.fly_with(start, (samples, stride), &mut NoObserver)
     }
 
     /// As [`Simulation::fly`], with computations beside the run.
@@ -128,7 +128,7 @@ impl Simulation<'_> {
         &self,
         start: &Start,
         (samples, stride): (usize, usize),
-        companion: &mut impl Companion,
+        observer: &mut impl StageObserver,
     ) -> FreeRun {
         let step_s = stride as f64 * self.recording.step_s;
         let mut equations = RunEquations {
@@ -154,8 +154,8 @@ impl Simulation<'_> {
             });
             run.outputs
                 .push(outputs(&readings, instant.air.velocity_ft_s));
-            companion.at_stage(0, &instant, (&mut equations, 2 * sample));
-            companion.at_sample(&instant);
+            observer.at_stage(0, &instant, (&mut equations, 2 * sample));
+            observer.at_sample(&instant);
             if sample + stride < samples {
                 // The first stage is at the sample itself.
                 let rate = |stage: usize, at: &BodyState| {
@@ -164,11 +164,11 @@ impl Simulation<'_> {
                     }
                     let point = 2 * sample + stride * POINT[stage];
                     let instant = equations.instant(at, point);
-                    companion.at_stage(stage, &instant, (&mut equations, point));
+                    observer.at_stage(stage, &instant, (&mut equations, point));
                     instant.rate
                 };
                 let end = runge_kutta::step(&state, step_s, rate, BodyState::plus);
-                companion.after_step(&end);
+                observer.after_step(&end);
                 state = end.normalised();
             }
         }
@@ -177,7 +177,7 @@ impl Simulation<'_> {
 }
 
 /// Computation beside a run, at the instants of its stages.
-pub trait Companion {
+pub trait StageObserver {
     /// Called at each stage, with the equations and the point of the recording. The first stage of
     /// a step is at its sample.
     fn at_stage(&mut self, stage: usize, instant: &Instant, at: (&mut RunEquations, usize));
@@ -189,10 +189,10 @@ pub trait Companion {
     fn after_step(&mut self, end: &BodyState);
 }
 
-/// Companion that computes nothing.
-struct Alone;
+/// Observer that computes nothing.
+struct NoObserver;
 
-impl Companion for Alone {
+impl StageObserver for NoObserver {
     fn at_stage(&mut self, _: usize, _: &Instant, _: (&mut RunEquations, usize)) {}
     fn at_sample(&mut self, _: &Instant) {}
     fn after_step(&mut self, _: &BodyState) {}
