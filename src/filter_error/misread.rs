@@ -65,7 +65,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         let mut changes = AlignedMatrix::zeros(errors.len(), OUTPUTS * self.samples());
         for (error, changes) in errors.iter().zip(changes.rows_mut()) {
             let inputs = evaluate(&samples.misread(recorded, error), &pass.steps);
-            Arch::new().dispatch(LinearRun::<NX, E, _> {
+            Arch::new().dispatch(ErrorPropagation::<NX, E, _> {
                 steps: &pass.steps,
                 gains: &gains,
                 patterns: self.patterns(),
@@ -194,7 +194,7 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Evaluation<'_, NX, E> {
 }
 
 /// Linear response of a filter to one error.
-struct LinearRun<'a, const NX: usize, E: InGusts<NX>, M: Fn(usize) -> [f64; OUTPUTS]> {
+struct ErrorPropagation<'a, const NX: usize, E: InGusts<NX>, M: Fn(usize) -> [f64; OUTPUTS]> {
     steps: &'a [RecordedStep<NX>],
     gains: &'a [PatternGain<NX>],
     /// Patterns, and the pattern of each sample.
@@ -210,7 +210,9 @@ struct LinearRun<'a, const NX: usize, E: InGusts<NX>, M: Fn(usize) -> [f64; OUTP
     equations: std::marker::PhantomData<E>,
 }
 
-impl<const NX: usize, E: InGusts<NX>, M: Fn(usize) -> [f64; OUTPUTS]> LinearRun<'_, NX, E, M> {
+impl<const NX: usize, E: InGusts<NX>, M: Fn(usize) -> [f64; OUTPUTS]>
+    ErrorPropagation<'_, NX, E, M>
+{
     /// Changes of rates and outputs at a sample.
     #[inline(always)]
     fn input_changes(&self, k: usize) -> ([f64; NX], [f64; OUTPUTS]) {
@@ -227,7 +229,7 @@ impl<const NX: usize, E: InGusts<NX>, M: Fn(usize) -> [f64; OUTPUTS]> LinearRun<
 }
 
 impl<const NX: usize, E: InGusts<NX>, M: Fn(usize) -> [f64; OUTPUTS]> WithSimd
-    for LinearRun<'_, NX, E, M>
+    for ErrorPropagation<'_, NX, E, M>
 {
     type Output = ();
 

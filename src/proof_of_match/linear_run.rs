@@ -35,7 +35,7 @@ pub type Histories = [Vec<f64>; COUNT];
 
 /// A run with the slopes of its outputs along parameters.
 #[derive(Clone, Debug)]
-pub struct LinearRun {
+pub struct RunWithSensitivities {
     pub run: FreeRun,
     /// Histories of the slopes, in the order of the parameters, up to a departure.
     pub slopes: Vec<Histories>,
@@ -49,11 +49,11 @@ impl Simulation<'_> {
         &self,
         (start, parameters): (&Start, &[Parameter]),
         (samples, stride): (usize, usize),
-    ) -> LinearRun {
+    ) -> RunWithSensitivities {
         let step_s = stride as f64 * self.recording.step_s;
         let mut slopes = RunSlopes::new(self, (start, parameters), step_s);
         let run = self.fly_with(start, (samples, stride), &mut slopes);
-        LinearRun {
+        RunWithSensitivities {
             run,
             slopes: slopes.histories,
         }

@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::free_run::{FreeRun, STATES, Simulation};
-use super::linear_run::{Histories, LinearRun, Parameter};
+use super::linear_run::{Histories, Parameter, RunWithSensitivities};
 use super::outputs::{COUNT, Outputs};
 use super::recording::ManeuverRecording;
 use super::start::MatchedStart;
@@ -49,7 +49,7 @@ impl MeanRun {
         let moved = derivatives.iter().map(|(_, d)| Parameter::Derivative(*d));
         let parameters: Vec<Parameter> = moved.chain(own.map(Parameter::Start)).collect();
         let steps = (recording.samples, stride);
-        let LinearRun { run, slopes } =
+        let RunWithSensitivities { run, slopes } =
             simulation.fly_with_slopes((&start.start, &parameters), steps);
         Some(MeanRun {
             stride,

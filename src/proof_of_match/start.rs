@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::aerodynamics::{AboutTrim, AeroInputs, COEFFICIENTS, SimulationTrim};
 use super::free_run::{FreeRun, STATES, Simulation, Start};
-use super::linear_run::{LinearRun, Parameter};
+use super::linear_run::{Parameter, RunWithSensitivities};
 use super::outputs::COUNT;
 use super::recording::ManeuverRecording;
 use crate::dynamics::{Equations, Lateral, Longitudinal, Motion};
@@ -74,7 +74,7 @@ impl StartSlopes {
     fn of(simulation: &Simulation, start: &Start) -> Option<(StartSlopes, FreeRun)> {
         let recording = simulation.recording;
         let parameters: [Parameter; PARAMETERS] = std::array::from_fn(Parameter::Start);
-        let LinearRun { run, slopes } =
+        let RunWithSensitivities { run, slopes } =
             simulation.fly_with_slopes((start, &parameters), (recording.trim_samples, 1));
         if run.has_departed {
             return None;
