@@ -7,7 +7,7 @@ use super::prepared_case::PreparedCase;
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{Equations, OUTPUTS};
-use crate::output_error::calibration_errors::{FittedManeuver, Misreading};
+use crate::output_error::calibration_errors::{FittedManeuver, SignalError};
 use crate::output_error::{Diverged, Fit, calibration_errors};
 
 /// Added to the reason of a fit whose bounds lack the effect of calibration errors.
@@ -24,7 +24,7 @@ pub(super) fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
     if fit.covariance_corrected.is_none() || is_exact {
         return;
     }
-    let errors = misreadings(context, &prepared.window);
+    let errors = signal_errors(context, &prepared.window);
     match gradient_shifts(
         context.aircraft,
         prepared,
@@ -40,17 +40,17 @@ pub(super) fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
 }
 
 /// Errors of one standard deviation each of the signals of a window.
-pub(super) fn misreadings<'a>(
+pub(super) fn signal_errors<'a>(
     context: &'a Context<'a>,
     window: &ManeuverSignals,
-) -> Vec<Misreading<'a>> {
+) -> Vec<SignalError<'a>> {
     // A signal that the maneuver does not use has no effect.
     let is_used = |signal: &str| !window.signal(signal).is_empty();
     let calibration = context.settings.calibration.iter();
     let used = calibration.filter(|(signal, _)| is_used(signal));
-    let readings = used.flat_map(|(signal, c)| c.misreadings(signal));
+    let readings = used.flat_map(|(signal, c)| c.signal_errors(signal));
     let delays = context.delays.iter().filter(|d| is_used(&d.surface));
-    let late = delays.map(|d| Misreading::late(&d.surface, d.uncertainty_s));
+    let late = delays.map(|d| SignalError::delay(&d.surface, d.uncertainty_s));
     readings.chain(late).collect()
 }
 
@@ -59,7 +59,7 @@ pub(super) fn misreadings<'a>(
 pub(super) fn gradient_shifts<const NX: usize, E: Equations<NX>>(
     aircraft: &Aircraft,
     prepared: &PreparedCase<NX, E>,
-    errors: &[Misreading],
+    errors: &[SignalError],
     values: &[f64],
     weights: &[f64; OUTPUTS],
 ) -> Result<Vec<DVector<f64>>, Diverged> {

@@ -5,7 +5,7 @@ use std::marker::PhantomData;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::calibration_effect::{NOT_COUNTED, misreadings};
+use super::calibration_effect::{NOT_COUNTED, signal_errors};
 use super::filter_minimum::{Minimum, NoMinimum};
 use super::group_member::GroupMember;
 use super::held_slopes::HeldSlopes;
@@ -327,7 +327,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
         let Some(first) = self.members.first() else {
             return;
         };
-        let errors = misreadings(first.task.context, &first.slopes.window);
+        let errors = signal_errors(first.task.context, &first.slopes.window);
         if self.task.context.settings.calibration.is_empty() && errors.is_empty() {
             return;
         }

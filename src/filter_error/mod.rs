@@ -30,7 +30,7 @@
 //! | [`filter`] | a maneuver prepared |
 //! | [`joint_filter`] | several maneuvers that share derivatives, or one |
 //! | [`scoring`] | the iteration |
-//! | [`misread`] | effects of the instruments' errors on the gradient |
+//! | [`calibration_gradients`] | effects of the instruments' errors on the gradient |
 //! | [`bounds`] | covariance of the estimates, and the effects of held values and calibration |
 //! | [`slopes`] | slopes of the derivatives over α, and their effect on the estimates |
 
@@ -41,7 +41,7 @@ mod gain_computation;
 mod input_noise;
 pub mod joint_filter;
 mod linearised;
-pub mod misread;
+pub mod calibration_gradients;
 pub mod noise;
 mod pass;
 pub mod response;

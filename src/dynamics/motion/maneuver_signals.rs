@@ -180,12 +180,12 @@ impl ManeuverSignals {
     /// Signals as a sensor in error would have recorded it: a signal's values times `1 + scale`,
     /// plus `bias`.
     #[must_use]
-    pub fn misread(&self, name: &str, scale: f64, bias: f64) -> ManeuverSignals {
+    pub fn with_error(&self, name: &str, scale: f64, bias: f64) -> ManeuverSignals {
         let mut signals = self.clone();
         for (name, bias) in [(name, bias), (slope_name(name).as_str(), 0.0)] {
             if let Some(points) = self.points.get(name) {
-                let misread = points.iter().map(|value| value + (scale * value + bias));
-                signals.set(name, misread.collect());
+                let in_error = points.iter().map(|value| value + (scale * value + bias));
+                signals.set(name, in_error.collect());
             }
         }
         signals
@@ -194,7 +194,7 @@ impl ManeuverSignals {
     /// Signals as a recorder would have recorded it with a signal late by `delay_s`, to first order in
     /// the delay.
     #[must_use]
-    pub fn late(&self, name: &str, delay_s: f64) -> ManeuverSignals {
+    pub fn delayed(&self, name: &str, delay_s: f64) -> ManeuverSignals {
         let mut signals = self.clone();
         if let Some(points) = self.points.get(name) {
             // Time between the points on either side of a point.

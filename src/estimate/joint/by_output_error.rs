@@ -4,7 +4,7 @@ use nalgebra::DVector;
 
 use super::member::{Fitted, Member, is_unshared, mean_of_own_estimates};
 use crate::dynamics::Equations;
-use crate::estimate::calibration_effect::{NOT_COUNTED, gradient_shifts, misreadings};
+use crate::estimate::calibration_effect::{NOT_COUNTED, gradient_shifts, signal_errors};
 use crate::estimate::task::{Task, values_by_name};
 use crate::estimate::whiteness::{lag_one, largest_correlation};
 use crate::output_error::consider::{self, Considered};
@@ -126,7 +126,7 @@ fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
     for (i, part) in parts.iter().enumerate() {
         let places = joint.parameters().places(i);
         let own = values_at(places, &fit.values);
-        errors = misreadings(part.task.context, &part.prepared.window);
+        errors = signal_errors(part.task.context, &part.prepared.window);
         let aircraft = part.task.context.aircraft;
         let shifts = gradient_shifts(aircraft, &part.prepared, &errors, &own, &fit.weights);
         let Ok(shifts) = shifts else {

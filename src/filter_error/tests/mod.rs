@@ -2,7 +2,7 @@
 
 mod inputs;
 mod joint;
-mod misread;
+mod calibration_gradients;
 
 use std::collections::BTreeMap;
 

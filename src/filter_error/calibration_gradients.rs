@@ -31,7 +31,7 @@ use crate::aircraft::Aircraft;
 use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
 use crate::numerics::matrix::AlignedMatrix;
-use crate::output_error::calibration_errors::Misreading;
+use crate::output_error::calibration_errors::SignalError;
 use crate::output_error::{Case, Diverged, InitialState, Measurements, Model};
 
 /// Maneuver as its instruments recorded it.
@@ -52,7 +52,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         &self,
         parameters: &[f64],
         recorded: &Recorded,
-        errors: &[Misreading],
+        errors: &[SignalError],
     ) -> Result<Vec<DVector<f64>>, Diverged> {
         let gains = self.gains_with_slopes(parameters)?;
         let mut pass = RecordedPass::new(self.samples(), self.lanes());
@@ -64,7 +64,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         let exact = evaluate(&samples.exact, &pass.steps);
         let mut changes = AlignedMatrix::zeros(errors.len(), OUTPUTS * self.samples());
         for (error, changes) in errors.iter().zip(changes.rows_mut()) {
-            let inputs = evaluate(&samples.misread(recorded, error), &pass.steps);
+            let inputs = evaluate(&samples.case_with_error(recorded, error), &pass.steps);
             Arch::new().dispatch(ErrorPropagation::<NX, E, _> {
                 steps: &pass.steps,
                 gains: &gains,
@@ -72,37 +72,40 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
                 decay: self.noise(parameters).decay(self.case.step_s),
                 half_step_s: 0.5 * self.case.step_s,
                 inputs: [&exact, &inputs],
-                measured: misread_outputs::<NX, E>(&self.case.measurements, error),
+                measured: output_errors::<NX, E>(&self.case.measurements, error),
                 changes,
                 equations: std::marker::PhantomData,
             });
         }
         let lanes = changes.product(&pass.rows);
         if lanes.values().iter().all(|change| change.is_finite()) {
-            Ok(lanes.rows().map(|lanes| self.own_lanes(lanes)).collect())
+            Ok(lanes
+                .rows()
+                .map(|lanes| self.values_in_lanes(lanes))
+                .collect())
         } else {
             Err(Diverged { sample: 0 })
         }
     }
 
     /// Values of the filter's own parameters, from values in lanes.
-    fn own_lanes(&self, lanes: &[f64]) -> DVector<f64> {
+    fn values_in_lanes(&self, lanes: &[f64]) -> DVector<f64> {
         let values = (0..self.first_noise()).map(|j| lanes[self.lane(j)]);
         DVector::from_iterator(self.first_noise(), values)
     }
 }
 
 /// Changes of the measured outputs by an error.
-fn misread_outputs<'a, const NX: usize, E: Equations<NX>>(
+fn output_errors<'a, const NX: usize, E: Equations<NX>>(
     measurements: &'a Measurements,
-    error: &Misreading,
+    error: &SignalError,
 ) -> impl Fn(usize) -> [f64; OUTPUTS] + use<'a, NX, E> {
     let outputs = E::AXIS.outputs();
-    let own = outputs.iter().position(|o| o.signal() == error.signal);
+    let in_error = outputs.iter().position(|o| o.signal() == error.signal);
     let (scale, bias) = (error.scale, error.bias);
     move |sample| {
         let mut change = [0.0; OUTPUTS];
-        if let Some(o) = own {
+        if let Some(o) = in_error {
             change[o] = scale * measurements.values[sample][o] + bias;
         }
         change
@@ -143,13 +146,13 @@ impl<'a, const NX: usize, E: Equations<NX>> SampleEquations<'a, NX, E> {
     }
 
     /// Maneuver as an instrument in error would have recorded it.
-    fn misread(&self, recorded: &Recorded, error: &Misreading) -> Case<NX, E> {
+    fn case_with_error(&self, recorded: &Recorded, error: &SignalError) -> Case<NX, E> {
         let window = if error.delay_s == 0.0 {
-            error.of_window(&self.window)
+            error.apply_to(&self.window)
         } else {
             // A delay needs the slope of the signal, and that the points between samples.
-            let late = error.of_window(recorded.window);
-            self.window.with_samples_of(error.signal, &late)
+            let delayed = error.apply_to(recorded.window);
+            self.window.with_samples_of(error.signal, &delayed)
         };
         let windows = [&self.window, &window];
         let nothing = Measurements::default();
@@ -216,13 +219,13 @@ impl<const NX: usize, E: InGusts<NX>, M: Fn(usize) -> [f64; OUTPUTS]>
     /// Changes of rates and outputs at a sample.
     #[inline(always)]
     fn input_changes(&self, k: usize) -> ([f64; NX], [f64; OUTPUTS]) {
-        let [exact, misread] = self.inputs.map(|values| &values[k]);
+        let [exact, in_error] = self.inputs.map(|values| &values[k]);
         let (mut rates, mut outputs) = ([0.0; NX], [0.0; OUTPUTS]);
         for i in 0..NX {
-            rates[i] = misread.rates[i] - exact.rates[i];
+            rates[i] = in_error.rates[i] - exact.rates[i];
         }
         for o in 0..OUTPUTS {
-            outputs[o] = misread.outputs[o] - exact.outputs[o];
+            outputs[o] = in_error.outputs[o] - exact.outputs[o];
         }
         (rates, outputs)
     }
