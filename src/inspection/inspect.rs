@@ -17,7 +17,7 @@ use super::mirror_images::MirrorImages;
 use super::plausible::{ColumnFacts, candidates, facts};
 use super::quantity::Quantity;
 use super::recording::Recording;
-use super::steps::{Excursions, Step, steps};
+use super::steps::{Excursions, InputActivity, steps};
 use super::vocabulary::meanings;
 use crate::flight::signal;
 use crate::units::{self, Unit};
@@ -150,7 +150,7 @@ impl FoundChannels<'_> {
         &self,
         input: &InputColumn,
         facts: &ColumnFacts,
-        (moves, step): (bool, &Step),
+        (moves, step): (bool, &InputActivity),
     ) -> Channel {
         let (unit, stated) = input_unit(facts, input);
         let kept = if unit.quantity == units::Quantity::Number {
@@ -170,7 +170,7 @@ impl FoundChannels<'_> {
         if input.is_sure && !rate_is_sure {
             evidence = format!("{evidence}; but {rate} is not sure");
         }
-        if let Some(why) = step.why_it_rests().filter(|_| moves) {
+        if let Some(why) = step.reason_without_step().filter(|_| moves) {
             evidence = format!("{evidence}; {why}");
         }
         let is_sure = input.is_sure && stated && rate_is_sure;
