@@ -11,7 +11,7 @@ use super::options::{
     ATTENTION, Options, REJECTED, TRY_AGAIN, WaitOptions, exit_code, start_threads,
 };
 use super::run_summary::print_summary;
-use crate::cluster::plan::{Dealt, Shard, ShardPlan, array};
+use crate::cluster::plan::{DealtKind, Shard, ShardPlan, array};
 use crate::cluster::scripts::{self, CampaignCommands, LARGEST_ARRAY};
 use crate::cluster::shard;
 use crate::config::Config;
@@ -85,7 +85,7 @@ enum Scheduler {
     Pbs,
 }
 
-fn plan_file(config: &Config, of: Dealt) -> PathBuf {
+fn plan_file(config: &Config, of: DealtKind) -> PathBuf {
     // A shared store is seen by all machines.
     config
         .shared_store
@@ -99,8 +99,8 @@ pub fn plan(options: &PlanOptions) -> anyhow::Result<ExitCode> {
     start_threads(options.options.threads)?;
     let config = options.options.load()?;
     let of = match options.of {
-        DealtArgument::Flights => Dealt::Flights,
-        DealtArgument::Maneuvers => Dealt::Maneuvers,
+        DealtArgument::Flights => DealtKind::Flights,
+        DealtArgument::Maneuvers => DealtKind::Maneuvers,
     };
     let file = options
         .out
@@ -174,7 +174,7 @@ fn compute(
     let plan = shard::read_plan(file)?;
     anyhow::ensure!(
         until <= plan.of.last_stage()
-            && (until == Stage::Estimate) == (plan.of == Dealt::Maneuvers),
+            && (until == Stage::Estimate) == (plan.of == DealtKind::Maneuvers),
         "{} is a plan of {}: its shards are for `harvest {}`",
         file.display(),
         plan.of.name(),
@@ -252,8 +252,8 @@ pub fn submit(options: &SubmitOptions) -> anyhow::Result<ExitCode> {
         program: shown(&files::program()?),
         arguments: options.options.typed(),
         folder: shown(&folder),
-        flights: shown(&plan_file(&config, Dealt::Flights)),
-        maneuvers: shown(&plan_file(&config, Dealt::Maneuvers)),
+        flights: shown(&plan_file(&config, DealtKind::Flights)),
+        maneuvers: shown(&plan_file(&config, DealtKind::Maneuvers)),
         out: shown(&folder.join(&out)),
     };
     let engine = match options.engine {
@@ -264,8 +264,14 @@ pub fn submit(options: &SubmitOptions) -> anyhow::Result<ExitCode> {
         atomic::place(&out.join(script.name), script.text.as_bytes())?;
     }
     let bars = Bars::new(options.options.quiet, None);
-    let file = plan_file(&config, Dealt::Flights);
-    let plan = shard::deal(&config, Dealt::Flights, config.cluster.shards, &file, &bars)?;
+    let file = plan_file(&config, DealtKind::Flights);
+    let plan = shard::deal(
+        &config,
+        DealtKind::Flights,
+        config.cluster.shards,
+        &file,
+        &bars,
+    )?;
     let submit = out.join("submit.sh");
     if !options.options.quiet {
         print_plan(&plan, &file);
