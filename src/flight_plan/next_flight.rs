@@ -23,7 +23,7 @@ use crate::pdf;
 use crate::pipeline::{Campaign, Conductor, Progress, decisive_differences, evidence, flown_means};
 use crate::proof_of_match::of_posterior;
 use crate::qualities::{self, FlownConditions};
-use crate::store::table::Shelf;
+use crate::store::table::TableFolder;
 use crate::store::{atomic, files, table};
 
 /// Published files of the page.
@@ -116,7 +116,7 @@ pub fn plan_next_flight(
 }
 
 /// Writes the tables and the page of a plan, and names their files.
-fn place_plan(plan: &Plan, page: &str, folder: &Path, shelf: &Shelf) -> Result<Vec<PathBuf>> {
+fn place_plan(plan: &Plan, page: &str, folder: &Path, shelf: &TableFolder) -> Result<Vec<PathBuf>> {
     table::publish(shelf, &plan.cards)?;
     table::publish(shelf, &plan.goals)?;
     files::place_text(&folder.join(PAGE), page)?;

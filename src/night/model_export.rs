@@ -11,7 +11,7 @@ use crate::export::{self, ExportContents, daveml, jsbsim};
 use crate::lineage::Stage;
 use crate::numerics::random::RandomStream;
 use crate::pipeline::{Campaign, Conductor, Progress};
-use crate::store::table::Shelf;
+use crate::store::table::TableFolder;
 use crate::store::{atomic, table};
 
 /// Files and values of an export.
@@ -75,7 +75,7 @@ fn write_draws(
     contents: &ExportContents,
     campaign: &Campaign,
     folder: &Path,
-    shelf: &Shelf,
+    shelf: &TableFolder,
     draws: Draws,
 ) -> Result<Vec<PathBuf>> {
     let mut all = Vec::new();
@@ -104,7 +104,7 @@ fn write(
     contents: &ExportContents,
     campaign: &Campaign,
     folder: &Path,
-    shelf: &Shelf,
+    shelf: &TableFolder,
 ) -> Result<Exported> {
     let tables = export::tables(contents);
     let rows = export::rows(&tables);

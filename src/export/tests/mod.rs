@@ -268,7 +268,7 @@ fn every_format_comes_back_as_the_same_tunnel_to_the_bit() {
             .as_ref()
             .map(|t| t.name.as_str());
         crate::store::table::publish_export(
-            &crate::store::table::Shelf::of(folder.path()),
+            &crate::store::table::TableFolder::of(folder.path()),
             &rows(&tables),
             third,
         )

@@ -63,7 +63,7 @@ pub fn run(
     }
     study.vary_starts(campaign, &points, progress);
     progress.end();
-    let shelf = table::Shelf::of(out);
+    let shelf = table::TableFolder::of(out);
     table::publish(&shelf, &study.conditions)?;
     table::publish(&shelf, &study.coverage)?;
     table::publish(&shelf, &study.starts)?;
