@@ -9,7 +9,7 @@ use super::progress::Progress;
 use super::step::{Companion, ComputedArtefact, LoadedOrMade, Step};
 use crate::config::Config;
 use crate::error::Result;
-use crate::store::{ArtefactName, InputDigests, Listed, Store};
+use crate::store::{ArtefactName, InWorkEntry, InputDigests, Store};
 
 /// Treatment of an artefact that is absent from the store.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -159,7 +159,7 @@ impl<'a> StepRunner<'a> {
 
     /// Reports a flight as being processed, to the progress display and in the store, until the
     /// returned value is dropped.
-    pub fn start_flight<'b>(&'b self, flight_id: &'b str) -> Option<Listed<'b>> {
+    pub fn start_flight<'b>(&'b self, flight_id: &'b str) -> Option<InWorkEntry<'b>> {
         self.progress.start(flight_id);
         self.store.list_in_work(flight_id)
     }

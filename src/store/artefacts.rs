@@ -14,7 +14,7 @@ use serde::de::DeserializeOwned;
 use super::artefact_name::{ArtefactName, Kind};
 use super::atomic;
 use super::fingerprint::{Digest, sealed, unsealed};
-use super::in_work::{InWorkList, Listed};
+use super::in_work::{InWorkEntry, InWorkList};
 use super::input_digests::InputDigests;
 use super::lock::Lock;
 use super::regular;
@@ -102,7 +102,7 @@ impl Store {
     }
 
     /// Lists a flight as being processed until the returned value is dropped.
-    pub fn list_in_work<'a>(&'a self, flight_id: &'a str) -> Option<Listed<'a>> {
+    pub fn list_in_work<'a>(&'a self, flight_id: &'a str) -> Option<InWorkEntry<'a>> {
         self.in_work.as_ref().map(|list| list.add(flight_id))
     }
 

@@ -27,7 +27,7 @@ pub struct InWorkList {
 
 /// A flight on the list, until it is dropped.
 #[derive(Debug)]
-pub struct Listed<'a> {
+pub struct InWorkEntry<'a> {
     list: &'a InWorkList,
     flight_id: &'a str,
 }
@@ -43,11 +43,11 @@ impl InWorkList {
         list
     }
 
-    pub fn add<'a>(&'a self, flight_id: &'a str) -> Listed<'a> {
+    pub fn add<'a>(&'a self, flight_id: &'a str) -> InWorkEntry<'a> {
         self.change(|flights| {
             flights.insert(flight_id.to_owned(), timestamp(SystemTime::now()));
         });
-        Listed {
+        InWorkEntry {
             list: self,
             flight_id,
         }
@@ -67,7 +67,7 @@ impl InWorkList {
     }
 }
 
-impl Drop for Listed<'_> {
+impl Drop for InWorkEntry<'_> {
     fn drop(&mut self) {
         self.list.change(|flights| {
             flights.remove(self.flight_id);
