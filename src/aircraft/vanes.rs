@@ -44,7 +44,7 @@ struct LocalVelocity {
 }
 
 /// Sine and cosine of an angle from a given direction, times the speed, with the angle's slopes.
-struct Turn {
+struct AngleFromDirection {
     sine: f64,
     cosine: f64,
     by_alpha: f64,
@@ -55,7 +55,7 @@ struct Turn {
 impl LocalVelocity {
     /// Angle in the plane of symmetry from a direction given by sine and cosine.
     #[inline(always)]
-    fn alpha_from(&self, direction: (f64, f64)) -> Turn {
+    fn alpha_from(&self, direction: (f64, f64)) -> AngleFromDirection {
         let [u, _, w] = self.velocity;
         let per_square = 1.0 / (u * u + w * w);
         let slope = |d: [f64; 3]| (u * d[2] - w * d[0]) * per_square;
@@ -64,7 +64,7 @@ impl LocalVelocity {
 
     /// Angle from the plane of symmetry, from a direction given by sine and cosine.
     #[inline(always)]
-    fn beta_from(&self, direction: (f64, f64)) -> Turn {
+    fn beta_from(&self, direction: (f64, f64)) -> AngleFromDirection {
         let [u, v, w] = self.velocity;
         let across = (u * u + w * w).sqrt();
         let per_square = 1.0 / (across * across + v * v);
@@ -73,15 +73,15 @@ impl LocalVelocity {
         self.turn((across, v), direction, slope)
     }
 
-    /// Turn of a vector in a plane from a direction, with the slope of its angle along a change of velocity.
+    /// Angle of a vector in a plane from a direction, with the slope of its angle along a change of velocity.
     #[inline(always)]
     fn turn(
         &self,
         (forward, aside): (f64, f64),
         (s, c): (f64, f64),
         slope: impl Fn([f64; 3]) -> f64,
-    ) -> Turn {
-        Turn {
+    ) -> AngleFromDirection {
+        AngleFromDirection {
             sine: aside * c - forward * s,
             cosine: forward * c + aside * s,
             by_alpha: slope(self.by_alpha),
@@ -91,7 +91,7 @@ impl LocalVelocity {
     }
 }
 
-impl Turn {
+impl AngleFromDirection {
     /// Reading of a vane, where the angle is from the direction `from`.
     #[inline(always)]
     fn reading(&self, from: f64) -> Reading {
