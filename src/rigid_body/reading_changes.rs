@@ -7,7 +7,7 @@
 use nalgebra::Vector3;
 use pulp::Simd;
 
-use super::changes::{AirChange, Down, StateChange};
+use super::changes::{AirChange, DownDirection, StateChange};
 use super::readings::Instant;
 use crate::aircraft::{Aircraft, Position, Reading, VaneFlow};
 use crate::numerics::lanes::{Lanes, combination, each};
@@ -31,7 +31,7 @@ pub(crate) struct ReadingsChange<S: Simd> {
 pub(crate) struct ReadingSlopes {
     alpha_vane: VaneSlopes,
     beta_vane: VaneSlopes,
-    down: Down,
+    down: DownDirection,
     an: AccelerometerSlopes,
     ax: AccelerometerSlopes,
     ay: AccelerometerSlopes,
@@ -66,7 +66,7 @@ impl ReadingSlopes {
         ReadingSlopes {
             alpha_vane: VaneSlopes::new(&sensors.alpha_reading(&flow, cg), &flow),
             beta_vane: VaneSlopes::new(&sensors.beta_reading(&flow, cg), &flow),
-            down: Down::new(&instant.state),
+            down: DownDirection::new(&instant.state),
             an: accelerometer(sensors.an, 2, -1.0),
             ax: accelerometer(sensors.ax, 0, 1.0),
             ay: accelerometer(sensors.ay, 1, 1.0),
