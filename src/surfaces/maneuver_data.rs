@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 
 use nalgebra::Complex;
 
-use super::fourier::{Band, Shifted, Spectrum};
+use super::fourier::{Band, DelayedSpectrum, Spectrum};
 use crate::aero::{AeroModel, Axis, Derivative, Regressor, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::{ManeuverSignals, MassProperties, slope_reach};
@@ -35,7 +35,7 @@ pub struct CoefficientData {
 /// One derivative of the build-up.
 #[derive(Clone, Debug)]
 pub struct TermData {
-    pub regressor: Shifted,
+    pub regressor: DelayedSpectrum,
     /// Index of its surface.
     pub surface: Option<usize>,
     /// Tunnel's value.
@@ -139,7 +139,7 @@ fn implied_spectra<const NX: usize, E: Equations<NX>>(
 fn regressors<const NX: usize, E: Equations<NX>>(
     band: &Band,
     case: &Case<NX, E>,
-) -> BTreeMap<usize, Shifted> {
+) -> BTreeMap<usize, DelayedSpectrum> {
     let columns = case.terms.iter().enumerate();
     let first: BTreeMap<usize, usize> = columns.rev().map(|(j, term)| (term.column, j)).collect();
     let series: Vec<Vec<f64>> = first
