@@ -209,7 +209,7 @@ impl<'a> Aerodynamics<'a> {
 /// Aerodynamics about a trim, prepared for a run of thousands of instants. The coefficients at the
 /// trim are computed once; a factor that several derivatives have is computed once per instant.
 #[derive(Clone, Debug)]
-pub struct AboutTrim<'a> {
+pub struct TrimmedAerodynamics<'a> {
     table: &'a DerivativeTable,
     /// Terms of each coefficient in the order of the build-up, without the constants.
     terms: [Vec<TrimmedTerm>; COEFFICIENTS],
@@ -225,16 +225,16 @@ pub struct AboutTrim<'a> {
 #[derive(Clone, Debug)]
 struct TrimmedTerm {
     derivative: usize,
-    /// Index of the term's factor in [`AboutTrim::values`].
+    /// Index of the term's factor in [`TrimmedAerodynamics::values`].
     factor: usize,
     is_along_alpha: bool,
     /// Factor at the trim; along α the integral of the derivative there.
     at_trim: f64,
 }
 
-impl<'a> AboutTrim<'a> {
+impl<'a> TrimmedAerodynamics<'a> {
     #[must_use]
-    pub fn new(aerodynamics: &'a Aerodynamics, trim: &SimulationTrim) -> AboutTrim<'a> {
+    pub fn new(aerodynamics: &'a Aerodynamics, trim: &SimulationTrim) -> TrimmedAerodynamics<'a> {
         let table = &aerodynamics.table;
         let place = table.position_of(trim.alpha_deg);
         let mut terms = [const { Vec::new() }; COEFFICIENTS];
@@ -260,7 +260,7 @@ impl<'a> AboutTrim<'a> {
                 factors.push(factor);
             }
         }
-        AboutTrim {
+        TrimmedAerodynamics {
             table,
             terms,
             values: vec![0.0; factors.len()],

@@ -2,7 +2,9 @@
 //! used.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
-use super::aerodynamics::{AboutTrim, AeroInputs, Aerodynamics, COEFFICIENTS, SimulationTrim};
+use super::aerodynamics::{
+    AeroInputs, Aerodynamics, COEFFICIENTS, SimulationTrim, TrimmedAerodynamics,
+};
 use super::load_changes::LoadSlopes;
 use super::outputs::{Outputs, outputs};
 use super::recording::ManeuverRecording;
@@ -134,7 +136,7 @@ impl Simulation<'_> {
         let mut equations = RunEquations {
             simulation: self,
             start,
-            aerodynamics: AboutTrim::new(&self.aerodynamics, &start.trim),
+            aerodynamics: TrimmedAerodynamics::new(&self.aerodynamics, &start.trim),
         };
         let mut state = start.body();
         let mut run = FreeRun {
@@ -218,7 +220,7 @@ impl WithSimd for Sensing<'_> {
 pub struct RunEquations<'a> {
     simulation: &'a Simulation<'a>,
     start: &'a Start,
-    aerodynamics: AboutTrim<'a>,
+    aerodynamics: TrimmedAerodynamics<'a>,
 }
 
 impl RunEquations<'_> {

@@ -7,7 +7,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::aerodynamics::{AboutTrim, AeroInputs, COEFFICIENTS, SimulationTrim};
+use super::aerodynamics::{AeroInputs, COEFFICIENTS, SimulationTrim, TrimmedAerodynamics};
 use super::free_run::{FreeRun, STATES, Simulation, Start};
 use super::linear_run::{Parameter, RunWithSensitivities};
 use super::outputs::COUNT;
@@ -120,7 +120,7 @@ fn as_measured(simulation: &Simulation) -> Start {
         factors: mean_factors(simulation),
         alpha_deg: mean(motions.iter().map(|m| DEG * m.alpha)),
     };
-    let mut about_trim = AboutTrim::new(&simulation.aerodynamics, &trim);
+    let mut about_trim = TrimmedAerodynamics::new(&simulation.aerodynamics, &trim);
     let implied: Vec<[f64; COEFFICIENTS]> = motions
         .iter()
         .enumerate()
