@@ -10,7 +10,7 @@ use std::ops::Range;
 
 use super::channel_statistics::{ChannelStatistics, LARGEST};
 use super::character::{Character, SPELL};
-use super::gaps::{Bridge, Reach, bridge_gaps};
+use super::gaps::{Bridge, BridgedGaps, bridge_gaps};
 use super::repeats::long_runs;
 use super::spell_characters::Characters;
 use super::spikes;
@@ -42,7 +42,7 @@ pub struct Conditioner {
     /// Conversion of the recorder's numbers to the signal's unit.
     conversion: Conversion,
     is_flag: bool,
-    reach: Reach,
+    reach: BridgedGaps,
     unwrapper: Option<Unwrapper>,
     /// Converted values from sample `first` on.
     values: Vec<f64>,
@@ -73,7 +73,7 @@ impl Conditioner {
                 ..conversion
             },
             is_flag: channel.unit == FLAG_UNIT,
-            reach: Reach::of(&channel.signal, settings.longest_bridge_s, step_s),
+            reach: BridgedGaps::of(&channel.signal, settings.longest_bridge_s, step_s),
             unwrapper: Unwrapper::of(channel, step_s, LONGEST_PERIOD, settings),
             values: Vec::new(),
             first: 0,
