@@ -117,7 +117,7 @@ pub fn of_differences(information: &Information, unknowns: &Unknowns) -> Option<
 /// Differences of rows that were left out from their prediction by the other rows, with the
 /// covariance of these differences.
 #[derive(Clone, Debug)]
-pub struct LeftOut {
+pub struct LeaveOneOutDifference {
     pub differences: DVector<f64>,
     pub covariance: DMatrix<f64>,
 }
@@ -159,17 +159,17 @@ impl LeavingOut {
 
     /// Difference of all rows of the flight from their prediction by the other flights.
     #[must_use]
-    pub fn flight(&self) -> Option<LeftOut> {
+    pub fn flight(&self) -> Option<LeaveOneOutDifference> {
         self.rows(&(0..self.weighted.len()))
     }
 
     /// Difference of some rows from their prediction by all other rows.
     #[must_use]
-    pub fn rows(&self, rows: &Range<usize>) -> Option<LeftOut> {
+    pub fn rows(&self, rows: &Range<usize>) -> Option<LeaveOneOutDifference> {
         let own = (rows.start, rows.start);
         let own = self.precision.view(own, (rows.len(), rows.len()));
         let covariance = Cholesky::new(own.into_owned())?.inverse();
-        Some(LeftOut {
+        Some(LeaveOneOutDifference {
             differences: &covariance * self.weighted.rows_range(rows.clone()),
             covariance,
         })

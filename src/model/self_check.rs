@@ -4,7 +4,7 @@
 use nalgebra::{Cholesky, DVector};
 
 use super::flight_data::FlightData;
-use super::posterior::{Gaussian, LeavingOut, LeftOut, SolvedPosterior, information};
+use super::posterior::{Gaussian, LeaveOneOutDifference, LeavingOut, SolvedPosterior, information};
 use crate::numerics::normal::NORMAL_95;
 use crate::numerics::root::BlockRoot;
 
@@ -27,7 +27,7 @@ impl std::ops::AddAssign for Agreement {
     }
 }
 
-impl LeftOut {
+impl LeaveOneOutDifference {
     /// Agreement of the rows with their joint prediction.
     #[must_use]
     pub fn agreement(&self) -> Agreement {
@@ -78,7 +78,7 @@ pub fn maneuvers(
         let (predicted, predicted_covariance) = rest.image(&own, &sums);
         let differences: DVector<f64> = &own.differences - predicted;
         let covariance = predicted_covariance + own.covariance(weights);
-        let prediction = LeftOut {
+        let prediction = LeaveOneOutDifference {
             differences,
             covariance,
         };
