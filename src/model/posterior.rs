@@ -137,21 +137,25 @@ pub struct LeaveOneOutDifference {
 /// Σ⁻¹ − Σ⁻¹ F Σ⁻¹ and the value V Σ⁻¹ r. If only some of its rows are left out, their blocks of
 /// V⁻¹ and Σ⁻¹ r replace the whole ones.
 #[derive(Clone, Debug)]
-pub struct LeavingOut {
+pub struct LeaveOneOut {
     /// Precision V⁻¹.
     precision: DMatrix<f64>,
     /// Weighted residual Σ⁻¹ r.
     weighted: DVector<f64>,
 }
 
-impl LeavingOut {
+impl LeaveOneOut {
     /// Prepares the predictions for a flight; `None` unless its covariances are positive definite.
     #[must_use]
-    pub fn new(flight: &FlightData, weights: &[f64], all_flights: &Gaussian) -> Option<LeavingOut> {
+    pub fn new(
+        flight: &FlightData,
+        weights: &[f64],
+        all_flights: &Gaussian,
+    ) -> Option<LeaveOneOut> {
         let (predicted, predicted_covariance) =
             flight.image(&all_flights.mean, &all_flights.covariance);
         let inverse = flight.cholesky(weights)?.inverse();
-        Some(LeavingOut {
+        Some(LeaveOneOut {
             precision: &inverse - &inverse * predicted_covariance * &inverse,
             weighted: inverse * (&flight.differences - predicted),
         })
@@ -191,7 +195,7 @@ pub fn reweighted(
 ) -> Vec<f64> {
     let mut next = weights.to_vec();
     for flight in flights {
-        let Some(leaving_out) = LeavingOut::new(flight, weights, all_flights) else {
+        let Some(leaving_out) = LeaveOneOut::new(flight, weights, all_flights) else {
             continue;
         };
         for (i, (place, rows)) in flight.maneuvers.iter().enumerate() {

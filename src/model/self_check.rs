@@ -4,7 +4,9 @@
 use nalgebra::{Cholesky, DVector};
 
 use super::flight_data::FlightData;
-use super::posterior::{Gaussian, LeaveOneOutDifference, LeavingOut, SolvedPosterior, information};
+use super::posterior::{
+    Gaussian, LeaveOneOut, LeaveOneOutDifference, SolvedPosterior, information,
+};
 use crate::numerics::normal::NORMAL_95;
 use crate::numerics::root::BlockRoot;
 
@@ -51,7 +53,7 @@ impl LeaveOneOutDifference {
 /// Agreement of a flight with the other flights.
 #[must_use]
 pub fn flight(data: &FlightData, weights: &[f64], all_flights: &Gaussian) -> Option<Agreement> {
-    let left_out = LeavingOut::new(data, weights, all_flights)?.flight()?;
+    let left_out = LeaveOneOut::new(data, weights, all_flights)?.flight()?;
     Some(left_out.agreement())
 }
 

@@ -10,7 +10,7 @@ use crate::maneuver::Maneuver;
 use crate::model::coefficient::Data;
 use crate::model::observed_differences::ObservedDifferences;
 use crate::model::open_scales::add_open_scales;
-use crate::model::posterior::{LeavingOut, gaussian, information, of_differences};
+use crate::model::posterior::{LeaveOneOut, gaussian, information, of_differences};
 use crate::model::scale_prior::Scale;
 use crate::model::scales::{logarithms_of, most_probable, negative_log_posterior, scales_of};
 use crate::model::term::{PosteriorTerm, TermSources};
@@ -301,7 +301,7 @@ fn what_is_left_out_is_predicted_as_if_it_had_not_been_there() {
         &information(&data.flights, &weights, data.unknowns.count),
     )
     .unwrap();
-    let leaving_out = LeavingOut::new(&data.flights[1], &weights, &whole).unwrap();
+    let leaving_out = LeaveOneOut::new(&data.flights[1], &weights, &whole).unwrap();
     let left = leaving_out.flight().unwrap();
     // The flight: the others are fitted anew.
     let mut others = data.flights.clone();
