@@ -41,7 +41,7 @@ pub struct Outcome {
     pub relations: RelationResult,
     pub findings: Findings,
     /// Channels that the stretch does without.
-    pub left_out: Vec<LeftOut>,
+    pub left_out: Vec<ExcludedChannel>,
     /// Stand-ins of the signals that the stretch lacks, with those of the channels that are left out, and
     /// in gaps of others.
     pub completion: Completion,
@@ -63,7 +63,7 @@ impl Outcome {
 
 /// A channel that is wrong, and that the stretch does without.
 #[derive(Clone)]
-pub struct LeftOut {
+pub struct ExcludedChannel {
     signal: String,
     /// Verdict for the table `channels`.
     verdict: String,
@@ -167,7 +167,7 @@ impl Examination<'_> {
     /// Examines the stretch without some channels. `checks` are those with these channels.
     fn examine_without(
         &self,
-        left_out: Vec<LeftOut>,
+        left_out: Vec<ExcludedChannel>,
         blocks: &BlockMeans,
         checks: Vec<Check>,
     ) -> Outcome {
@@ -205,7 +205,7 @@ impl Examination<'_> {
     }
 
     /// Channels in no relation whose values cannot be used, to be left out.
-    fn unusable_outside_relations(&self, blocks: &BlockMeans) -> Vec<LeftOut> {
+    fn unusable_outside_relations(&self, blocks: &BlockMeans) -> Vec<ExcludedChannel> {
         let temperature =
             unusable_temperature(blocks).map(|reason| (signal::AIR_TEMPERATURE, reason));
         let engines = ENGINE_SIGNALS.iter();
@@ -255,7 +255,7 @@ impl Examination<'_> {
     }
 
     /// Faulty channels that the stretch can do without, to be left out.
-    fn dispensable_faults(&self, relations: &RelationResult) -> Vec<LeftOut> {
+    fn dispensable_faults(&self, relations: &RelationResult) -> Vec<ExcludedChannel> {
         let report = relations.report.as_ref();
         let reason = report.map_or_else(String::new, |report| report.reason.clone());
         let leave_out = |fault: &FaultyChannel| {
@@ -267,7 +267,7 @@ impl Examination<'_> {
     }
 
     /// Channels whose values no error of an instrument explains and that the stretch can do without.
-    fn inexplicable(&self, findings: &Findings) -> Vec<LeftOut> {
+    fn inexplicable(&self, findings: &Findings) -> Vec<ExcludedChannel> {
         let inexplicable = findings.inexplicable();
         let dispensable = inexplicable.filter(|(name, _)| self.can_do_without(name));
         let left_out = dispensable.map(|(name, fault)| self.leave_out_for(name, fault));
@@ -275,19 +275,19 @@ impl Examination<'_> {
     }
 
     /// A channel that is left out for a reason that is also its verdict.
-    fn leave_out_for(&self, name: &str, reason: String) -> LeftOut {
+    fn leave_out_for(&self, name: &str, reason: String) -> ExcludedChannel {
         let verdict = reason.clone();
         self.leave_out(name, verdict, self.context.refusal(name, reason))
     }
 
     /// A channel that is left out, with its stand-in and the cost.
-    fn leave_out(&self, name: &str, verdict: String, refusal: Refusal) -> LeftOut {
+    fn leave_out(&self, name: &str, verdict: String, refusal: Refusal) -> ExcludedChannel {
         let stand_ins = self.without(&|other| other == name).completion.stand_ins;
         let refusal = Refusal {
             reason: format!("{}. The channel is left out", refusal.reason),
             ..refusal
         };
-        LeftOut {
+        ExcludedChannel {
             signal: name.to_owned(),
             verdict,
             refusal: refusal.with_stand_in(name, &stand_ins),
