@@ -175,7 +175,7 @@ table! {
 
 table! {
     /// Excitation that fits no class.
-    pub struct Unknown in "unknown" per "excitation that fits no class" {
+    pub struct UnclassifiedExcitation in "unknown" per "excitation that fits no class" {
         /// Flight, or stretch of a flight.
         pub flight_id: String,
         /// Time of the first step.

@@ -3,7 +3,7 @@
 use crate::aircraft::Aircraft;
 use crate::error::did_you_mean;
 use crate::flight::Record;
-use crate::maneuver::{Class, Event, Maneuver, Unknown};
+use crate::maneuver::{Class, Event, Maneuver, UnclassifiedExcitation};
 use crate::tables::{EventRow, EventVerdict};
 
 use super::segmented::Segmented;
@@ -59,7 +59,7 @@ pub fn with_events(
             Err(reason) => problems.push(problems::at_time(record, event.start_s, reason)),
         }
     }
-    let is_explained = |u: &Unknown| given.iter().any(|g| explains(g, u));
+    let is_explained = |u: &UnclassifiedExcitation| given.iter().any(|g| explains(g, u));
     let (explained, unknown) = unknown.into_iter().partition::<Vec<_>, _>(is_explained);
     let explained = problems::of_unknown(record, &explained);
     problems.retain(|problem| !explained.contains(problem));
@@ -125,7 +125,7 @@ fn replaces(given: &Maneuver, found: &Maneuver, step_s: f64) -> bool {
 }
 
 /// `true` if the analyst's maneuver covers more than half of an excitation that fits no class.
-fn explains(given: &Maneuver, unknown: &Unknown) -> bool {
+fn explains(given: &Maneuver, unknown: &UnclassifiedExcitation) -> bool {
     let lasting_s = unknown.end_s - unknown.start_s;
     overlap_s(given, unknown.start_s, unknown.end_s) > REPLACING_SHARE * lasting_s
 }

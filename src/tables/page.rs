@@ -12,7 +12,7 @@ use super::{
 };
 use crate::aero::DerivativeUnit;
 use crate::error::Problem;
-use crate::maneuver::{Maneuver, Unknown};
+use crate::maneuver::{Maneuver, UnclassifiedExcitation};
 use crate::schema::{Cells, Column, Entry, Row, Table, Words, one_line};
 
 const HEAD: &str = "\
@@ -62,7 +62,7 @@ pub fn page() -> String {
     page.push_str("\nUnits of derivatives and biases in the column `unit`:\n\n");
     words(&mut page, DerivativeUnit::ENTRIES);
     table::<Maneuver>(&mut page);
-    table::<Unknown>(&mut page);
+    table::<UnclassifiedExcitation>(&mut page);
     let mut columns = FitRow::columns(&[]);
     columns.extend(PredictedRow::columns(&[]));
     section(&mut page, FitRow::NAME, FitRow::PER, FitRow::MEANING);
@@ -195,7 +195,7 @@ mod tests {
     #[test]
     fn every_number_has_a_unit_or_a_column_with_its_unit() {
         assert_units::<Maneuver>();
-        assert_units::<Unknown>();
+        assert_units::<UnclassifiedExcitation>();
         assert_units::<FitRow>();
         assert_units::<CorrelationRow>();
         assert_units::<JointRow>();

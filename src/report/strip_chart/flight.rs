@@ -7,7 +7,7 @@ use super::signal_strips::{
 };
 use crate::error::Problem;
 use crate::flight::{Record, signal};
-use crate::maneuver::{Maneuver, Unknown};
+use crate::maneuver::{Maneuver, UnclassifiedExcitation};
 use crate::report::figure::annotated_chart::{
     self, Chart, LABEL_PITCH, Lane, LaneBox, ShadedManeuver,
 };
@@ -26,7 +26,7 @@ pub struct FlightView<'a> {
     pub groups: &'a SignalGroups,
     pub maneuvers: &'a [Maneuver],
     /// Excitation that fits no class.
-    pub unknown: &'a [Unknown],
+    pub unknown: &'a [UnclassifiedExcitation],
     /// The analyst's events against the recognised maneuvers; empty without a list.
     pub events: &'a [EventRow],
     pub problems: &'a [Problem],

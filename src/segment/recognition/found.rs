@@ -1,6 +1,6 @@
 //! Results of recognition: maneuvers found, and excitation that fits no class.
 
-use crate::maneuver::{Class, Recognised, Unknown};
+use crate::maneuver::{Class, Recognised, UnclassifiedExcitation};
 
 /// A maneuver's class and the times of its first and last input, s on the record's clock.
 #[derive(Clone, Debug)]
@@ -31,7 +31,7 @@ impl FoundManeuver<'_> {
 #[derive(Clone, Debug, Default)]
 pub(in crate::segment) struct Recognition<'a> {
     pub found: Vec<FoundManeuver<'a>>,
-    pub unknown: Vec<Unknown>,
+    pub unknown: Vec<UnclassifiedExcitation>,
 }
 
 impl<'a> Recognition<'a> {

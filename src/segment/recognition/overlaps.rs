@@ -3,7 +3,7 @@
 
 use super::detections::Detections;
 use super::found::{FoundManeuver, Recognition};
-use crate::maneuver::Unknown;
+use crate::maneuver::UnclassifiedExcitation;
 
 /// A candidate with the reason for which it would be rejected.
 struct Candidate<'a> {
@@ -42,7 +42,7 @@ pub(in crate::segment) fn without_overlaps<'a>(
         accepted.then(longer)
     });
     let mut found: Vec<FoundManeuver> = Vec::new();
-    let mut displaced: Vec<Unknown> = Vec::new();
+    let mut displaced: Vec<UnclassifiedExcitation> = Vec::new();
     for candidate in candidates {
         match found.iter().find(|other| overlap(&candidate.found, other)) {
             None => found.push(candidate.found),
@@ -62,9 +62,12 @@ fn overlap(a: &FoundManeuver, b: &FoundManeuver) -> bool {
 }
 
 /// Excitation of no class apart from maneuvers and from longer excitation of no class.
-fn apart(mut all: Vec<Unknown>, found: &[FoundManeuver]) -> Vec<Unknown> {
+fn apart(
+    mut all: Vec<UnclassifiedExcitation>,
+    found: &[FoundManeuver],
+) -> Vec<UnclassifiedExcitation> {
     all.sort_by(|a, b| (b.end_s - b.start_s).total_cmp(&(a.end_s - a.start_s)));
-    let mut unknown: Vec<Unknown> = Vec::new();
+    let mut unknown: Vec<UnclassifiedExcitation> = Vec::new();
     for u in all {
         let overlaps = |from_s: f64, to_s: f64| u.start_s <= to_s && u.end_s >= from_s;
         if !found.iter().any(|f| overlaps(f.first_s, f.last_s))
@@ -78,7 +81,11 @@ fn apart(mut all: Vec<Unknown>, found: &[FoundManeuver]) -> Vec<Unknown> {
 
 impl Candidate<'_> {
     /// Row of a candidate that a maneuver displaces; `None` if the maneuver explains its inputs.
-    fn displaced(&self, detections: &Detections, maneuver: &FoundManeuver) -> Option<Unknown> {
+    fn displaced(
+        &self,
+        detections: &Detections,
+        maneuver: &FoundManeuver,
+    ) -> Option<UnclassifiedExcitation> {
         let FoundManeuver {
             class,
             first_s,
@@ -90,7 +97,7 @@ impl Candidate<'_> {
         }
         let rejected = self.rejection.as_ref();
         let rejected = rejected.map_or_else(String::new, |reason| format!("; {reason}"));
-        Some(Unknown {
+        Some(UnclassifiedExcitation {
             flight_id: detections.record.flight_id.clone(),
             start_s: first_s,
             end_s: last_s,

@@ -9,7 +9,7 @@ use super::segment::Segment;
 use super::sequences::{Source, StepSequence, sequences};
 use super::sweeps::find_sweeps;
 use super::unclassified::{ambiguous, unexplained};
-use crate::maneuver::{Class, Unknown};
+use crate::maneuver::{Class, UnclassifiedExcitation};
 use crate::segment::steps::step::Step;
 
 /// Difference of confidence below which two classes fit alike: less than the weight of a flag that
@@ -91,7 +91,7 @@ fn recognise_sequence<'a>(
 enum Classified<'a> {
     Found(FoundManeuver<'a>),
     /// Several classes fit alike.
-    Ambiguous(Unknown),
+    Ambiguous(UnclassifiedExcitation),
     None,
 }
 

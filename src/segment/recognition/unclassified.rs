@@ -8,7 +8,7 @@ use super::detections::Detections;
 use super::found::Recognition;
 use super::mismatch::Mismatch;
 use super::segment::Segment;
-use crate::maneuver::{Class, Unknown};
+use crate::maneuver::{Class, UnclassifiedExcitation};
 use crate::segment::steps::detection::{is_maneuver_alone, largest_change};
 
 /// Least number of steps of pilot controls that are more than ordinary flying: four reversals.
@@ -23,7 +23,10 @@ const CUT_AT_START_S: f64 = 1.0;
 /// and back. Ordinary flying moves the controls too. Two cases are not reported: a few steps of the
 /// pilot, and steps among which no class has one of its inputs complete. In a recording that may be
 /// one maneuver everything is reported.
-pub(super) fn unexplained(search: &CutSearch, steps: (usize, usize)) -> Option<Unknown> {
+pub(super) fn unexplained(
+    search: &CutSearch,
+    steps: (usize, usize),
+) -> Option<UnclassifiedExcitation> {
     let segment = search.segment(steps);
     let nearest = search
         .classes
@@ -57,7 +60,7 @@ pub(super) fn unexplained(search: &CutSearch, steps: (usize, usize)) -> Option<U
 pub(in crate::segment) fn nothing_found(
     detections: &Detections,
     recognition: &Recognition,
-) -> Option<Unknown> {
+) -> Option<UnclassifiedExcitation> {
     let record = detections.record;
     let is_empty = recognition.found.is_empty() && recognition.unknown.is_empty();
     if !is_empty || !is_maneuver_alone(record) {
@@ -75,7 +78,7 @@ pub(in crate::segment) fn nothing_found(
     };
     let changes = detections.settings.steps.iter().filter_map(change);
     let changes: Vec<String> = changes.collect();
-    Some(Unknown {
+    Some(UnclassifiedExcitation {
         flight_id: record.flight_id.clone(),
         start_s,
         end_s,
@@ -90,7 +93,11 @@ pub(in crate::segment) fn nothing_found(
 }
 
 /// Reports a segment that fits several classes alike.
-pub(super) fn ambiguous(search: &CutSearch, segment: &Segment, names: String) -> Unknown {
+pub(super) fn ambiguous(
+    search: &CutSearch,
+    segment: &Segment,
+    names: String,
+) -> UnclassifiedExcitation {
     let reason = format!("fits {names} alike; make their recognition exclude each other");
     unknown(search, segment, names, reason)
 }
@@ -107,7 +114,7 @@ fn unknown(
     segment: &Segment,
     nearest_class: String,
     reason: String,
-) -> Unknown {
+) -> UnclassifiedExcitation {
     let counted = search
         .classes
         .iter()
@@ -115,7 +122,7 @@ fn unknown(
         .map(String::as_str);
     let own = search.sequence.steps.iter().map(|step| step.signal);
     let counted = counted.chain(own.filter(|_| search.classes.is_empty()));
-    Unknown {
+    UnclassifiedExcitation {
         flight_id: segment.detections.record.flight_id.clone(),
         start_s: segment.from_s,
         end_s: segment.to_s,
