@@ -57,7 +57,7 @@ impl AeroModel {
     }
 
     /// Derivatives along the rate of the angle of attack.
-    pub fn lags(&self) -> impl Iterator<Item = &Derivative> {
+    pub fn along_alpha_rate(&self) -> impl Iterator<Item = &Derivative> {
         let derivatives = self.derivatives.iter();
         derivatives.filter(|d| d.regressor.has_alpha_rate())
     }
@@ -65,7 +65,7 @@ impl AeroModel {
     /// Sentence on what a derivative along `alpha_dot` can mean; `None` without one.
     #[must_use]
     pub fn lag_warning(&self) -> Option<String> {
-        let names: Vec<&str> = self.lags().map(|d| d.name.as_str()).collect();
+        let names: Vec<&str> = self.along_alpha_rate().map(|d| d.name.as_str()).collect();
         (!names.is_empty()).then(|| {
             format!(
                 "{}: a constant along `alpha_dot` stands for a lag of the flow and is right for slow motion alone; flight shows the sum \

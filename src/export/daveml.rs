@@ -173,8 +173,8 @@ fn inputs(contents: &ExportContents, tables: &[ExportTable], xml: &mut Xml) {
             VariableRole::Input,
         );
     }
-    let has_lag = contents.aero_model.lags().next().is_some();
-    let is_used = |rate: &Regressor| *rate != Regressor::AlphaRate || has_lag;
+    let has_alpha_rate = contents.aero_model.along_alpha_rate().next().is_some();
+    let is_used = |rate: &Regressor| *rate != Regressor::AlphaRate || has_alpha_rate;
     for (_, id, words) in RATES.iter().filter(|(rate, ..)| is_used(rate)) {
         variable(xml, id, id, "rad", words, VariableRole::Input);
     }

@@ -119,7 +119,7 @@ pub struct Aerodynamics<'a> {
     aircraft: &'a Aircraft,
     /// Coefficient and factor of each derivative, in the order of the build-up.
     terms: Vec<(usize, Factor)>,
-    has_lag: bool,
+    has_alpha_rate: bool,
     pub table: DerivativeTable,
 }
 
@@ -152,7 +152,7 @@ impl<'a> Aerodynamics<'a> {
         Aerodynamics {
             aircraft,
             terms: derivatives.map(term).collect(),
-            has_lag: aero_model.lags().next().is_some(),
+            has_alpha_rate: aero_model.along_alpha_rate().next().is_some(),
             table,
         }
     }
@@ -217,7 +217,7 @@ pub struct TrimmedAerodynamics<'a> {
     factors: Vec<&'a Factor>,
     /// Values of the factors at the present instant.
     values: Vec<f64>,
-    has_lag: bool,
+    has_alpha_rate: bool,
     trim_alpha_deg: f64,
 }
 
@@ -264,7 +264,7 @@ impl<'a> TrimmedAerodynamics<'a> {
             table,
             terms,
             values: vec![0.0; factors.len()],
-            has_lag: aerodynamics.has_lag,
+            has_alpha_rate: aerodynamics.has_alpha_rate,
             factors,
             trim_alpha_deg: trim.alpha_deg,
         }
@@ -272,8 +272,8 @@ impl<'a> TrimmedAerodynamics<'a> {
 
     /// `true` if the coefficients depend on the rate of the angle of attack.
     #[must_use]
-    pub fn have_lag(&self) -> bool {
-        self.has_lag
+    pub fn have_alpha_rate(&self) -> bool {
+        self.has_alpha_rate
     }
 
     /// Change of the coefficients from the trim.

@@ -226,7 +226,7 @@ pub struct RunEquations<'a> {
 impl RunEquations<'_> {
     /// Motion at a state and a point of the recording.
     fn instant(&mut self, state: &BodyState, point: usize) -> Instant {
-        if !self.aerodynamics.have_lag() {
+        if !self.aerodynamics.have_alpha_rate() {
             return self.instant_at(0.0, state, point);
         }
         let implied = |alpha_rate: f64| {
@@ -240,9 +240,9 @@ impl RunEquations<'_> {
     /// Slopes of the loads at an instant, and slope of each derivative's coefficient along the
     /// derivative.
     pub fn load_slopes(&mut self, instant: &Instant, point: usize) -> (LoadSlopes, Vec<f64>) {
-        let has_lag = self.aerodynamics.have_lag();
+        let has_alpha_rate = self.aerodynamics.have_alpha_rate();
         let state = &instant.state;
-        let alpha_rate = if has_lag {
+        let alpha_rate = if has_alpha_rate {
             AirData::alpha_rate(&state.velocity, &instant.rate.velocity)
         } else {
             0.0
@@ -255,7 +255,7 @@ impl RunEquations<'_> {
             instant,
             &self.coefficients(slopes.change),
             slopes.by_flow,
-            has_lag,
+            has_alpha_rate,
         );
         (loads, slopes.by_derivative)
     }

@@ -31,12 +31,12 @@ pub struct LoadSlopes {
     /// Slope of each component of force and moment along its coefficient.
     force_by_own: [f64; 3],
     moment_by_own: [f64; 3],
-    lag: Option<Lag>,
+    alpha_rate: Option<AlphaRateTerm>,
 }
 
 /// Slopes of α̇ where the loads depend on α̇, so that its equation is implicit.
 #[derive(Clone, Copy, Debug)]
-struct Lag {
+struct AlphaRateTerm {
     by_velocity: [f64; 3],
     /// Along the accelerations at a constant α̇.
     by_acceleration: [f64; 3],
@@ -53,7 +53,7 @@ impl LoadSlopes {
         instant: &Instant,
         coefficients: &[f64; COEFFICIENTS],
         mut by_flow: [FlowSlopes; COEFFICIENTS],
-        has_lag: bool,
+        has_alpha_rate: bool,
     ) -> LoadSlopes {
         let qbar = instant.air.qbar_psf;
         let area = qbar * aerodynamics.area();
@@ -69,15 +69,15 @@ impl LoadSlopes {
             moment: moment.into(),
             force_by_own: FORCE.map(|(_, sign)| sign * area),
             moment_by_own: aerodynamics.lengths().map(|length| length * area),
-            lag: None,
+            alpha_rate: None,
         };
-        slopes.lag = has_lag.then(|| slopes.lag(instant));
+        slopes.alpha_rate = has_alpha_rate.then(|| slopes.alpha_rate_term(instant));
         slopes
     }
 
     /// Slopes of α̇ = (u ẇ − w u̇)/(u² + w²), with u and w the velocities along body x and z. u̇
     /// and ẇ are linear in α̇.
-    fn lag(&self, instant: &Instant) -> Lag {
+    fn alpha_rate_term(&self, instant: &Instant) -> AlphaRateTerm {
         let along = |i: usize| self.coefficients[i][AeroInputs::ALPHA_RATE];
         let force: [f64; 3] = from_fn(|i| self.force_by_own[i] * along(FORCE[i].0));
         let moment = from_fn(|i| self.moment_by_own[i] * along(MOMENT[i]));
@@ -87,7 +87,7 @@ impl LoadSlopes {
         let alpha_rate = (u * w_rate - w * u_rate) * per_square;
         let own = (u * force[2] - w * force[0]) * per_square / instant.loading.mass_slug;
         let per_balance = per_square / (1.0 - own);
-        Lag {
+        AlphaRateTerm {
             by_velocity: [
                 (w_rate - 2.0 * alpha_rate * u) * per_balance,
                 0.0,
@@ -134,13 +134,13 @@ impl LoadSlopes {
                 },
             ),
         };
-        if let Some(lag) = &self.lag {
+        if let Some(term) = &self.alpha_rate {
             let rate = body.change(state, &loads.force, &loads.moment);
-            let alpha_rate = combination(&lag.by_velocity, &state.velocity())
-                + combination(&lag.by_acceleration, &rate.velocity());
+            let alpha_rate = combination(&term.by_velocity, &state.velocity())
+                + combination(&term.by_acceleration, &rate.velocity());
             for i in 0..3 {
-                loads.force[i] = loads.force[i].plus(lag.force[i], alpha_rate);
-                loads.moment[i] = loads.moment[i].plus(lag.moment[i], alpha_rate);
+                loads.force[i] = loads.force[i].plus(term.force[i], alpha_rate);
+                loads.moment[i] = loads.moment[i].plus(term.moment[i], alpha_rate);
             }
         }
         loads

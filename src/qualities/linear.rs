@@ -29,14 +29,14 @@ pub struct LinearModel {
     pub slopes: Vec<Matrix>,
     pub control_slopes: Vec<Vector>,
     /// `None` if no derivative is along α̇.
-    pub lag: Option<Lag>,
+    pub alpha_rate: Option<AlphaRateTerm>,
     pub velocity: f64,
     pub gravity: f64,
 }
 
 /// Effect of α̇ on the rates of the states.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Lag {
+pub struct AlphaRateTerm {
     /// Index of α among the states.
     pub alpha: usize,
     /// Slopes of m along each value of the posterior.
@@ -72,16 +72,16 @@ impl LinearModel {
             slopes: self.slopes[..count].to_vec(),
             control_slopes: self.control_slopes[..count].to_vec(),
         };
-        match &self.lag {
+        match &self.alpha_rate {
             None => explicit,
-            Some(lag) => lag.solved(&explicit, values),
+            Some(term) => term.solved(&explicit, values),
         }
     }
 }
 
-impl Lag {
-    /// Solves the equations with a lag for the rates. Let e be the unit vector of α and I the
-    /// identity. Then ẋ = (I − m eᵀ)⁻¹ (A x + B u), and the inverse is I + m eᵀ/(1 − eᵀm). The
+impl AlphaRateTerm {
+    /// Solves the equations with a term along α̇ for the rates. Let e be the unit vector of α and I
+    /// the identity. Then ẋ = (I − m eᵀ)⁻¹ (A x + B u), and the inverse is I + m eᵀ/(1 − eᵀm). The
     /// slopes follow from the slopes of (I − m eᵀ) A.
     fn solved(&self, explicit: &SolvedEquations, values: &DVector<f64>) -> SolvedEquations {
         let effect = weighted_sum(&self.slopes, values);
@@ -92,9 +92,11 @@ impl Lag {
         let control = solve_vector(explicit.control);
         let of_matrix = explicit.slopes.iter().zip(&self.slopes);
         let of_control = explicit.control_slopes.iter().zip(&self.slopes);
-        let slope = |(own, lag): (&Matrix, &Vector)| solve(own + lag * matrix.row(self.alpha));
-        let control_slope =
-            |(own, lag): (&Vector, &Vector)| solve_vector(own + lag * control[self.alpha]);
+        let slope =
+            |(slope, effect): (&Matrix, &Vector)| solve(slope + effect * matrix.row(self.alpha));
+        let control_slope = |(slope, effect): (&Vector, &Vector)| {
+            solve_vector(slope + effect * control[self.alpha])
+        };
         SolvedEquations {
             matrix,
             control,

@@ -70,7 +70,7 @@ fn estimate(config: &Config, source: &Source) -> Result<()> {
                     maneuvers that share derivatives must hold the same";
         return Err(source.error_under("estimate", "joint", what));
     }
-    if config.aero_model.lags().next().is_some() && settings.hold == Hold::Evidence {
+    if config.aero_model.along_alpha_rate().next().is_some() && settings.hold == Hold::Evidence {
         let what = "`hold: evidence` frees derivatives along `alpha_dot`, which must stay held: `hold: table` holds them";
         return Err(source.error_under("estimate", "hold", what));
     }

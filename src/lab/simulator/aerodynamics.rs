@@ -114,7 +114,7 @@ impl Aerodynamics {
     /// `true` if the loads depend on the rate of the angle of attack.
     #[must_use]
     pub fn have_lag(&self) -> bool {
-        self.aero_model.lags().next().is_some()
+        self.aero_model.along_alpha_rate().next().is_some()
     }
 
     /// Force, lbf, and moment about the c.g., ft lbf, in body axes, at rates relative to the air, and at a

@@ -10,7 +10,8 @@ use crate::aero::{AeroModel, Axis, Coefficient, Derivative, Regressor};
 use crate::aircraft::{Aircraft, ThrustLine};
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
 use crate::qualities::linear::{
-    AxisStates, Controls, Differentiation, Effect, Lag, LinearModel, Matrix, SteadyFlight, Vector,
+    AlphaRateTerm, AxisStates, Controls, Differentiation, Effect, LinearModel, Matrix,
+    SteadyFlight, Vector,
 };
 use crate::tables::FlyingQuality;
 use crate::units::DEG;
@@ -251,7 +252,7 @@ fn equations_with_a_lag_are_solved_with_their_slopes() {
     };
     let alpha = 1;
     let with_lag = LinearModel {
-        lag: Some(Lag {
+        alpha_rate: Some(AlphaRateTerm {
             alpha,
             slopes: (0..values.len()).map(effect).collect(),
         }),
