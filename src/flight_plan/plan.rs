@@ -10,7 +10,7 @@ use super::goals::Goal;
 use super::rehearsal::Rehearsed;
 use crate::aero::{AeroModel, Condition, WindTunnel};
 use crate::estimate::Covariance;
-use crate::model::{self, Evidence, Model, Outlook, OutlookPoint};
+use crate::model::{self, ManeuverResults, Model, Outlook, OutlookPoint};
 use crate::qualities::{self, FlownConditions};
 use crate::tables::{NextCardRow, NextGoalRow};
 
@@ -21,7 +21,7 @@ const NAMED_GOALS: usize = 3;
 #[derive(Clone, Copy, Debug)]
 pub struct CampaignState<'a> {
     pub model: &'a Model,
-    pub evidence: &'a [Evidence<'a>],
+    pub evidence: &'a [ManeuverResults<'a>],
     pub history: CampaignHistory<'a>,
     pub aero_model: &'a AeroModel,
     pub tunnel: &'a WindTunnel,
@@ -148,9 +148,9 @@ fn condition(state: &CampaignState, kept: &[KeptCard], alpha_deg: f64) -> Option
 fn outlooks(state: &CampaignState, kept: &[KeptCard], points: &[GoalPoint]) -> Vec<Outlook> {
     let covariances = covariances(state, kept);
     let planned = kept.iter().zip(&covariances);
-    let planned: Vec<Evidence> = planned
+    let planned: Vec<ManeuverResults> = planned
         .filter_map(|(KeptCard { rehearsed, .. }, covariance)| {
-            Some(Evidence {
+            Some(ManeuverResults {
                 maneuver: &rehearsed.maneuver,
                 estimates: &rehearsed.estimated.estimates,
                 combined: &rehearsed.estimated.combined,

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::evidence::Evidence;
+use super::evidence::ManeuverResults;
 use super::flight_data::{FlightData, Observed};
 use super::held_values::{HeldDifferences, TermsPosterior};
 use super::observation::Observation;
@@ -53,7 +53,7 @@ impl CoefficientPosterior {
     #[must_use]
     pub fn from_terms(
         terms: Vec<PosteriorTerm>,
-        evidence: &[Evidence],
+        evidence: &[ManeuverResults],
         basis: &TermSources,
     ) -> Option<CoefficientPosterior> {
         let mut data = Data::new(&terms, evidence, basis);
@@ -99,7 +99,7 @@ pub struct Data {
 impl Data {
     /// Collects the evidence about a coefficient's terms.
     #[must_use]
-    pub fn new(terms: &[PosteriorTerm], evidence: &[Evidence], basis: &TermSources) -> Data {
+    pub fn new(terms: &[PosteriorTerm], evidence: &[ManeuverResults], basis: &TermSources) -> Data {
         Data::with_planned(terms, evidence, &[], basis).0
     }
 
@@ -109,12 +109,12 @@ impl Data {
     #[must_use]
     pub fn with_planned(
         terms: &[PosteriorTerm],
-        evidence: &[Evidence],
-        planned: &[Evidence],
+        evidence: &[ManeuverResults],
+        planned: &[ManeuverResults],
         basis: &TermSources,
     ) -> (Data, Vec<Option<(usize, Observation)>>) {
         let mut classes: BTreeMap<String, usize> = BTreeMap::new();
-        let mut observe = |own: &Evidence| {
+        let mut observe = |own: &ManeuverResults| {
             let observation = own.about(terms, basis.tunnel)?;
             let next = classes.len();
             let class = classes.entry(own.maneuver.class.clone()).or_insert(next);
@@ -182,7 +182,7 @@ impl Data {
         &self,
         posterior: &TermsPosterior,
         weights: &[f64],
-        evidence: &[Evidence],
+        evidence: &[ManeuverResults],
         tunnel: &WindTunnel,
     ) -> BTreeMap<String, HeldDifferences> {
         let mut held = BTreeMap::new();
@@ -206,7 +206,7 @@ impl Data {
         scales: Vec<Scale>,
         weights: &[f64],
         gaussian: Gaussian,
-        evidence: &[Evidence],
+        evidence: &[ManeuverResults],
     ) -> CoefficientPosterior {
         let root = self.unknowns.root(&terms, &scales, CHECKED_VARIANCE);
         let checked = self.flight_ids.iter().zip(&self.flights);

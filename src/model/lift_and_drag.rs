@@ -21,7 +21,7 @@
 use nalgebra::{DMatrix, DVector, Matrix2, RowDVector};
 
 use super::campaign_model::Model;
-use super::evidence::Evidence;
+use super::evidence::ManeuverResults;
 use crate::aero::{AeroModel, Axis, Coefficient, Derivative, DerivativeUnit, Regressor};
 use crate::aircraft::Aircraft;
 use crate::maneuver::{Maneuver, Means, Status};
@@ -34,7 +34,7 @@ const TOTAL: &str = "total";
 /// Maneuver as it was flown, with its build-up.
 #[derive(Clone, Copy, Debug)]
 pub struct PublishedManeuver<'a> {
-    pub evidence: &'a Evidence<'a>,
+    pub evidence: &'a ManeuverResults<'a>,
     /// Rows of the estimates as they are published.
     pub estimates: &'a [EstimateRow],
     pub means: &'a Means,
@@ -239,7 +239,7 @@ impl PublishedManeuver<'_> {
 
 impl HeldErrors {
     /// Errors of the held values with the tunnel's uncertainty.
-    fn with_tunnel_uncertainty(evidence: &Evidence) -> HeldErrors {
+    fn with_tunnel_uncertainty(evidence: &ManeuverResults) -> HeldErrors {
         let effects: Vec<_> = evidence.held_effects().collect();
         let deviations = effects.iter().map(|(_, effect)| effect.deviation.powi(2));
         let variances = DVector::from_iterator(effects.len(), deviations);

@@ -46,7 +46,7 @@ use term::TermSources;
 
 pub use campaign_model::{Failure, MOST_POINTS, Model};
 pub use draws::CorrelatedDerivatives;
-pub use evidence::Evidence;
+pub use evidence::ManeuverResults;
 pub use lift_and_drag::PublishedManeuver;
 pub use local::{LocalKind, LocalPosterior, LocalValue};
 pub use outlook::{Outlook, OutlookPoint, PlannedRows, PointQuantity};
@@ -56,7 +56,7 @@ pub use settings::Settings;
 /// flights, is that of their ids.
 #[must_use]
 pub fn model(
-    evidence: &[Evidence],
+    evidence: &[ManeuverResults],
     aero_model: &AeroModel,
     tunnel: &WindTunnel,
     settings: &Settings,

@@ -14,7 +14,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::evidence::Evidence;
+use super::evidence::ManeuverResults;
 use super::term::PosteriorTerm;
 use crate::aero::{Condition, WindTunnel};
 use crate::maneuver::Status;
@@ -49,7 +49,7 @@ struct ObservationRow {
     difference: f64,
 }
 
-impl Evidence<'_> {
+impl ManeuverResults<'_> {
     /// Evidence about a coefficient's terms; `None` if the maneuver estimates none of them.
     #[must_use]
     pub fn about(&self, terms: &[PosteriorTerm], tunnel: &WindTunnel) -> Option<Observation> {

@@ -17,7 +17,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::campaign_model::Model;
 use super::coefficient::{CoefficientPosterior, Data};
-use super::evidence::{Evidence, in_order};
+use super::evidence::{ManeuverResults, in_order};
 use super::local::{LocalValue, local_shares};
 use super::observation::Observation;
 use super::posterior::{gaussian, information};
@@ -72,7 +72,7 @@ impl Model {
     #[must_use]
     pub fn outlook(
         &self,
-        (evidence, planned): (&[Evidence], &[Evidence]),
+        (evidence, planned): (&[ManeuverResults], &[ManeuverResults]),
         points: &[OutlookPoint],
         (aero_model, tunnel): (&AeroModel, &WindTunnel),
         settings: &Settings,
@@ -112,7 +112,7 @@ impl Model {
 impl CoefficientPosterior {
     fn outlook(
         &self,
-        (evidence, planned): (&[Evidence], &[Evidence]),
+        (evidence, planned): (&[ManeuverResults], &[ManeuverResults]),
         points: &[OutlookPoint],
         basis: &TermSources,
     ) -> Option<Outlook> {

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::coefficient::CoefficientPosterior;
-use super::evidence::Evidence;
+use super::evidence::ManeuverResults;
 use super::posterior::prior;
 use super::published::PublishedDerivative;
 use super::self_check::Agreement;
@@ -38,7 +38,11 @@ impl CoefficientTables {
 impl CoefficientPosterior {
     /// Rows of all tables.
     #[must_use]
-    pub fn rows(&self, coefficient: Coefficient, evidence: &[Evidence]) -> CoefficientTables {
+    pub fn rows(
+        &self,
+        coefficient: Coefficient,
+        evidence: &[ManeuverResults],
+    ) -> CoefficientTables {
         let alphas: Vec<f64> = evidence.iter().map(|e| e.maneuver.alpha_deg).collect();
         let quantities = self.quantities();
         let before = prior(&self.unknowns, &self.terms, &self.scales);
@@ -127,7 +131,7 @@ impl CoefficientPosterior {
     fn contributions(
         &self,
         coefficient: Coefficient,
-        evidence: &[Evidence],
+        evidence: &[ManeuverResults],
     ) -> Vec<ContributionRow> {
         let row = |(place, weight): (&usize, &f64)| {
             let maneuver = evidence[*place].maneuver;

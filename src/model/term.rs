@@ -6,7 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::evidence::Evidence;
+use super::evidence::ManeuverResults;
 use super::grid::{Grid, refined};
 use super::prior::{DerivativePrior, TableOnGrid};
 use super::scale_prior::Scale;
@@ -56,7 +56,11 @@ pub struct TermSources<'a> {
 impl TermSources<'_> {
     /// Terms of a coefficient, in the order of the model.
     #[must_use]
-    pub fn terms(&self, coefficient: Coefficient, evidence: &[Evidence]) -> Vec<PosteriorTerm> {
+    pub fn terms(
+        &self,
+        coefficient: Coefficient,
+        evidence: &[ManeuverResults],
+    ) -> Vec<PosteriorTerm> {
         let of_coefficient = |d: &&Derivative| d.coefficient == coefficient;
         let derivatives = self.aero_model.derivatives.iter().filter(of_coefficient);
         let alphas = self.alphas_deg(coefficient, evidence);
@@ -68,7 +72,7 @@ impl TermSources<'_> {
     /// Upper limit of the number of points of a coefficient's grids, found without making the
     /// grids.
     #[must_use]
-    pub fn count_points(&self, coefficient: Coefficient, evidence: &[Evidence]) -> usize {
+    pub fn count_points(&self, coefficient: Coefficient, evidence: &[ManeuverResults]) -> usize {
         let derivatives = self.aero_model.derivatives.iter();
         let alphas = self.alphas_deg(coefficient, evidence).len();
         derivatives
@@ -88,7 +92,7 @@ impl TermSources<'_> {
 
     /// Angles of attack of a coefficient's grids: the breakpoints of its tables, the flown range, and
     /// points between.
-    fn alphas_deg(&self, coefficient: Coefficient, evidence: &[Evidence]) -> Vec<f64> {
+    fn alphas_deg(&self, coefficient: Coefficient, evidence: &[ManeuverResults]) -> Vec<f64> {
         let names = self.aero_model.derivatives.iter();
         let names = names
             .filter(|d| d.coefficient == coefficient)
@@ -126,7 +130,7 @@ impl TermSources<'_> {
         &self,
         derivative: &Derivative,
         alphas: &[f64],
-        evidence: &[Evidence],
+        evidence: &[ManeuverResults],
     ) -> Option<PosteriorTerm> {
         let is_constant = derivative.regressor == Regressor::Constant;
         let sum = self.aero_model.combined.iter();
@@ -162,7 +166,12 @@ impl TermSources<'_> {
 
     /// Tunnel's table over a grid, and the centre of the difference's relative size. A derivative
     /// without table gets the order of magnitude of its estimates; `None` without estimates.
-    fn table(&self, name: &str, grid: &Grid, evidence: &[Evidence]) -> Option<(TableOnGrid, f64)> {
+    fn table(
+        &self,
+        name: &str,
+        grid: &Grid,
+        evidence: &[ManeuverResults],
+    ) -> Option<(TableOnGrid, f64)> {
         let read = |node: super::grid::Node| self.tunnel.at(name, &node.condition());
         let values: Option<Vec<_>> = grid.nodes().into_iter().map(read).collect();
         let size = self.tunnel.root_mean_square(name);

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::campaign_model::Model;
-use super::evidence::Evidence;
+use super::evidence::ManeuverResults;
 use super::held_values::HeldDifferences;
 use super::unknowns::{SparseRow, covariance_between, weighted_sum};
 use crate::aero::Combined;
@@ -22,7 +22,7 @@ use crate::tables::EstimateRow;
 /// other flights.
 #[derive(Clone, Debug)]
 pub struct WithHeld<'a> {
-    evidence: &'a Evidence<'a>,
+    evidence: &'a ManeuverResults<'a>,
     /// Differences of the held derivatives from the tunnel.
     held: BTreeMap<&'a str, f64>,
     /// Change of each estimated parameter due to the new held values.
@@ -35,7 +35,7 @@ impl Model {
     /// Change of a maneuver's results if the values that it holds are taken from the posterior of
     /// the other flights.
     #[must_use]
-    pub fn with_held<'a>(&'a self, evidence: &'a Evidence<'a>) -> WithHeld<'a> {
+    pub fn with_held<'a>(&'a self, evidence: &'a ManeuverResults<'a>) -> WithHeld<'a> {
         let parameters = evidence.covariance.names.len();
         let mut with = WithHeld {
             evidence,

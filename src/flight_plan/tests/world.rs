@@ -17,7 +17,7 @@ use crate::flight_plan::rehearsal::{RehearsalBasis, derivatives, instruments};
 use crate::lab::campaign::{FlightLimits, SimulatedCampaign, TestPoint, tunnel_rows};
 use crate::lab::simulator::{Instruments, Simulator};
 use crate::maneuver::Maneuver;
-use crate::model::{Evidence, Model, model};
+use crate::model::{ManeuverResults, Model, model};
 use crate::numerics::random::derived_seed;
 use crate::pipeline::estimate_maneuver;
 use crate::proof_of_match::of_posterior;
@@ -91,7 +91,7 @@ impl World {
         cards.par_iter().enumerate().map(fly).collect()
     }
 
-    pub fn model(&self, evidence: &[Evidence]) -> Model {
+    pub fn model(&self, evidence: &[ManeuverResults]) -> Model {
         let Config {
             aero_model,
             tunnel,
@@ -173,9 +173,9 @@ pub fn deviation(model: &Model, goal: &NextGoalRow) -> f64 {
     rows.find(is_there).unwrap().standard_deviation
 }
 
-pub fn evidence(flown: &[FlownCard]) -> Vec<Evidence<'_>> {
+pub fn evidence(flown: &[FlownCard]) -> Vec<ManeuverResults<'_>> {
     let own = flown.iter().filter_map(|(maneuver, estimated)| {
-        Some(Evidence {
+        Some(ManeuverResults {
             maneuver,
             estimates: &estimated.estimates,
             combined: &estimated.combined,

@@ -6,7 +6,7 @@ use crate::aero::wind_tunnel::TunnelPoint;
 use crate::aero::{AeroModel, Coefficient, Combined, Derivative, Regressor, WindTunnel};
 use crate::estimate::Covariance;
 use crate::maneuver::{Maneuver, Status};
-use crate::model::{Evidence, Model, Settings, model};
+use crate::model::{ManeuverResults, Model, Settings, model};
 use crate::output_error::error_effect::{ErrorEffect, SharedError};
 use crate::tables::EstimateRow;
 
@@ -114,8 +114,8 @@ impl Flown {
         self
     }
 
-    pub fn evidence(&self) -> Evidence<'_> {
-        Evidence {
+    pub fn evidence(&self) -> ManeuverResults<'_> {
+        ManeuverResults {
             maneuver: &self.maneuver,
             estimates: &self.estimates,
             combined: &self.combined,
@@ -141,7 +141,7 @@ pub fn exact() -> Settings {
 }
 
 pub fn posterior(flown: &[Flown], tunnel: &WindTunnel, settings: &Settings) -> Model {
-    let evidence: Vec<Evidence> = flown.iter().map(Flown::evidence).collect();
+    let evidence: Vec<ManeuverResults> = flown.iter().map(Flown::evidence).collect();
     model(&evidence, &aero_model(), tunnel, settings)
 }
 

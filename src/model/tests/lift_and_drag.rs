@@ -10,7 +10,7 @@ use crate::dynamics::tests::aircraft;
 use crate::estimate::Covariance;
 use crate::maneuver::{Maneuver, Means, Status};
 use crate::model::lift_and_drag::PublishedManeuver;
-use crate::model::{Evidence, Model};
+use crate::model::{ManeuverResults, Model};
 use crate::output_error::error_effect::{ErrorEffect, SharedError};
 use crate::tables::{EstimateRow, LiftAndDragRow};
 
@@ -71,7 +71,7 @@ fn rows(corrected: &DMatrix<f64>, effects: Vec<ErrorEffect>) -> Vec<LiftAndDragR
         corrected: corrected.as_slice().to_vec(),
         shared_errors: effects,
     };
-    let evidence = Evidence {
+    let evidence = ManeuverResults {
         maneuver: &maneuver,
         estimates: &estimates,
         combined: &[],

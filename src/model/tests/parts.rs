@@ -15,7 +15,7 @@ use crate::model::scale_prior::Scale;
 use crate::model::scales::{logarithms_of, most_probable, negative_log_posterior, scales_of};
 use crate::model::term::{PosteriorTerm, TermSources};
 use crate::model::unknowns::root_of_differences;
-use crate::model::{Evidence, Settings};
+use crate::model::{ManeuverResults, Settings};
 use crate::numerics::random::RandomStream;
 use crate::numerics::root::EXACT;
 use crate::output_error::error_effect::SharedError;
@@ -48,7 +48,7 @@ pub fn campaign() -> Vec<Flown> {
 
 /// Terms and data of a campaign.
 pub fn data(flown: &[Flown], settings: &Settings) -> (Vec<PosteriorTerm>, Data) {
-    let evidence: Vec<Evidence> = flown.iter().map(Flown::evidence).collect();
+    let evidence: Vec<ManeuverResults> = flown.iter().map(Flown::evidence).collect();
     let (aero_model, tunnel) = (aero_model(), tunnel(None));
     let basis = TermSources {
         aero_model: &aero_model,
