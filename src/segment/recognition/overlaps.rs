@@ -6,7 +6,7 @@ use super::found::{FoundManeuver, Recognition};
 use crate::maneuver::UnclassifiedExcitation;
 
 /// A candidate with the reason for which it would be rejected.
-struct Candidate<'a> {
+struct CandidateManeuver<'a> {
     found: FoundManeuver<'a>,
     rejection: Option<String>,
 }
@@ -23,7 +23,7 @@ pub(in crate::segment) fn without_overlaps<'a>(
     recognition: Recognition<'a>,
     rejection: impl Fn(&FoundManeuver) -> Option<String>,
 ) -> Recognition<'a> {
-    let mut candidates: Vec<Candidate> = Vec::new();
+    let mut candidates: Vec<CandidateManeuver> = Vec::new();
     for found in &recognition.found {
         let others = recognition
             .found
@@ -31,7 +31,7 @@ pub(in crate::segment) fn without_overlaps<'a>(
             .filter(|other| overlap(found, other));
         // A candidate overlaps itself.
         let is_contested = others.count() > 1;
-        candidates.push(Candidate {
+        candidates.push(CandidateManeuver {
             rejection: is_contested.then(|| rejection(found)).flatten(),
             found: found.clone(),
         });
@@ -79,7 +79,7 @@ fn apart(
     unknown
 }
 
-impl Candidate<'_> {
+impl CandidateManeuver<'_> {
     /// Row of a candidate that a maneuver displaces; `None` if the maneuver explains its inputs.
     fn displaced(
         &self,
