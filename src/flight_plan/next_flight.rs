@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use rayon::prelude::*;
 
-use super::candidate::{Candidate, candidates, reach_deg};
+use super::candidate::{CandidateCard, candidates, reach_deg};
 use super::choice::Budget;
 use super::experience::CampaignHistory;
 use super::goal_file;
@@ -184,7 +184,7 @@ fn rehearse(
     };
     let all = candidates(&cards.cards, config);
     progress.begin("rehearse", all.len());
-    let rehearse = |candidate: Candidate| {
+    let rehearse = |candidate: CandidateCard| {
         let result = basis.rehearse(&candidate);
         progress.advance(&candidate.card.class);
         Rehearsal { candidate, result }

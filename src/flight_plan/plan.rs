@@ -1,6 +1,6 @@
 //! Plan of the next flight: candidates and goals to a choice, and the choice to the rows of the tables.
 
-use super::candidate::{Candidate, reach_deg};
+use super::candidate::{CandidateCard, reach_deg};
 use super::choice::{
     Aim, AimPart, Budget, CardChoice, CardSet, CoefficientCovariance, Price, variance,
 };
@@ -34,14 +34,14 @@ pub struct CampaignState<'a> {
 /// A candidate with its rehearsal, or the reason why it is refused.
 #[derive(Debug)]
 pub struct Rehearsal {
-    pub candidate: Candidate,
+    pub candidate: CandidateCard,
     pub result: Result<Rehearsed, String>,
 }
 
 /// A candidate that is not refused, with its index.
 #[derive(Clone, Copy)]
 struct KeptCard<'a> {
-    candidate: &'a Candidate,
+    candidate: &'a CandidateCard,
     rehearsed: &'a Rehearsed,
 }
 
@@ -112,7 +112,7 @@ pub fn plan(
     }
 }
 
-fn price(candidate: &Candidate) -> Price {
+fn price(candidate: &CandidateCard) -> Price {
     Price {
         minutes: candidate.minutes,
         alpha_deg: candidate.card.alpha_deg,
@@ -290,7 +290,7 @@ impl PlanRows<'_> {
     }
 
     /// Row of a card before it is rehearsed.
-    fn of_candidate(&self, candidate: &Candidate) -> NextCardRow {
+    fn of_candidate(&self, candidate: &CandidateCard) -> NextCardRow {
         let card = &candidate.card;
         NextCardRow {
             place: None,

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::aero::WindTunnel;
 use crate::config::Config;
 use crate::estimate::{Estimated, means};
-use crate::flight_plan::candidate::{Candidate, candidates};
+use crate::flight_plan::candidate::{CandidateCard, candidates};
 use crate::flight_plan::choice::Budget;
 use crate::flight_plan::experience::CampaignHistory;
 use crate::flight_plan::goals::Goal;
@@ -64,7 +64,7 @@ impl World {
         }
     }
 
-    pub fn candidates(&self) -> Vec<Candidate> {
+    pub fn candidates(&self) -> Vec<CandidateCard> {
         candidates(&self.shipped.cards, &self.config)
     }
 
@@ -74,8 +74,8 @@ impl World {
     }
 
     /// Flies cards of one flight with the truth, and estimates them.
-    pub fn fly(&self, flight: &str, cards: &[Candidate]) -> Vec<FlownCard> {
-        let fly = |(i, candidate): (usize, &Candidate)| {
+    pub fn fly(&self, flight: &str, cards: &[CandidateCard]) -> Vec<FlownCard> {
+        let fly = |(i, candidate): (usize, &CandidateCard)| {
             let flown = self.shipped.simulator.fly(&candidate.card).unwrap();
             let seed = derived_seed(self.seed, &format!("{flight} {i}"));
             let record = flown.recorded(&self.instruments, seed);
@@ -122,7 +122,7 @@ impl World {
             delays: &[],
             limits: &FlightLimits::default(),
         };
-        let rehearse = |candidate: Candidate| {
+        let rehearse = |candidate: CandidateCard| {
             let result = basis.rehearse(&candidate);
             Rehearsal { candidate, result }
         };
@@ -150,11 +150,11 @@ impl World {
     }
 
     /// Cards of a plan, each as often as it is flown.
-    pub fn cards(&self, plan: &Plan) -> Vec<Candidate> {
+    pub fn cards(&self, plan: &Plan) -> Vec<CandidateCard> {
         let all = self.candidates();
         let chosen = plan.cards.iter().filter(|row| row.place.is_some());
         let chosen = chosen.flat_map(|row| {
-            let is_it = |c: &&Candidate| {
+            let is_it = |c: &&CandidateCard| {
                 c.card.class == row.class && (c.card.alpha_deg - row.alpha_deg).abs() < 1e-9
             };
             let candidate = all.iter().find(is_it).unwrap().clone();
