@@ -15,7 +15,7 @@ use crate::output_error::{Case, Fit, InitialState, Outcome};
 use crate::units::{DEG, Unit};
 
 /// Motion that a fit explains without the corrections of a filter, and the second opinion on it.
-pub(super) struct Explanation<'a> {
+pub(super) struct ExplainedMotion<'a> {
     /// Outputs of the equations; `None` if they diverge.
     pub outputs: Option<&'a [[f64; OUTPUTS]]>,
     /// `true` if gusts explain a drift of the attitude: it integrates the rates, and the rotary
@@ -29,7 +29,7 @@ pub(super) struct Credibility<'c, 'a, const NX: usize, E: Equations<NX>> {
     pub task: &'c Task<'a>,
     pub case: &'c Case<NX, E>,
     pub fit: &'c Fit,
-    pub explanation: Explanation<'c>,
+    pub explanation: ExplainedMotion<'c>,
 }
 
 impl<const NX: usize, E: Equations<NX>> Credibility<'_, '_, NX, E> {
