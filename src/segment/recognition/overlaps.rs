@@ -2,7 +2,7 @@
 //! unless the maneuver explains the same motion.
 
 use super::detections::Detections;
-use super::found::{FoundManeuver, Recognition};
+use super::found::{FoundManeuver, RecognitionResult};
 use crate::maneuver::UnclassifiedExcitation;
 
 /// A candidate with the reason for which it would be rejected.
@@ -20,9 +20,9 @@ struct CandidateManeuver<'a> {
 /// part.
 pub(in crate::segment) fn without_overlaps<'a>(
     detections: &Detections,
-    recognition: Recognition<'a>,
+    recognition: RecognitionResult<'a>,
     rejection: impl Fn(&FoundManeuver) -> Option<String>,
-) -> Recognition<'a> {
+) -> RecognitionResult<'a> {
     let mut candidates: Vec<CandidateManeuver> = Vec::new();
     for found in &recognition.found {
         let others = recognition
@@ -53,7 +53,7 @@ pub(in crate::segment) fn without_overlaps<'a>(
     let mut unknown = apart(recognition.unknown, &found);
     unknown.extend(displaced);
     unknown.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
-    Recognition { found, unknown }
+    RecognitionResult { found, unknown }
 }
 
 /// `true` if the inputs of two candidates overlap.

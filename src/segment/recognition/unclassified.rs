@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::class_match::mismatches;
 use super::cuts::CutSearch;
 use super::detections::Detections;
-use super::found::Recognition;
+use super::found::RecognitionResult;
 use super::mismatch::Mismatch;
 use super::segment::Segment;
 use crate::maneuver::{Class, UnclassifiedExcitation};
@@ -59,7 +59,7 @@ pub(super) fn unexplained(
 /// Reports a recording that may be one maneuver and in which nothing was found.
 pub(in crate::segment) fn nothing_found(
     detections: &Detections,
-    recognition: &Recognition,
+    recognition: &RecognitionResult,
 ) -> Option<UnclassifiedExcitation> {
     let record = detections.record;
     let is_empty = recognition.found.is_empty() && recognition.unknown.is_empty();
