@@ -31,7 +31,7 @@ pub(super) fn class_of_recorded_outputs(task: &Task) -> (Class, BTreeMap<String,
 fn unseen(task: &Task) -> BTreeMap<String, String> {
     let axis = task.class.axis;
     let derivatives = task.context.aero_model.derivatives_of(axis);
-    let of_derivatives = derivatives.map(|d| (&d.name, output_that_hides(task, d)));
+    let of_derivatives = derivatives.map(|d| (&d.name, output_required_by(task, d)));
     let biases = task.context.aero_model.biases_of(axis);
     let biases = biases.filter(|b| task.status(&b.name) == Some(Status::Estimated));
     let of_biases = biases.map(|b| (&b.name, Some(b.output).filter(|o| task.is_absent(*o))));
@@ -48,7 +48,7 @@ fn reason(absent: Output) -> String {
 
 /// Absent output that a derivative needs in order to have the class's status. The axial force needs
 /// `ax`; a regressor with the measured α̇ needs `an` or `ax`.
-fn output_that_hides(task: &Task, derivative: &Derivative) -> Option<Output> {
+fn output_required_by(task: &Task, derivative: &Derivative) -> Option<Output> {
     let is_free = match task.status(&derivative.name)? {
         Status::Estimated => true,
         Status::Held => task.context.settings.hold == Hold::Evidence,

@@ -171,7 +171,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
                 .bounds
                 .are_exceeded_by(&effect.change, SMALL_CHANGE)
         {
-            effect.become_uncertainty();
+            effect.replace_change_by_variance();
         }
         slope_fit
     }

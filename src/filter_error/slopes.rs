@@ -43,7 +43,7 @@ pub struct SlopeEffect {
 
 impl SlopeEffect {
     /// Adds the square of the change to the covariance, and leaves the estimates unchanged.
-    pub fn become_uncertainty(&mut self) {
+    pub fn replace_change_by_variance(&mut self) {
         self.covariance += &self.change * self.change.transpose();
         self.change.fill(0.0);
     }

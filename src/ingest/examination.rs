@@ -6,9 +6,10 @@ use std::ops::Range;
 
 use super::checks::{
     BlockAverager, BlockMeans, Check, ENGINE_SIGNALS, FaultReport, FaultyChannel, Gusts,
-    ImpossibleSignal, check_relations, confirmed_signals, find_faulty_channels, impossible_centre,
-    impossible_gyration, impossible_mass, impossible_signals, impossible_temperature,
-    impossible_velocity, report, unusable_engine_signal, unusable_temperature, wrong_time,
+    ImpossibleSignal, check_relations, confirmed_signals, find_faulty_channels,
+    find_time_scale_fault, impossible_centre, impossible_gyration, impossible_mass,
+    impossible_signals, impossible_temperature, impossible_velocity, report,
+    unusable_engine_signal, unusable_temperature,
 };
 use super::clock::Clock;
 use super::compatibility::{self, Findings};
@@ -375,7 +376,7 @@ impl Examination<'_> {
             ..
         } = *self.context;
         let (checks, gusts) = check_relations(blocks, aircraft, &settings.checks);
-        if let Some(time) = wrong_time(&checks) {
+        if let Some(time) = find_time_scale_fault(&checks) {
             return RelationResult {
                 confirmed: Vec::new(),
                 report: None,

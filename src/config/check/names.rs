@@ -42,9 +42,9 @@ pub(super) fn known_signal(config: &Config, source: &Source, name: &str, user: &
 /// Refuses a signal that is probably another one misspelt; `user` names what needs it. A recorder may
 /// lack any other signal: `check` lists it with the cost.
 pub(super) fn spelt_signal(config: &Config, source: &Source, name: &str, user: &str) -> Result<()> {
-    match meant(config, name) {
-        Some(meant) => {
-            let near = format!("; did you mean `{meant}`?");
+    match corrected_spelling(config, name) {
+        Some(spelling) => {
+            let near = format!("; did you mean `{spelling}`?");
             Err(no_channel(source, name, user, &near))
         }
         None => Ok(()),
@@ -66,10 +66,10 @@ fn no_channel(source: &Source, name: &str, user: &str, near: &str) -> Error {
     source.error(name, what)
 }
 
-/// Signal that was meant by a misspelt name. A typing error occurs in one place of the
+/// Signal whose name is the corrected spelling of `name`. A typing error occurs in one place of the
 /// configuration and resembles a correct name; or it occurs in the channel map, and nothing else
 /// uses the signal.
-fn meant<'a>(config: &'a Config, name: &str) -> Option<&'a str> {
+fn corrected_spelling<'a>(config: &'a Config, name: &str) -> Option<&'a str> {
     if is_given(config, name) || signal::is_own(name) {
         return None;
     }

@@ -35,7 +35,7 @@ const UNITS: [(&str, f64); 5] = [
 ];
 
 /// Finds a time that runs too fast or too slow.
-pub fn wrong_time(checks: &[Check]) -> Option<ImpossibleSignal> {
+pub fn find_time_scale_fault(checks: &[Check]) -> Option<ImpossibleSignal> {
     let slopes = |signals: &[&str]| -> Vec<f64> {
         let of = checks.iter().filter(|check| {
             let first = check.relation.signals.first();
