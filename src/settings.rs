@@ -116,7 +116,7 @@ pub trait SplitGroup: Sized {
     type InSight: DeserializeOwned + Default;
     type Expert: DeserializeOwned + Default;
 
-    fn join(in_sight: Self::InSight, expert: Self::Expert) -> Self;
+    fn merge(in_sight: Self::InSight, expert: Self::Expert) -> Self;
     fn keys_in_sight() -> Vec<Key>;
     fn keys_of_experts() -> Vec<Key>;
 }
@@ -309,7 +309,7 @@ macro_rules! settings {
                     Ok($name {
                         $($field: written.$field,)*
                         $($expert: written.expert.$expert,)*
-                        $($($split: $crate::settings::SplitGroup::join(written.$split, written.expert.$split),)*)?
+                        $($($split: $crate::settings::SplitGroup::merge(written.$split, written.expert.$split),)*)?
                         $($($other: $other_default,)*)?
                     })
                 }
@@ -405,7 +405,7 @@ macro_rules! settings {
                 type InSight = InSight;
                 type Expert = Expert;
 
-                fn join(in_sight: InSight, expert: Expert) -> $name {
+                fn merge(in_sight: InSight, expert: Expert) -> $name {
                     $name {
                         $($field: in_sight.$field,)*
                         $($expert: expert.$expert,)*

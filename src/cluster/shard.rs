@@ -42,7 +42,7 @@ pub fn deal(
     progress: &dyn Progress,
 ) -> Result<ShardPlan> {
     let archive = archive::find(&config.archive)?;
-    let mut conductor = Conductor::join(
+    let mut conductor = Conductor::open_shared(
         config,
         archive,
         AbsentArtefacts::Report,
@@ -86,7 +86,7 @@ pub fn compute(
     let flight_ids: BTreeSet<&str> = items.iter().map(|item| item.flight_id.as_str()).collect();
     let mut archive = archive::find(&config.archive)?;
     archive.retain(|f| flight_ids.contains(f.flight_id.as_str()));
-    let conductor = Conductor::join(config, archive, AbsentArtefacts::Make, wait, progress)?;
+    let conductor = Conductor::open_shared(config, archive, AbsentArtefacts::Make, wait, progress)?;
     check_lineage(plan, &conductor, Some(&flight_ids))?;
     let mut campaign = conductor.campaign(until.min(Stage::Segment))?;
     if let Some((flight, why)) = campaign.unread.first_key_value() {

@@ -128,7 +128,11 @@ impl<'a> Step for JointStep<'a> {
 ///
 /// # Errors
 /// A fault that stops the run.
-pub fn join(runner: &StepRunner, campaign: &mut Campaign, estimates: &[Estimated]) -> Result<()> {
+pub fn estimate_jointly(
+    runner: &StepRunner,
+    campaign: &mut Campaign,
+    estimates: &[Estimated],
+) -> Result<()> {
     let Some(settings) = &runner.config.estimate.joint else {
         return Ok(());
     };

@@ -77,7 +77,7 @@ impl Store {
     ///
     /// # Errors
     /// As [`Store::open`].
-    pub fn join(folder: &Path, wait: Duration) -> Result<Store> {
+    pub fn open_shared(folder: &Path, wait: Duration) -> Result<Store> {
         let lock = Lock::share(&folder.join("lock"), "store", wait)?;
         Ok(Store {
             _lock: Some(lock),
