@@ -162,7 +162,7 @@ fn minimise_from_two_starts<const NX: usize, E: Equations<NX>, const NG: usize, 
     let moving = start(implied, Noise::starting(member.deviations));
     let still = start(
         output_error.values.clone(),
-        Noise::slight(member.deviations),
+        Noise::with_small_gusts(member.deviations),
     );
     let starts = if is_white(&case.measurements, output_error) {
         [still, moving]

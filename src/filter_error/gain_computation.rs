@@ -54,9 +54,9 @@ impl<const NX: usize, E: InGusts<NX>> WithSimd for GainComputation<'_, NX, E> {
         } else {
             Vec::new()
         };
-        let is_still = self.noise.is_still() && self.input_noise.is_zero();
-        let filter = if is_still {
-            SteadyFilter::still(system)
+        let has_no_noise = self.noise.has_no_gusts() && self.input_noise.is_zero();
+        let filter = if has_no_noise {
+            SteadyFilter::without_process_noise(system)
         } else {
             SteadyFilter::solve_system(system)?
         };

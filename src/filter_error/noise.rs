@@ -155,7 +155,7 @@ impl Noise {
 
     /// Noise of still air, with these standard deviations of the outputs.
     #[must_use]
-    pub fn still(outputs: [f64; OUTPUTS]) -> Noise {
+    pub fn without_gusts(outputs: [f64; OUTPUTS]) -> Noise {
         Noise {
             angle: LEAST_ANGLE,
             gusts: [LEAST_GUST; MOST_GUSTS],
@@ -165,7 +165,7 @@ impl Noise {
 
     /// Noise of almost still air, from which the iteration can grow gusts if there are any.
     #[must_use]
-    pub fn slight(outputs: [f64; OUTPUTS]) -> Noise {
+    pub fn with_small_gusts(outputs: [f64; OUTPUTS]) -> Noise {
         Noise {
             angle: 10.0 * LEAST_ANGLE,
             gusts: [10.0 * LEAST_GUST; MOST_GUSTS],
@@ -177,7 +177,7 @@ impl Noise {
     #[must_use]
     pub fn of_parameters(parameters: &[f64], gusts: usize) -> Noise {
         // Gusts that the axis does not have are still.
-        let mut noise = Noise::still([1.0; OUTPUTS]);
+        let mut noise = Noise::without_gusts([1.0; OUTPUTS]);
         for (parameter, value) in NoiseParameter::all(gusts).into_iter().zip(parameters) {
             match parameter {
                 NoiseParameter::Angle => noise.angle = value.exp(),
@@ -205,7 +205,7 @@ impl Noise {
 
     /// `true` if all noise of the process is at its floor.
     #[must_use]
-    pub fn is_still(&self) -> bool {
+    pub fn has_no_gusts(&self) -> bool {
         // Parameters are logarithms, whose rounding the factor covers.
         const AT: f64 = 1.0 + 1e-9;
         self.angle <= AT * LEAST_ANGLE && self.gusts.iter().all(|g| *g <= AT * LEAST_GUST)
@@ -216,7 +216,7 @@ impl Noise {
     #[must_use]
     pub fn is_of_air(&self, gusts: usize, step_s: f64) -> bool {
         let belongs = |gust| self.rotary_excess(gust, step_s) < MOST_EXCESS.ln();
-        !self.is_still() && (0..gusts).all(belongs)
+        !self.has_no_gusts() && (0..gusts).all(belongs)
     }
 
     /// Steady gain of a filter for the angle of the air alone, measured by the output `vane`; zero
@@ -227,7 +227,7 @@ impl Noise {
     /// gain p / (p + r).
     #[must_use]
     pub fn angle_gain(&self, vane: usize) -> f64 {
-        if self.is_still() {
+        if self.has_no_gusts() {
             return 0.0;
         }
         let (q, r) = (self.angle.powi(2), (self.outputs[vane] * RAD).powi(2));

@@ -87,7 +87,7 @@ impl<const NX: usize> SteadyFilter<NX> {
     }
 
     /// Filter without process noise: its gain is zero, whether or not the airframe is stable.
-    pub fn still(system: NoisySystem<NX>) -> Self {
+    pub fn without_process_noise(system: NoisySystem<NX>) -> Self {
         SteadyFilter {
             prediction: StateMatrix::zeros(),
             corrected: StateMatrix::zeros(),

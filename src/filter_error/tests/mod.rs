@@ -225,7 +225,7 @@ fn assert_still_air_is_output_error<
     let (truth, given) = (truth(E::AXIS), biases(E::AXIS));
     let mut simulated = prepared::<NG, G>(&truth, &given);
     simulated.fly(&light(), &mut Draws(7));
-    let still = Noise::still(light().outputs);
+    let still = Noise::without_gusts(light().outputs);
     let at = simulated.filter.with_noise(&simulated.own, &still);
     let predicted = simulated.filter.respond(&at).unwrap();
     let model = Model {
@@ -299,7 +299,7 @@ fn outputs_along_still_air_are_those_of_output_error() {
     simulated.fly(&light(), &mut Draws(7));
     let at = simulated
         .filter
-        .with_noise(&simulated.own, &Noise::still(light().outputs));
+        .with_noise(&simulated.own, &Noise::without_gusts(light().outputs));
     let along = simulated.filter.outputs_along_air(&at).unwrap();
     let predicted = simulated.filter.respond(&at).unwrap().predicted;
     for (along, predicted) in along.iter().zip(&predicted) {
@@ -317,7 +317,7 @@ fn the_gain_of_the_angle_alone_is_the_limit_of_its_filter() {
     }
     let limit = predicted / (predicted + r);
     assert_relative_eq!(noise.angle_gain(0), limit, max_relative = 1e-12);
-    assert_abs_diff_eq!(Noise::still(noise.outputs).angle_gain(0), 0.0);
+    assert_abs_diff_eq!(Noise::without_gusts(noise.outputs).angle_gain(0), 0.0);
 }
 
 #[test]
@@ -331,7 +331,7 @@ fn rotary_gusts_without_gusts_of_the_angle_are_not_of_the_air() {
     };
     assert!(light().is_of_air(2, step_s) && with_rotary(9.9).is_of_air(2, step_s));
     assert!(!with_rotary(10.1).is_of_air(2, step_s));
-    assert!(!Noise::still(light().outputs).is_of_air(2, step_s));
+    assert!(!Noise::without_gusts(light().outputs).is_of_air(2, step_s));
 }
 
 /// Checks at the true parameters that the innovations are white with the computed covariance.
