@@ -6,7 +6,7 @@ use super::checked::Config;
 use crate::aero::{Axis, Derivative, Output};
 use crate::error::did_you_mean;
 use crate::flight::signal;
-use crate::flight::stand_in::{StandIn, cost};
+use crate::flight::stand_in::{StandIn, consequence_of_absence};
 use crate::maneuver::{Class, Status};
 use crate::segment::absent_signals;
 
@@ -110,7 +110,10 @@ impl<'a> Recorder<'a> {
             let Some(stand_in) = StandIn::of(signal, has) else {
                 continue;
             };
-            let (own, absent) = (cost(signal, has), (signal, stand_in.in_words()));
+            let (own, absent) = (
+                consequence_of_absence(signal, has),
+                (signal, stand_in.in_words()),
+            );
             match costs.iter_mut().find(|(cost, _)| *cost == own) {
                 Some((_, signals)) => signals.push(absent),
                 None => costs.push((own, vec![absent])),
@@ -119,7 +122,9 @@ impl<'a> Recorder<'a> {
         let mut lines: Vec<String> = costs.iter().map(|(cost, s)| absence(s, cost)).collect();
         let optional = signal::OPTIONAL.into_iter();
         let absent = optional.filter(|signal| !has(signal));
-        lines.extend(absent.map(|signal| format!("no `{signal}`: {}", cost(signal, has))));
+        lines.extend(
+            absent.map(|signal| format!("no `{signal}`: {}", consequence_of_absence(signal, has))),
+        );
         lines
     }
 

@@ -300,7 +300,7 @@ pub fn stand_ins(has: impl Fn(&str) -> bool) -> Result<Vec<(String, StandIn)>, &
 /// Consequence of a missing signal for the results, as text for the user. `has` is `true` for a
 /// signal that is recorded or given as a constant.
 #[must_use]
-pub fn cost(signal: &str, has: impl Fn(&str) -> bool) -> &'static str {
+pub fn consequence_of_absence(signal: &str, has: impl Fn(&str) -> bool) -> &'static str {
     let has_all = |signals: &[&str]| signals.iter().all(|signal| has(signal));
     match signal {
         s::RPM_LEFT | s::RPM_RIGHT => {
@@ -390,11 +390,11 @@ mod tests {
         let all = [s::AN, s::AX, s::AY];
         for (absent, coefficient) in all.into_iter().zip(["CN", "CA", "CY"]) {
             assert!(StandIn::of(absent, all_but(&all)).is_some(), "{absent}");
-            let alone = cost(absent, all_but(&[absent]));
+            let alone = consequence_of_absence(absent, all_but(&[absent]));
             assert!(alone.contains(coefficient), "{alone}");
         }
-        let with_axis = cost(s::AY, all_but(&[s::AY, s::BETA_VANE]));
-        assert_eq!(with_axis, cost(s::P, all_but(&[s::P])));
+        let with_axis = consequence_of_absence(s::AY, all_but(&[s::AY, s::BETA_VANE]));
+        assert_eq!(with_axis, consequence_of_absence(s::P, all_but(&[s::P])));
     }
 
     #[test]
