@@ -97,8 +97,8 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
 
     /// Place of each parameter of a maneuver, its noise included.
     fn places(&self, member: usize) -> Vec<usize> {
-        let own = self.own.places(member).iter().copied();
-        own.chain(self.noise_places(member)).collect()
+        let places = self.own.places(member).iter().copied();
+        places.chain(self.noise_places(member)).collect()
     }
 
     /// Filters with the places of their parameters.
@@ -193,13 +193,13 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
     /// standard deviation of each output of each maneuver.
     #[must_use]
     pub fn floors(&self, resolutions: &[[f64; OUTPUTS]]) -> Vec<f64> {
-        let own = vec![f64::NEG_INFINITY; self.first_noise()];
+        let unlimited = vec![f64::NEG_INFINITY; self.first_noise()];
         let members = self.filters.iter().zip(resolutions);
         let noise = members.flat_map(|(filter, resolution)| {
             let parameters = filter.noise_parameters().iter();
             parameters.map(|parameter| parameter.floor(resolution))
         });
-        own.into_iter().chain(noise).collect()
+        unlimited.into_iter().chain(noise).collect()
     }
 
     /// Fixes noise parameters that the data do not determine: all of them if the noise is known.

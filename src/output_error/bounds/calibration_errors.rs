@@ -275,8 +275,8 @@ impl<'a> SurfaceErrors<'a> {
 
     fn gradient_shift(&self, error: &SignalError) -> DVector<f64> {
         let mut shift = DVector::zeros(self.places.len());
-        let own = self.derivatives.iter();
-        for (derivative, value) in own.filter(|(d, _)| is_along(d, error.signal)) {
+        let derivatives = self.derivatives.iter();
+        for (derivative, value) in derivatives.filter(|(d, _)| is_along(d, error.signal)) {
             let constant = constant_name(derivative.coefficient, &derivative.regressor);
             self.subtract_column(&derivative.name, error.scale * value, &mut shift);
             self.subtract_column(&constant, error.bias * value, &mut shift);

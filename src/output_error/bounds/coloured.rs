@@ -310,28 +310,32 @@ impl<'a> NoiseIteration<'a> {
         } else {
             1.0
         };
-        let both = absorbed.iter().zip(&self.pairs).zip(&self.observed);
-        let whole: Vec<f64> = both
+        let by_lag = absorbed.iter().zip(&self.pairs).zip(&self.observed);
+        let whole: Vec<f64> = by_lag
             .map(|((absorbed, pairs), observed)| observed + stronger * absorbed / pairs)
             .collect();
         let expected = stronger * self.slow.long_run_variance();
         self.set_noise(&whole);
-        let found = self.slow.long_run_variance();
-        self.settled = (expected - found).abs() <= SETTLED * found;
+        let fitted = self.slow.long_run_variance();
+        self.settled = (expected - fitted).abs() <= SETTLED * fitted;
     }
 
     /// Absorbed part R C Sᵀ + S Cᵀ R − S K Sᵀ, summed over all pairs of blocks at each lag.
+    ///
+    /// With X = R C − ½ S K the part is X Sᵀ + S Xᵀ. For white noise R is a number, and the two
+    /// products are equal.
     fn absorbed_autocovariance(&mut self, covariance: &AlignedMatrix) -> Vec<f64> {
         let (series, lags) = (self.series, self.series.lags());
         let (sums, length) = (&series.sensitivities, series.block_length);
         let factor = self.slow.innovation / length;
         let mut inner = covariance.clone().scaled_by(-0.5 / (length * length));
-        if let Some(mut half) = self.process_times_changes.take() {
-            half.add_product(sums, &inner.scaled_by(1.0 / factor));
-            let before = half.lagged_products(sums, lags);
-            let after = sums.lagged_products(&half, lags);
-            let both = before.iter().zip(after);
-            both.map(|(before, after)| factor * (before + after))
+        if let Some(mut x) = self.process_times_changes.take() {
+            x.add_product(sums, &inner.scaled_by(1.0 / factor));
+            let x_with_s = x.lagged_products(sums, lags);
+            let s_with_x = sums.lagged_products(&x, lags);
+            let by_lag = x_with_s.iter().zip(s_with_x);
+            by_lag
+                .map(|(x_with_s, s_with_x)| factor * (x_with_s + s_with_x))
                 .collect()
         } else {
             inner.add_scaled(self.inverse, factor * series.weight);
