@@ -59,20 +59,20 @@ impl CoefficientPosterior {
         let mut data = Data::new(&terms, evidence, basis);
         let mut weights = vec![1.0; evidence.len()];
         let mut noise_scales = centres(&terms);
-        let (mut observed, mut scales, mut found) = data.fit(&terms, &weights, &noise_scales)?;
+        let (mut observed, mut scales, mut gaussian) = data.fit(&terms, &weights, &noise_scales)?;
         for _ in 0..REWEIGHTINGS {
             let freedom = basis.settings.degrees_of_freedom;
-            weights = reweighted(&data.flights, &weights, &found, freedom);
+            weights = reweighted(&data.flights, &weights, &gaussian, freedom);
             noise_scales = scales;
-            (observed, scales, found) = data.fit(&terms, &weights, &noise_scales)?;
+            (observed, scales, gaussian) = data.fit(&terms, &weights, &noise_scales)?;
         }
         let posterior = TermsPosterior {
             terms: &terms,
             scales: &scales,
-            gaussian: &found,
+            gaussian: &gaussian,
         };
         let held = data.held(&posterior, &weights, evidence, basis.tunnel);
-        let mut posterior = data.posterior(terms, scales, &weights, found, evidence);
+        let mut posterior = data.posterior(terms, scales, &weights, gaussian, evidence);
         add_open_scales(&observed, &posterior.scales, &mut posterior.gaussian);
         Some(CoefficientPosterior {
             noise_scales,
@@ -114,20 +114,22 @@ impl Data {
         basis: &TermSources,
     ) -> (Data, Vec<Option<(usize, Observation)>>) {
         let mut classes: BTreeMap<String, usize> = BTreeMap::new();
-        let mut observe = |own: &ManeuverResults| {
-            let observation = own.about(terms, basis.tunnel)?;
+        let mut observe = |results: &ManeuverResults| {
+            let observation = results.about(terms, basis.tunnel)?;
             let next = classes.len();
-            let class = classes.entry(own.maneuver.class.clone()).or_insert(next);
+            let class = classes
+                .entry(results.maneuver.class.clone())
+                .or_insert(next);
             Some((*class, observation))
         };
         let mut observations: Vec<(usize, Observation)> = vec![];
         let mut places: BTreeMap<&str, Vec<(usize, usize)>> = BTreeMap::new();
         let mut estimated = BTreeMap::new();
-        for (place, own) in evidence.iter().enumerate() {
-            let Some((class, observation)) = observe(own) else {
+        for (place, results) in evidence.iter().enumerate() {
+            let Some((class, observation)) = observe(results) else {
                 continue;
             };
-            let of_flight = places.entry(&own.maneuver.flight_id).or_default();
+            let of_flight = places.entry(&results.maneuver.flight_id).or_default();
             of_flight.push((place, observations.len()));
             estimated.insert(place, observation.terms.clone());
             observations.push((class, observation));
@@ -143,10 +145,9 @@ impl Data {
             places: places.into_values().collect(),
             estimated,
         };
-        let flights = data
-            .places
-            .iter()
-            .map(|own| FlightData::new(&observed(own, &data.observations), terms, &data.unknowns));
+        let flights = data.places.iter().map(|places| {
+            FlightData::new(&observed(places, &data.observations), terms, &data.unknowns)
+        });
         data.flights = flights.collect();
         (data, planned)
     }
@@ -154,8 +155,8 @@ impl Data {
     /// Adds the noise between the points of the grids to each maneuver's own noise, for these
     /// scales.
     pub fn add_grid_noise(&mut self, terms: &[PosteriorTerm], scales: &[Scale]) {
-        for (flight, own) in self.flights.iter_mut().zip(&self.places) {
-            flight.add_grid_noise(&observed(own, &self.observations), terms, scales);
+        for (flight, places) in self.flights.iter_mut().zip(&self.places) {
+            flight.add_grid_noise(&observed(places, &self.observations), terms, scales);
         }
     }
 
@@ -169,8 +170,8 @@ impl Data {
     ) -> Option<(ObservedDifferences, Vec<Scale>, Gaussian)> {
         self.add_grid_noise(terms, start);
         let sums = information(&self.flights, weights, self.unknowns.count);
-        let own = of_differences(&sums, &self.unknowns)?;
-        let observed = ObservedDifferences::new(terms, &self.unknowns, &own);
+        let information_on_differences = of_differences(&sums, &self.unknowns)?;
+        let observed = ObservedDifferences::new(terms, &self.unknowns, &information_on_differences);
         let scales = most_probable(&observed, start);
         let gaussian = gaussian(&self.unknowns.root(terms, &scales, EXACT), &sums)?;
         Some((observed, scales, gaussian))
@@ -186,13 +187,15 @@ impl Data {
         tunnel: &WindTunnel,
     ) -> BTreeMap<String, HeldDifferences> {
         let mut held = BTreeMap::new();
-        for own in evidence.chunk_by(|a, b| a.maneuver.flight_id == b.maneuver.flight_id) {
-            let place = self.flight_ids.binary_search(&own[0].maneuver.flight_id);
+        for of_flight in evidence.chunk_by(|a, b| a.maneuver.flight_id == b.maneuver.flight_id) {
+            let place = self
+                .flight_ids
+                .binary_search(&of_flight[0].maneuver.flight_id);
             let flight = place.ok().map(|i| &self.flights[i]);
             let Some(others) = OtherFlights::new(posterior.gaussian, flight, weights) else {
                 continue;
             };
-            held.extend(own.iter().filter_map(|e| {
+            held.extend(of_flight.iter().filter_map(|e| {
                 let differences = e.held_differences(posterior, &self.unknowns, &others, tunnel)?;
                 Some((e.maneuver.maneuver_id.clone(), differences))
             }));
@@ -216,9 +219,10 @@ impl Data {
         let class = |place: &usize| evidence[*place].maneuver.class.as_str();
         let names: BTreeSet<&str> = self.estimated.keys().map(class).collect();
         let classes = names.into_iter().filter_map(|name| {
-            let is_own = |m: usize| evidence[m].maneuver.class == name;
+            let is_of_class = |m: usize| evidence[m].maneuver.class == name;
             let count = self.unknowns.count;
-            let agreement = self_check::maneuvers(&self.flights, weights, &root, count, is_own)?;
+            let agreement =
+                self_check::maneuvers(&self.flights, weights, &root, count, is_of_class)?;
             Some((name.to_owned(), agreement))
         });
         let classes: BTreeMap<String, Agreement> = classes.collect();
@@ -242,9 +246,9 @@ fn observed<'o>(
     places: &[(usize, usize)],
     observations: &'o [(usize, Observation)],
 ) -> Vec<Observed<'o>> {
-    let own = places.iter().map(|&(place, i)| {
+    let maneuvers = places.iter().map(|&(place, i)| {
         let (class, observation) = &observations[i];
         (place, *class, observation)
     });
-    own.collect()
+    maneuvers.collect()
 }

@@ -72,8 +72,8 @@ impl Model {
     ) -> Vec<LiftAndDragRow> {
         let derivatives = flown.derivatives();
         let is_estimated = |c: Coefficient| {
-            let mut own = derivatives.iter().filter(|d| d.coefficient == c);
-            own.any(|d| d.regressor == Regressor::Constant && flown.is_estimated(d))
+            let mut of_coefficient = derivatives.iter().filter(|d| d.coefficient == c);
+            of_coefficient.any(|d| d.regressor == Regressor::Constant && flown.is_estimated(d))
         };
         if !is_estimated(Coefficient::CN) || !is_estimated(Coefficient::CA) {
             return vec![];
@@ -144,7 +144,7 @@ impl PublishedManeuver<'_> {
     fn weights_from_regressors(
         &self,
         derivatives: &[&Derivative],
-        own: impl Fn(&Derivative) -> f64,
+        regressor: impl Fn(&Derivative) -> f64,
     ) -> Weights {
         let Maneuver {
             alpha_deg,
@@ -152,11 +152,11 @@ impl PublishedManeuver<'_> {
             ..
         } = *self.evidence.maneuver;
         let (sin, cos) = (RAD * alpha_deg).sin_cos();
-        let own = |d: &Derivative| own(d) * d.coefficient_factor(self.aircraft, qbar_psf);
+        let factor = |d: &Derivative| regressor(d) * d.coefficient_factor(self.aircraft, qbar_psf);
         let weight = |by_normal: f64, by_axial: f64| {
             let weights = derivatives.iter().map(|d| match d.coefficient {
-                Coefficient::CN => by_normal * own(d),
-                _ => by_axial * own(d),
+                Coefficient::CN => by_normal * factor(d),
+                _ => by_axial * factor(d),
             });
             RowDVector::from_iterator(derivatives.len(), weights)
         };
@@ -218,21 +218,21 @@ impl PublishedManeuver<'_> {
         held: &HeldErrors,
     ) -> Matrix2<f64> {
         let place = |name: &String| derivatives.iter().position(|d| d.name == *name);
-        let of = |names: &[String]| {
+        let weights_of = |names: &[String]| {
             DMatrix::from_fn(2, names.len(), |i, j| {
                 let row = if i == 0 { &weights.lift } else { &weights.drag };
                 place(&names[j]).map_or(0.0, |d| row[d])
             })
         };
         let covariance = self.evidence.covariance;
-        let (estimated, held_weights) = (of(&covariance.names), of(&held.names));
+        let (estimated, held_weights) = (weights_of(&covariance.names), weights_of(&held.names));
         let n = covariance.names.len();
         let corrected = DMatrix::from_row_slice(n, n, &covariance.corrected);
         let change = &held.gains * (&held.covariance - &held.assumed) * held.gains.transpose();
-        let own = &estimated * (corrected + change) * estimated.transpose();
+        let from_estimates = &estimated * (corrected + change) * estimated.transpose();
         let cross = &estimated * &held.gains * &held.covariance * held_weights.transpose();
-        let alone = &held_weights * &held.covariance * held_weights.transpose();
-        let sum = own - &cross - cross.transpose() + alone;
+        let from_held = &held_weights * &held.covariance * held_weights.transpose();
+        let sum = from_estimates - &cross - cross.transpose() + from_held;
         sum.fixed_view::<2, 2>(0, 0).into_owned()
     }
 }

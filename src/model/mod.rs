@@ -70,22 +70,22 @@ pub fn model(
     };
     let all = [Axis::Longitudinal, Axis::Lateral].map(Axis::coefficients);
     let all: Vec<Coefficient> = all.into_iter().flatten().collect();
-    let of = |coefficient: Coefficient| {
+    let posterior_of = |coefficient: Coefficient| {
         let points = basis.count_points(coefficient, &evidence);
         if points > MOST_POINTS {
             return Some((coefficient, Err(Failure::TooManyPoints(points))));
         }
         let terms = basis.terms(coefficient, &evidence);
         let has_terms = !terms.is_empty();
-        let found =
+        let posterior =
             has_terms.then(|| CoefficientPosterior::from_terms(terms, &evidence, &basis))?;
-        let rows = found.as_ref().map(|p| p.rows(coefficient, &evidence));
-        Some((coefficient, found.zip(rows).ok_or(Failure::NotFinite)))
+        let rows = posterior.as_ref().map(|p| p.rows(coefficient, &evidence));
+        Some((coefficient, posterior.zip(rows).ok_or(Failure::NotFinite)))
     };
-    let found: Vec<_> = all.into_par_iter().filter_map(of).collect();
+    let results: Vec<_> = all.into_par_iter().filter_map(posterior_of).collect();
     let mut model = Model::default();
-    for (coefficient, found) in found {
-        match found {
+    for (coefficient, result) in results {
+        match result {
             Ok((posterior, rows)) => {
                 model.rows.append(rows);
                 model.coefficients.push((coefficient, posterior));

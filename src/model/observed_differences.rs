@@ -56,13 +56,16 @@ impl ObservedDifferences {
             let points = 0..term.prior.grid.len();
             let (start, every): (usize, Vec<usize>) = (places.len(), points.clone().collect());
             let is_observed = |point: &usize| matrix[(first + point, first + point)] != 0.0;
-            let own: Vec<usize> = points.filter(is_observed).collect();
-            places.extend(own.iter().map(|point| first + point));
+            let observed_points: Vec<usize> = points.filter(is_observed).collect();
+            places.extend(observed_points.iter().map(|point| first + point));
             observed.push(ObservedTerm {
                 start,
-                covariance: term.prior.covariance.select(&own, &own),
-                with_all: term.prior.covariance.select(&every, &own),
-                points: own,
+                covariance: term
+                    .prior
+                    .covariance
+                    .select(&observed_points, &observed_points),
+                with_all: term.prior.covariance.select(&every, &observed_points),
+                points: observed_points,
                 scale: term.prior.scale,
             });
         }

@@ -96,8 +96,9 @@ impl Model {
     pub fn breakpoints_deg(&self, derivative: &str) -> Option<(&'static str, &[f64])> {
         let all = self.coefficients.iter();
         let mut terms = all.flat_map(|(_, posterior)| &posterior.terms);
-        let own = |t: &&PosteriorTerm| t.prior.name == derivative || t.derivative == derivative;
-        let term = terms.find(own)?;
+        let is_derivative =
+            |t: &&PosteriorTerm| t.prior.name == derivative || t.derivative == derivative;
+        let term = terms.find(is_derivative)?;
         Some((term.unit, &term.breakpoints_deg))
     }
 
@@ -169,8 +170,8 @@ impl CoefficientPosterior {
         }
         let differences = (unknowns.differences, unknowns.differences);
         let published = self.gaussian.covariance.view((0, 0), differences);
-        let mut own = covariance.view_mut((0, 0), differences);
-        own += positive(&(published - &own));
+        let mut of_differences = covariance.view_mut((0, 0), differences);
+        of_differences += positive(&(published - &of_differences));
         Some(covariance)
     }
 
@@ -226,8 +227,10 @@ impl CoefficientPosterior {
         let mut row = SparseRow::new();
         for (value, weight) in values {
             let mut terms = self.terms.iter().zip(&unknowns.starts);
-            let own = terms.find(|(term, _)| term.derivative == value.derivative);
-            let Some((term, start)) = own else { continue };
+            let term_and_start = terms.find(|(term, _)| term.derivative == value.derivative);
+            let Some((term, start)) = term_and_start else {
+                continue;
+            };
             let shares = local_shares(term, condition, value.is_mach_slope).unwrap_or_default();
             let shares = shares.into_iter();
             row.extend(shares.map(|(node, share)| (start + node, weight * share)));

@@ -102,11 +102,11 @@ pub fn gaussian(root: &BlockRoot, information: &Information) -> Option<Gaussian>
 pub fn of_differences(information: &Information, unknowns: &Unknowns) -> Option<Information> {
     let (n, all) = (unknowns.differences, unknowns.count);
     let (matrix, vector) = (&information.matrix, &information.vector);
-    let own = Information {
+    let of_others = Information {
         matrix: matrix.view((n, n), (all - n, all - n)).into_owned(),
         vector: vector.rows(n, all - n).into_owned(),
     };
-    let others = gaussian(&unknowns.root_of_others(EXACT), &own)?;
+    let others = gaussian(&unknowns.root_of_others(EXACT), &of_others)?;
     let cross = matrix.view((0, n), (n, all - n));
     Some(Information {
         matrix: matrix.view((0, 0), (n, n)) - cross * &others.covariance * cross.transpose(),
@@ -170,9 +170,9 @@ impl LeaveOneOut {
     /// Difference of some rows from their prediction by all other rows.
     #[must_use]
     pub fn rows(&self, rows: &Range<usize>) -> Option<LeaveOneOutDifference> {
-        let own = (rows.start, rows.start);
-        let own = self.precision.view(own, (rows.len(), rows.len()));
-        let covariance = Cholesky::new(own.into_owned())?.inverse();
+        let start = (rows.start, rows.start);
+        let precision = self.precision.view(start, (rows.len(), rows.len()));
+        let covariance = Cholesky::new(precision.into_owned())?.inverse();
         Some(LeaveOneOutDifference {
             differences: &covariance * self.weighted.rows_range(rows.clone()),
             covariance,
@@ -216,10 +216,11 @@ pub fn reweighted(
 /// Prior covariance of the differences.
 #[must_use]
 pub fn prior(unknowns: &Unknowns, terms: &[PosteriorTerm], scales: &[Scale]) -> DMatrix<f64> {
-    let mut joined = DMatrix::zeros(unknowns.differences, unknowns.differences);
+    let mut all = DMatrix::zeros(unknowns.differences, unknowns.differences);
     for ((term, scale), &start) in terms.iter().zip(scales).zip(&unknowns.starts) {
-        let own = term.prior.covariance.for_scale(scale);
-        joined.view_mut((start, start), own.shape()).copy_from(&own);
+        let covariance = term.prior.covariance.for_scale(scale);
+        all.view_mut((start, start), covariance.shape())
+            .copy_from(&covariance);
     }
-    joined
+    all
 }

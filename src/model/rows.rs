@@ -66,10 +66,11 @@ impl CoefficientPosterior {
     ) -> Vec<PosteriorRow> {
         let values = self.values(quantity);
         let row = |i: usize| {
-            let (node, own) = (&quantity.nodes[i], &quantity.rows[i]);
-            let variance = covariance_between(own, own, &self.gaussian.covariance).max(0.0);
+            let (node, row_of_node) = (&quantity.nodes[i], &quantity.rows[i]);
+            let variance =
+                covariance_between(row_of_node, row_of_node, &self.gaussian.covariance).max(0.0);
             let deviation = variance.sqrt();
-            let known = covariance_between(own, own, before);
+            let prior_variance = covariance_between(row_of_node, row_of_node, before);
             PosteriorRow {
                 derivative: quantity.name.clone(),
                 unit: quantity.unit.to_owned(),
@@ -81,8 +82,9 @@ impl CoefficientPosterior {
                 lower_95: values[i] - NORMAL_95 * deviation,
                 upper_95: values[i] + NORMAL_95 * deviation,
                 wind_tunnel: quantity.has_tunnel.then_some(quantity.tunnel[i]),
-                prior_deviation: known.sqrt(),
-                flight_share_pct: (known > 0.0).then(|| 100.0 * (1.0 - variance / known).max(0.0)),
+                prior_deviation: prior_variance.sqrt(),
+                flight_share_pct: (prior_variance > 0.0)
+                    .then(|| 100.0 * (1.0 - variance / prior_variance).max(0.0)),
                 maneuvers: self.maneuvers_near(quantity.term, alphas_deg, node.alpha_deg),
             }
         };
@@ -118,14 +120,15 @@ impl CoefficientPosterior {
     }
 
     fn scale_rows(&self) -> Vec<ScaleRow> {
-        let both = self.terms.iter().zip(&self.scales);
-        both.map(|(term, scale)| ScaleRow {
-            derivative: term.prior.name.clone(),
-            knowledge: term.prior.source,
-            size: scale.size,
-            length_deg: scale.length_deg,
-        })
-        .collect()
+        let pairs = self.terms.iter().zip(&self.scales);
+        pairs
+            .map(|(term, scale)| ScaleRow {
+                derivative: term.prior.name.clone(),
+                knowledge: term.prior.source,
+                size: scale.size,
+                length_deg: scale.length_deg,
+            })
+            .collect()
     }
 
     fn contributions(

@@ -34,8 +34,8 @@ impl LeaveOneOutDifference {
     #[must_use]
     pub fn agreement(&self) -> Agreement {
         let variances = self.covariance.diagonal();
-        let both = self.differences.iter().zip(variances.iter());
-        let inside = both.filter(|(d, variance)| d.abs() <= NORMAL_95 * variance.sqrt());
+        let pairs = self.differences.iter().zip(variances.iter());
+        let inside = pairs.filter(|(d, variance)| d.abs() <= NORMAL_95 * variance.sqrt());
         let log_density = Cholesky::new(self.covariance.clone()).map_or(f64::NEG_INFINITY, |c| {
             let square = self.differences.dot(&c.solve(&self.differences));
             let roots: f64 = c.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
@@ -73,13 +73,13 @@ pub fn maneuvers(
     let rest = SolvedPosterior::new(root, &sums)?;
     let mut sum = Agreement::default();
     for flight in flights {
-        let own = flight.of_maneuvers(&is_left_out);
-        if own.rows.is_empty() {
+        let left_out = flight.of_maneuvers(&is_left_out);
+        if left_out.rows.is_empty() {
             continue;
         }
-        let (predicted, predicted_covariance) = rest.image(&own, &sums);
-        let differences: DVector<f64> = &own.differences - predicted;
-        let covariance = predicted_covariance + own.covariance(weights);
+        let (predicted, predicted_covariance) = rest.image(&left_out, &sums);
+        let differences: DVector<f64> = &left_out.differences - predicted;
+        let covariance = predicted_covariance + left_out.covariance(weights);
         let prediction = LeaveOneOutDifference {
             differences,
             covariance,

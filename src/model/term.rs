@@ -38,8 +38,8 @@ pub fn between_points(
     design: &DMatrix<f64>,
     condition: &Condition,
 ) -> DMatrix<f64> {
-    let both = terms.iter().zip(scales);
-    let variances = both.map(|(t, s)| t.prior.variance_between_points(s, condition));
+    let pairs = terms.iter().zip(scales);
+    let variances = pairs.map(|(t, s)| t.prior.variance_between_points(s, condition));
     let variances = DVector::from_iterator(terms.len(), variances);
     design * DMatrix::from_diagonal(&variances) * design.transpose()
 }
@@ -79,8 +79,10 @@ impl TermSources<'_> {
             .filter(|derivative| derivative.coefficient == coefficient)
             .map(|derivative| {
                 let sums = self.aero_model.combined.iter();
-                let own = sums.filter(|sum| sum.constant == derivative.name);
-                let names = own.map(|sum| &sum.name).chain([&derivative.name]);
+                let sums_of_constant = sums.filter(|sum| sum.constant == derivative.name);
+                let names = sums_of_constant
+                    .map(|sum| &sum.name)
+                    .chain([&derivative.name]);
                 let tables = names.map(|name| {
                     let (machs, thirds) = (self.tunnel.machs(name), self.tunnel.thirds(name));
                     machs.len().max(1).saturating_mul(thirds.len().max(1))
@@ -113,8 +115,8 @@ impl TermSources<'_> {
             .flat_map(|name| self.tunnel.alphas_deg(name))
             .collect();
         let axis = coefficient.axis();
-        let own = evidence.iter().filter(|e| e.maneuver.axis == axis);
-        let flown = || own.clone().map(|e| e.maneuver.alpha_deg);
+        let on_axis = evidence.iter().filter(|e| e.maneuver.axis == axis);
+        let flown = || on_axis.clone().map(|e| e.maneuver.alpha_deg);
         // Beyond the tables a whole step encloses the outermost maneuver.
         let step = self.settings.alpha_step_deg;
         let lowest = flown().reduce(f64::min).map(|a| (a / step).floor() * step);

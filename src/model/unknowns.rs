@@ -101,8 +101,8 @@ impl Unknowns {
         for (i, (row, &term)) in rows.iter_mut().zip(&observation.terms).enumerate() {
             let bound = observation.noise[(i, i)].sqrt();
             if let Some(error) = self.classes.get(&(class, term)) {
-                let own = error.grid.shares(&observation.condition).into_iter();
-                row.extend(own.map(|(node, share)| (error.start + node, share * bound)));
+                let shares = error.grid.shares(&observation.condition).into_iter();
+                row.extend(shares.map(|(node, share)| (error.start + node, share * bound)));
             }
             for (error, change) in &observation.calibration {
                 let place = self.campaign.get(error);

@@ -57,16 +57,20 @@ impl Model {
 impl<'a> WithHeld<'a> {
     fn add(&mut self, differences: &'a HeldDifferences, effects: &BTreeMap<&str, &ErrorEffect>) {
         let names = || differences.derivatives.iter().map(String::as_str);
-        let own: Vec<&ErrorEffect> = names().filter_map(|n| effects.get(n).copied()).collect();
-        if own.len() != differences.derivatives.len() {
+        let effects_of_held: Vec<&ErrorEffect> =
+            names().filter_map(|n| effects.get(n).copied()).collect();
+        if effects_of_held.len() != differences.derivatives.len() {
             return;
         }
         let change = |e: &ErrorEffect| DVector::from_column_slice(&e.change);
-        let gains: Vec<DVector<f64>> = own.iter().map(|e| change(e) / e.deviation).collect();
+        let gains: Vec<DVector<f64>> = effects_of_held
+            .iter()
+            .map(|e| change(e) / e.deviation)
+            .collect();
         let gains = DMatrix::from_columns(&gains);
         self.change -= &gains * &differences.values;
         self.covariance += &gains * &differences.covariance * gains.transpose();
-        for effect in own {
+        for effect in effects_of_held {
             let change = change(effect);
             self.covariance -= &change * change.transpose();
         }
