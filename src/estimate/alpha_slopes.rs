@@ -81,11 +81,11 @@ impl AlphaSlopes {
     /// Model with the slopes added as held derivatives; `values[i]` belongs to slope `i`.
     pub fn held_in<'s>(&'s self, model: &Model<'s>, values: &[f64]) -> Model<'s> {
         let mut held = model.clone();
-        let both = || self.slopes.iter().zip(values);
+        let slopes_and_values = || self.slopes.iter().zip(values);
         held.held
-            .extend(both().map(|(slope, value)| (&slope.term, *value)));
+            .extend(slopes_and_values().map(|(slope, value)| (&slope.term, *value)));
         for (part, derivative) in self.parts_of_lines() {
-            let of_line = both().filter(|(slope, _)| slope.has_line_in(derivative));
+            let of_line = slopes_and_values().filter(|(slope, _)| slope.has_line_in(derivative));
             let value = of_line.map(|(slope, value)| slope.line[part] * value).sum();
             held.held.push((derivative, value));
         }
@@ -105,8 +105,8 @@ impl AlphaSlopes {
     /// Pass whose parameters of the slopes move their lines as well.
     pub fn with_lines(&self, mut pass: WidePass) -> WidePass {
         for (part, derivative) in self.parts_of_lines() {
-            let own = self.slopes.iter().filter(|s| s.has_line_in(derivative));
-            for slope in own {
+            let slopes = self.slopes.iter().filter(|s| s.has_line_in(derivative));
+            for slope in slopes {
                 pass.add_column(&derivative.name, slope.line[part], &slope.term.name);
             }
         }
@@ -132,8 +132,8 @@ impl AlphaSlopes {
             change.slope
         };
         let line = [along, -along * mean(alphas.iter().copied())];
-        let both = change.values.iter().zip(alphas);
-        let rest: Vec<f64> = both
+        let pairs = change.values.iter().zip(alphas);
+        let rest: Vec<f64> = pairs
             .map(|(value, alpha)| value - line[0] * alpha - line[1])
             .collect();
         self.window = self.window.with_samples(&change.name, &rest);
@@ -148,9 +148,9 @@ impl AlphaSlopes {
 
 impl CoefficientChange {
     /// No change, at as many samples as there are angles of attack.
-    fn none(of: &str, coefficient: Coefficient, alphas: &[f64]) -> CoefficientChange {
+    fn none(name: &str, coefficient: Coefficient, alphas: &[f64]) -> CoefficientChange {
         CoefficientChange {
-            name: format!("{of} over alpha"),
+            name: format!("{name} over alpha"),
             coefficient,
             values: vec![0.0; alphas.len()],
             slope: 0.0,
@@ -160,8 +160,8 @@ impl CoefficientChange {
     /// Adds the changes of a derivative, per unit of its regressor; along α itself those of the coefficient.
     fn add(&mut self, changes: &[f64], alphas: &[f64], regressor: Option<&[f64]>) {
         let Some(regressor) = regressor else {
-            let both = self.values.iter_mut().zip(changes);
-            return both.for_each(|(value, change)| *value += change);
+            let pairs = self.values.iter_mut().zip(changes);
+            return pairs.for_each(|(value, change)| *value += change);
         };
         for ((value, change), r) in self.values.iter_mut().zip(changes).zip(regressor) {
             *value += change * r;
@@ -201,9 +201,9 @@ fn changes<const NX: usize, E: Equations<NX>>(
             let sum = &mut in_tunnel[derivative.coefficient.index()];
             sum.add(&changes, alphas, regressor.as_deref());
         }
-        let own = own_change(task, derivative, alphas, range.mean);
+        let deviation = own_change(task, derivative, alphas, range.mean);
         let mut change = CoefficientChange::none(name, derivative.coefficient, alphas);
-        change.add(&own, alphas, regressor.as_deref());
+        change.add(&deviation, alphas, regressor.as_deref());
         changes.push((change, SlopePrior::DEVIATION));
     }
     changes.extend(in_tunnel.map(|change| (change, SlopePrior::SHARE)));

@@ -169,8 +169,8 @@ impl<'m, const NX: usize, E: Equations<NX>> Diagnostics<'_, 'm, NX, E> {
         }
         let row = |(i, j): (usize, usize)| {
             let ((first, a), (second, b)) = (&distinct[i], &distinct[j]);
-            let both = correlation(a, b)?;
-            Some(self.correlation_row(CorrelationKind::Regressors, [first, second], both))
+            let coefficient = correlation(a, b)?;
+            Some(self.correlation_row(CorrelationKind::Regressors, [first, second], coefficient))
         };
         pairs(distinct.len()).filter_map(row).collect()
     }
@@ -196,8 +196,8 @@ impl<'m, const NX: usize, E: Equations<NX>> Diagnostics<'_, 'm, NX, E> {
         pairs(names.len())
             .filter(|&(i, j)| matrix[(i, j)].abs() >= least)
             .map(|(i, j)| {
-                let both = [names[i].as_str(), names[j].as_str()];
-                self.correlation_row(CorrelationKind::Estimates, both, matrix[(i, j)])
+                let pair = [names[i].as_str(), names[j].as_str()];
+                self.correlation_row(CorrelationKind::Estimates, pair, matrix[(i, j)])
             })
             .collect()
     }

@@ -35,10 +35,10 @@ impl HeldSlopes {
 
     /// The slopes moved by a fraction of the way to other values.
     pub fn towards(&self, values: &DVector<f64>, share: f64) -> Self {
-        let both = self.values.iter().zip(values.iter());
+        let pairs = self.values.iter().zip(values.iter());
         HeldSlopes {
             names: self.names.clone(),
-            values: both.map(|(from, to)| from + share * (to - from)).collect(),
+            values: pairs.map(|(from, to)| from + share * (to - from)).collect(),
             priors: self.priors.clone(),
         }
     }

@@ -35,8 +35,8 @@ pub(super) fn explains(
 /// Gain in log-likelihood of coloured noise over white noise, summed over the outputs.
 fn colour_gain(measurements: &Measurements, computed: &[[f64; OUTPUTS]]) -> f64 {
     let residuals = |o: usize| -> Vec<f64> {
-        let both = measurements.values.iter().zip(computed);
-        let counted = both.zip(&measurements.used);
+        let pairs = measurements.values.iter().zip(computed);
+        let counted = pairs.zip(&measurements.used);
         counted
             .map(|((z, y), used)| if used[o] { z[o] - y[o] } else { f64::NAN })
             .collect()

@@ -12,8 +12,8 @@ const COLOURED: f64 = 0.3;
 /// Standard deviation of an output's white noise, from its second differences.
 pub(super) fn sample_noise(measurements: &Measurements, output: usize) -> f64 {
     let samples = measurements.values.array_windows::<3>();
-    let both = samples.zip(measurements.used.array_windows::<3>());
-    let sizes = both
+    let windows = samples.zip(measurements.used.array_windows::<3>());
+    let sizes = windows
         .filter(|(_, used)| used.iter().all(|used| used[output]))
         .map(|(z, _)| differences::second(&z.map(|z| z[output])).abs());
     differences::noise_of_second(median(sizes).unwrap_or(0.0))
@@ -58,8 +58,8 @@ pub(super) fn white_cost(measurements: &Measurements, fit: &Fit) -> Option<f64> 
     fit.final_cost?;
     let mut cost = 0.0;
     for o in 0..OUTPUTS {
-        let both = measurements.values.iter().zip(&fit.response.outputs);
-        let counted = both.zip(&measurements.used).filter(|(_, used)| used[o]);
+        let pairs = measurements.values.iter().zip(&fit.response.outputs);
+        let counted = pairs.zip(&measurements.used).filter(|(_, used)| used[o]);
         let squares: Vec<f64> = counted.map(|((z, y), _)| (z[o] - y[o]).powi(2)).collect();
         if squares.is_empty() {
             continue;

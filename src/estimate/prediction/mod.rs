@@ -82,7 +82,7 @@ pub fn predicting_maneuvers(
     let near = |a: &Maneuver, b: &Maneuver| {
         (a.alpha_deg - b.alpha_deg).abs() <= settings.alpha_distance_deg
     };
-    let of = |(i, m): (usize, &Maneuver)| {
+    let others_of = |(i, m): (usize, &Maneuver)| {
         let is_other = |&(j, o): &(usize, &Maneuver)| {
             j != i && o.class == m.class && near(m, o) && is_sound(j)
         };
@@ -95,7 +95,7 @@ pub fn predicting_maneuvers(
                 .collect()
         })
     };
-    maneuvers.iter().enumerate().map(of).collect()
+    maneuvers.iter().enumerate().map(others_of).collect()
 }
 
 /// Predicts one maneuver from others. `own` is its own estimate. A failure is reported in the
@@ -251,8 +251,8 @@ fn predict_in_gusts<const NX: usize, E: Equations<NX>, const NG: usize, G: InGus
     start: Vec<f64>,
 ) -> Result<Prediction, String> {
     let filter = new_filter::<NX, E, NG, G>(task, prepared, &prepared.window, &prepared.model);
-    let own = SharedParameters::of_one(filter.names());
-    let joint = JointFilter::new(std::slice::from_ref(&filter), &own).with_known_noise();
+    let sharing = SharedParameters::of_one(filter.names());
+    let joint = JointFilter::new(std::slice::from_ref(&filter), &sharing).with_known_noise();
     let start = if by_output_error.cost.is_ok() {
         by_output_error.values.clone()
     } else {
