@@ -66,12 +66,12 @@ impl CoefficientPosterior {
             noise_scales = scales;
             (observed, scales, gaussian) = data.fit(&terms, &weights, &noise_scales)?;
         }
-        let posterior = TermsPosterior {
+        let terms_posterior = TermsPosterior {
             terms: &terms,
             scales: &scales,
             gaussian: &gaussian,
         };
-        let held = data.held(&posterior, &weights, evidence, basis.tunnel);
+        let held = data.held(&terms_posterior, &weights, evidence, basis.tunnel);
         let mut posterior = data.posterior(terms, scales, &weights, gaussian, evidence);
         add_open_scales(&observed, &posterior.scales, &mut posterior.gaussian);
         Some(CoefficientPosterior {

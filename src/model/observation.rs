@@ -196,14 +196,17 @@ impl ManeuverResults<'_> {
         shared: impl Iterator<Item = &'e ErrorEffect>,
     ) -> Option<DMatrix<f64>> {
         let n = self.covariance.names.len();
-        let mut unshared = DMatrix::from_row_slice(n, n, &self.covariance.corrected);
+        let corrected = DMatrix::from_row_slice(n, n, &self.covariance.corrected);
+        let mut unshared = corrected.clone();
         for effect in shared {
             let change = DVector::from_column_slice(&effect.change);
             unshared -= &change * change.transpose();
         }
-        let corrected = DMatrix::from_row_slice(n, n, &self.covariance.corrected);
-        let corrected = of_rows * corrected * of_rows.transpose();
-        floored(&(of_rows * unshared * of_rows.transpose()), &corrected)
+        let corrected_of_rows = of_rows * corrected * of_rows.transpose();
+        floored(
+            &(of_rows * unshared * of_rows.transpose()),
+            &corrected_of_rows,
+        )
     }
 }
 

@@ -95,37 +95,28 @@ impl TermSources<'_> {
     /// Angles of attack of a coefficient's grids: the breakpoints of its tables, the flown range, and
     /// points between.
     fn alphas_deg(&self, coefficient: Coefficient, evidence: &[ManeuverResults]) -> Vec<f64> {
-        let names = self.aero_model.derivatives.iter();
-        let names = names
-            .filter(|d| d.coefficient == coefficient)
-            .map(|d| &d.name)
-            .chain(
-                self.aero_model
-                    .combined
-                    .iter()
-                    .map(|c| &c.name)
-                    .filter(|sum| {
-                        let constant = self.aero_model.combined.iter().find(|c| c.name == **sum);
-                        let constant =
-                            constant.and_then(|c| self.aero_model.derivative(&c.constant));
-                        constant.is_some_and(|d| d.coefficient == coefficient)
-                    }),
-            );
+        let names = self.table_names(coefficient);
         let tabulated: Vec<f64> = names
             .flat_map(|name| self.tunnel.alphas_deg(name))
             .collect();
-        let axis = coefficient.axis();
-        let on_axis = evidence.iter().filter(|e| e.maneuver.axis == axis);
-        let flown = || on_axis.clone().map(|e| e.maneuver.alpha_deg);
-        // Beyond the tables a whole step encloses the outermost maneuver.
         let step = self.settings.alpha_step_deg;
-        let lowest = flown().reduce(f64::min).map(|a| (a / step).floor() * step);
-        let highest = flown().reduce(f64::max).map(|a| (a / step).ceil() * step);
-        let first = tabulated.iter().copied().reduce(f64::min);
-        let last = tabulated.iter().copied().reduce(f64::max);
-        let below = lowest.filter(|a| first.is_none_or(|first| *a < first));
-        let above = highest.filter(|a| last.is_none_or(|last| *a > last));
+        let [below, above] = beyond_tables(&tabulated, &flown_alphas(coefficient, evidence), step);
         refined(tabulated.into_iter().chain(below).chain(above), step)
+    }
+
+    /// Names of the tables of a coefficient: its derivatives, and the sums with its constant.
+    fn table_names(&self, coefficient: Coefficient) -> impl Iterator<Item = &String> {
+        let is_of_coefficient =
+            move |derivative: &&Derivative| derivative.coefficient == coefficient;
+        let derivatives = self.aero_model.derivatives.iter();
+        let sums = self.aero_model.combined.iter().filter(move |sum| {
+            let constant = self.aero_model.derivative(&sum.constant);
+            constant.is_some_and(|derivative| is_of_coefficient(&derivative))
+        });
+        derivatives
+            .filter(is_of_coefficient)
+            .map(|derivative| &derivative.name)
+            .chain(sums.map(|sum| &sum.name))
     }
 
     fn term(
@@ -211,4 +202,24 @@ impl TermSources<'_> {
         };
         (size > 0.0).then_some((table, 1.0))
     }
+}
+
+/// Mean angles of attack of the maneuvers on a coefficient's axis.
+fn flown_alphas(coefficient: Coefficient, evidence: &[ManeuverResults]) -> Vec<f64> {
+    let on_axis = evidence
+        .iter()
+        .filter(|e| e.maneuver.axis == coefficient.axis());
+    on_axis.map(|e| e.maneuver.alpha_deg).collect()
+}
+
+/// Points below and above the tabulated angles of attack where maneuvers are flown there: a whole
+/// step encloses the outermost maneuver.
+fn beyond_tables(tabulated: &[f64], flown: &[f64], step: f64) -> [Option<f64>; 2] {
+    let least = |values: &[f64]| values.iter().copied().reduce(f64::min);
+    let largest = |values: &[f64]| values.iter().copied().reduce(f64::max);
+    let lowest = least(flown).map(|a| (a / step).floor() * step);
+    let highest = largest(flown).map(|a| (a / step).ceil() * step);
+    let below = lowest.filter(|a| least(tabulated).is_none_or(|first| *a < first));
+    let above = highest.filter(|a| largest(tabulated).is_none_or(|last| *a > last));
+    [below, above]
 }

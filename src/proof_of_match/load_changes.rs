@@ -29,8 +29,8 @@ pub struct LoadSlopes {
     force: [f64; 3],
     moment: [f64; 3],
     /// Slope of each component of force and moment along its coefficient.
-    force_by_own: [f64; 3],
-    moment_by_own: [f64; 3],
+    force_by_coefficient: [f64; 3],
+    moment_by_coefficient: [f64; 3],
     alpha_rate: Option<AlphaRateTerm>,
 }
 
@@ -67,8 +67,8 @@ impl LoadSlopes {
             coefficients: by_flow,
             force: force.into(),
             moment: moment.into(),
-            force_by_own: FORCE.map(|(_, sign)| sign * area),
-            moment_by_own: aerodynamics.lengths().map(|length| length * area),
+            force_by_coefficient: FORCE.map(|(_, sign)| sign * area),
+            moment_by_coefficient: aerodynamics.lengths().map(|length| length * area),
             alpha_rate: None,
         };
         slopes.alpha_rate = has_alpha_rate.then(|| slopes.alpha_rate_term(instant));
@@ -79,21 +79,22 @@ impl LoadSlopes {
     /// and ẇ are linear in α̇.
     fn alpha_rate_term(&self, instant: &Instant) -> AlphaRateTerm {
         let along = |i: usize| self.coefficients[i][AeroInputs::ALPHA_RATE];
-        let force: [f64; 3] = from_fn(|i| self.force_by_own[i] * along(FORCE[i].0));
-        let moment = from_fn(|i| self.moment_by_own[i] * along(MOMENT[i]));
+        let force: [f64; 3] = from_fn(|i| self.force_by_coefficient[i] * along(FORCE[i].0));
+        let moment = from_fn(|i| self.moment_by_coefficient[i] * along(MOMENT[i]));
         let [u, _, w]: [f64; 3] = instant.state.velocity.into();
         let [u_rate, _, w_rate]: [f64; 3] = instant.rate.velocity.into();
         let per_square = 1.0 / (u * u + w * w);
         let alpha_rate = (u * w_rate - w * u_rate) * per_square;
-        let own = (u * force[2] - w * force[0]) * per_square / instant.loading.mass_slug;
-        let per_balance = per_square / (1.0 - own);
+        // α̇ = α̇₀ + gain · α̇, so every slope of α̇₀ is divided by 1 − gain.
+        let gain = (u * force[2] - w * force[0]) * per_square / instant.loading.mass_slug;
+        let factor = per_square / (1.0 - gain);
         AlphaRateTerm {
             by_velocity: [
-                (w_rate - 2.0 * alpha_rate * u) * per_balance,
+                (w_rate - 2.0 * alpha_rate * u) * factor,
                 0.0,
-                (-u_rate - 2.0 * alpha_rate * w) * per_balance,
+                (-u_rate - 2.0 * alpha_rate * w) * factor,
             ],
-            by_acceleration: [-w * per_balance, 0.0, u * per_balance],
+            by_acceleration: [-w * factor, 0.0, u * factor],
             force,
             moment,
         }
@@ -122,15 +123,15 @@ impl LoadSlopes {
             force: each(
                 #[inline(always)]
                 |i| {
-                    let own = coefficients[FORCE[i].0] * self.force_by_own[i];
-                    own.plus(self.force[i], air.relative_qbar)
+                    let by_coefficient = coefficients[FORCE[i].0] * self.force_by_coefficient[i];
+                    by_coefficient.plus(self.force[i], air.relative_qbar)
                 },
             ),
             moment: each(
                 #[inline(always)]
                 |i| {
-                    let own = coefficients[MOMENT[i]] * self.moment_by_own[i];
-                    own.plus(self.moment[i], air.relative_qbar)
+                    let by_coefficient = coefficients[MOMENT[i]] * self.moment_by_coefficient[i];
+                    by_coefficient.plus(self.moment[i], air.relative_qbar)
                 },
             ),
         };
