@@ -70,42 +70,56 @@ fn unnamed(
     facts: &[ColumnFacts],
     found: &[InputColumn],
 ) -> Vec<InputColumn> {
-    let is_free = |c: &&ColumnFacts| {
-        let is_motion = assignment.values().any(|choice| choice.column == c.name);
-        let is_angle = c
-            .unit
-            .is_some_and(|unit| unit.quantity == units::Quantity::Angle);
-        let has_meaning = kind_of(c).is_some() || !meanings(&c.spelling).is_empty();
-        is_angle && !is_motion && !has_meaning && !is_derived(&c.spelling)
-    };
+    let is_motion = |c: &ColumnFacts| assignment.values().any(|choice| choice.column == c.name);
+    let is_free = |c: &&ColumnFacts| is_nameless_angle(c) && !is_motion(c);
     let free: Vec<&ColumnFacts> = facts.iter().filter(is_free).collect();
-    let lacks = |kind: &Input| {
-        let is_main = |input: &&InputColumn| input.kind != Input::OtherSurface;
-        let surfaces = found
-            .iter()
-            .filter(|input| input.kind.is_surface())
-            .filter(is_main);
-        usual_axis(*kind).is_some_and(|axis| surfaces.clone().all(|input| input.axis != axis))
-    };
-    let of_kind = |kind: Input| {
-        let judged = free.iter().filter_map(|facts| {
-            let single = [(*facts, kind)];
-            let responses = Responses::of(grid, assignment, &single, 1);
-            let input = responses.inputs().pop().filter(|input| input.is_sure)?;
-            Some((responses.significance(0, input.axis).abs(), input))
-        });
-        let (_, input) = judged.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some(InputColumn {
-            is_sure: false,
-            evidence: format!(
-                "its name is not in harvest's vocabulary; {}",
-                input.evidence
-            ),
-            ..input
-        })
-    };
+    let clearest = |kind: Input| clearest_unnamed(grid, assignment, &free, kind);
     let main = [Input::Elevator, Input::Aileron, Input::Rudder].into_iter();
-    main.filter(lacks).filter_map(of_kind).collect()
+    main.filter(|kind| lacks_main_surface(found, *kind))
+        .filter_map(clearest)
+        .collect()
+}
+
+/// `true` for an angle whose name means nothing.
+fn is_nameless_angle(column: &ColumnFacts) -> bool {
+    let is_angle = column
+        .unit
+        .is_some_and(|unit| unit.quantity == units::Quantity::Angle);
+    let has_meaning = kind_of(column).is_some() || !meanings(&column.spelling).is_empty();
+    is_angle && !has_meaning && !is_derived(&column.spelling)
+}
+
+/// `true` if no main surface acts on the usual axis of this kind.
+fn lacks_main_surface(inputs: &[InputColumn], kind: Input) -> bool {
+    let is_main =
+        |input: &&InputColumn| input.kind.is_surface() && input.kind != Input::OtherSurface;
+    let mut axes = inputs.iter().filter(is_main).map(|input| input.axis);
+    usual_axis(kind).is_some_and(|usual| axes.all(|axis| axis != usual))
+}
+
+/// Column that the angular acceleration follows most clearly as an input of this kind, if any is
+/// sure.
+fn clearest_unnamed(
+    grid: &Grid,
+    assignment: &Assignment,
+    columns: &[&ColumnFacts],
+    kind: Input,
+) -> Option<InputColumn> {
+    let judged = columns.iter().filter_map(|facts| {
+        let single = [(*facts, kind)];
+        let responses = Responses::of(grid, assignment, &single, 1);
+        let input = responses.inputs().pop().filter(|input| input.is_sure)?;
+        Some((responses.significance(0, input.axis).abs(), input))
+    });
+    let (_, input) = judged.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(InputColumn {
+        is_sure: false,
+        evidence: format!(
+            "its name is not in harvest's vocabulary; {}",
+            input.evidence
+        ),
+        ..input
+    })
 }
 
 /// Kind of an input by its name; an angle whose name is a `d` and a few letters is a surface.
