@@ -78,13 +78,13 @@ impl Air {
         let group: Group<NX, E, NG, G> = Group::single(task, member);
         let constant = group.constant();
         let filters = group.filters(&constant, None);
-        let found = minimise_from_two_starts(&group, &filters, implied, output_error);
-        let slope_fit = found.and_then(|found| {
-            let slope_fit = group.slope_fit(constant, filters, found);
+        let minimum = minimise_from_two_starts(&group, &filters, implied, output_error);
+        let fit_with_slopes = minimum.and_then(|minimum| {
+            let slope_fit = group.slope_fit(constant, filters, minimum);
             Ok(group.with_slopes(slope_fit.ok_or(NoMinimum::Diverges)?))
         });
-        let end = match &slope_fit {
-            Ok(slope_fit) => Some(slope_fit.end()),
+        let end = match &fit_with_slopes {
+            Ok(fit) => Some(fit.end()),
             Err(why) => why.end(),
         };
         let filter = end.and_then(|end| end.response.members.first());
@@ -92,9 +92,8 @@ impl Air {
         if filter.is_some_and(|filter| sensor_noise::explains(measurements, output_error, filter)) {
             return Air::IsStill;
         }
-        let filtered = slope_fit.and_then(|slope_fit| {
-            Filtered::new(&group, &slope_fit, output_error).ok_or(NoMinimum::Diverges)
-        });
+        let filtered = fit_with_slopes
+            .and_then(|fit| Filtered::new(&group, &fit, output_error).ok_or(NoMinimum::Diverges));
         match filtered {
             Ok(filtered) => Air::Moves(Box::new(filtered)),
             Err(why) => Air::Unknown(why),
@@ -172,11 +171,12 @@ fn minimise_from_two_starts<const NX: usize, E: Equations<NX>, const NG: usize, 
     let (mut least, mut failures) = (None::<Minimum>, vec![]);
     for start in &starts {
         match group.minimum(filters, start) {
-            Ok(found) => least = least.into_iter().chain([found]).min_by(Minimum::by_cost),
+            Ok(minimum) => least = least.into_iter().chain([minimum]).min_by(Minimum::by_cost),
             Err(why) => failures.push(why),
         }
-        let found = least.as_ref();
-        if found.is_some_and(|found| !is_mostly_air(filters, found, &case.motion.states)) {
+        let is_plausible =
+            |minimum: &Minimum| !is_mostly_air(filters, minimum, &case.motion.states);
+        if least.as_ref().is_some_and(is_plausible) {
             break;
         }
     }
@@ -188,11 +188,11 @@ fn minimise_from_two_starts<const NX: usize, E: Equations<NX>, const NG: usize, 
 /// to which it adds.
 fn is_mostly_air<const NX: usize, const NG: usize, G: InGusts<NG>>(
     filters: &[Filter<NG, G>],
-    found: &Minimum,
+    minimum: &Minimum,
     states: &[SVector<f64, NX>],
 ) -> bool {
     filters.iter().any(|filter| {
-        let gusts = filter.noise(&found.scored.parameters).gusts;
+        let gusts = filter.noise(&minimum.scored.parameters).gusts;
         let mut rates = G::AIR_RELATIVE_RATES.iter().zip(gusts);
         rates.any(|((rate, _), gust)| {
             let values = states.iter().map(|x| x[*rate]);
