@@ -19,8 +19,10 @@
 //!    measured outputs.
 //! 6. **Estimate.** [`output_error::newton_raphson`] minimises the cost of the case to a
 //!    [`output_error::Fit`], and [`output_error::cramer_rao`] bounds it. In moving air
-//!    [`filter_error`] replaces output error. [`estimate::maneuver`] returns the rows
-//!    [`tables::FitRow`] and [`tables::EstimateRow`].
+//!    [`filter_error`] replaces output error: a [`filter_error::filter::Filter`] gives the cost of
+//!    one maneuver, a [`filter_error::joint_filter::JointFilter`] that of several,
+//!    [`filter_error::scoring`] minimises it, and [`filter_error::bounds`] bounds the estimates.
+//!    [`estimate::maneuver`] returns the rows [`tables::FitRow`] and [`tables::EstimateRow`].
 //! 7. **Model and trend.** [`model::model`] fuses the [`aero::WindTunnel`] and the estimates to the
 //!    posterior ([`tables::PosteriorRow`]); [`trend::trends`] fits the estimates of a derivative
 //!    across angle of attack ([`tables::TrendRow`]). [`compare::compare_posterior`] sets the

@@ -35,13 +35,13 @@
 //! | [`slopes`] | slopes of the derivatives over α, and their effect on the estimates |
 
 pub mod bounds;
+pub mod calibration_gradients;
 pub mod filter;
-mod gains;
 mod gain_computation;
+mod gains;
 mod input_noise;
 pub mod joint_filter;
 mod linearised;
-pub mod calibration_gradients;
 pub mod noise;
 mod pass;
 pub mod response;

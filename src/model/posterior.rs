@@ -213,9 +213,13 @@ pub fn reweighted(
     next
 }
 
-/// Prior covariance of the differences.
+/// Prior covariance of the differences of all terms.
 #[must_use]
-pub fn prior(unknowns: &Unknowns, terms: &[PosteriorTerm], scales: &[Scale]) -> DMatrix<f64> {
+pub fn prior_covariance_of_terms(
+    unknowns: &Unknowns,
+    terms: &[PosteriorTerm],
+    scales: &[Scale],
+) -> DMatrix<f64> {
     let mut all = DMatrix::zeros(unknowns.differences, unknowns.differences);
     for ((term, scale), &start) in terms.iter().zip(scales).zip(&unknowns.starts) {
         let covariance = term.prior.covariance.for_scale(scale);

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::coefficient::CoefficientPosterior;
 use super::evidence::ManeuverResults;
-use super::posterior::prior;
+use super::posterior::prior_covariance_of_terms;
 use super::published::PublishedDerivative;
 use super::self_check::Agreement;
 use super::unknowns::covariance_between;
@@ -45,7 +45,7 @@ impl CoefficientPosterior {
     ) -> CoefficientTables {
         let alphas: Vec<f64> = evidence.iter().map(|e| e.maneuver.alpha_deg).collect();
         let quantities = self.quantities();
-        let before = prior(&self.unknowns, &self.terms, &self.scales);
+        let before = prior_covariance_of_terms(&self.unknowns, &self.terms, &self.scales);
         let posterior = quantities
             .iter()
             .flat_map(|q| self.posterior(q, &before, &alphas));

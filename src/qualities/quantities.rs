@@ -87,6 +87,7 @@ fn longitudinal(
             diverging.map_or_else(|| f64::NAN.into(), |root| time_to_double(root.real())),
         ),
         (FlyingQuality::AttitudeZero, entries.attitude_zero()),
+        // CAP = ω²/(n/α): ω² is the product of the fast roots, n/α the load factor per radian.
         (
             FlyingQuality::ControlAnticipation,
             fast.product.clone() / load_factor.clone(),

@@ -12,6 +12,9 @@
 //! are slopes of local straight lines through the rates: accelerations averaged by a short window.
 //! All other terms are averaged by the same window, so that the equation still holds.
 //!
+//! Least squares in time ([`regress_coefficient`]) gives the starting values where the regression
+//! has no result.
+//!
 //! Noise of the regressors remains: it attenuates derivatives by its share of the regressor's
 //! variance inside the band.
 
