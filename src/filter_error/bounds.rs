@@ -131,7 +131,7 @@ impl FilterBounds {
         let series = members.flat_map(|(i, (filter, response))| {
             let places = sharing.places(i);
             let series = filter.series(response).into_iter();
-            series.map(|series| series.widened(places, n))
+            series.map(|series| series.with_parameters(places, n))
         });
         let series: Vec<BlockSeries> = series.collect();
         let innovations = coloured::covariance(&aligned, &series).widened();
@@ -237,11 +237,11 @@ impl WidePass {
     }
 
     /// Names of the parameters of one maneuver in the joint fit.
-    fn joint_names<'n>(&'n self, own: &'n SharedParameters, member: usize) -> Vec<&'n String> {
-        let places = own.places(member);
+    fn joint_names<'n>(&'n self, sharing: &'n SharedParameters, member: usize) -> Vec<&'n String> {
+        let places = sharing.places(member);
         let joint = |name: &'n String| {
             let place = self.own.iter().position(|n| n == name);
-            place.map_or(name, |j| &own.names()[places[j]])
+            place.map_or(name, |j| &sharing.names()[places[j]])
         };
         self.names.iter().map(joint).collect()
     }
