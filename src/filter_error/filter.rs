@@ -162,8 +162,8 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
 
     /// Joins the filter's own parameters with the parameters of a noise.
     #[must_use]
-    pub fn with_noise(&self, own: &[f64], noise: &Noise) -> Vec<f64> {
-        [own, &noise.parameters(E::AIR_RELATIVE_RATES.len())].concat()
+    pub fn with_noise(&self, values: &[f64], noise: &Noise) -> Vec<f64> {
+        [values, &noise.parameters(E::AIR_RELATIVE_RATES.len())].concat()
     }
 
     /// Runs the filter over the maneuver: innovations, their sensitivities to all parameters, and the

@@ -74,8 +74,8 @@ impl<const NX: usize> InputNoise<NX> {
         let mut slopes = vec![StateMatrix::zeros(); derivatives.len()];
         for effect in &self.effects {
             let sum = effect.sum(derivatives);
-            for (j, own) in &effect.free {
-                let half = own * sum.transpose();
+            for (j, by_derivative) in &effect.free {
+                let half = by_derivative * sum.transpose();
                 slopes[*j] += half + half.transpose();
             }
         }
@@ -151,6 +151,8 @@ impl<const NX: usize> StateEffect<NX> {
     /// Effect with these free derivatives.
     fn sum(&self, derivatives: &[f64]) -> SVector<f64, NX> {
         let free = self.free.iter();
-        free.fold(self.held, |sum, (j, own)| sum + own * derivatives[*j])
+        free.fold(self.held, |sum, (j, by_derivative)| {
+            sum + by_derivative * derivatives[*j]
+        })
     }
 }

@@ -79,10 +79,10 @@ impl FilterResponse {
             let excess = OutputMatrix::identity() * samples - gain.inverse * products;
             let traces = covariance_traces(gain, &excess);
             let mut rows = traces.rows();
-            for (own, row) in gain.slopes.iter().zip(&mut rows) {
+            for (slope, row) in gain.slopes.iter().zip(&mut rows) {
                 for (other, trace) in gain.slopes.iter().zip(row) {
                     let information = &mut self.other_information;
-                    information[(own.parameter, other.parameter)] += 0.5 * samples * trace;
+                    information[(slope.parameter, other.parameter)] += 0.5 * samples * trace;
                 }
             }
             for (slope, trace) in gain.slopes.iter().zip(rows.flatten()) {
@@ -122,8 +122,8 @@ fn innovation_products(
     pattern_of: &[u8],
 ) -> OutputMatrix {
     let mut sum = OutputMatrix::zeros();
-    for (v, own) in innovations.iter().zip(pattern_of) {
-        if usize::from(*own) == pattern {
+    for (v, pattern_of_sample) in innovations.iter().zip(pattern_of) {
+        if usize::from(*pattern_of_sample) == pattern {
             let v = nalgebra::SVector::from(*v);
             sum += v * v.transpose();
         }

@@ -140,7 +140,7 @@ impl SlopeInformation {
 
 /// Mean over the shares, weighted by their likelihoods. The covariance includes the scatter between
 /// the shares.
-fn mean(estimates: &[ShareEstimate], own: usize) -> SlopeEffect {
+fn mean(estimates: &[ShareEstimate], parameters: usize) -> SlopeEffect {
     let largest = estimates
         .iter()
         .map(|e| e.log_likelihood)
@@ -153,8 +153,8 @@ fn mean(estimates: &[ShareEstimate], own: usize) -> SlopeEffect {
     let slopes = estimates.first().map_or(0, |e| e.slopes.len());
     let mut effect = SlopeEffect {
         slopes: DVector::zeros(slopes),
-        change: DVector::zeros(own),
-        covariance: DMatrix::zeros(own, own),
+        change: DVector::zeros(parameters),
+        covariance: DMatrix::zeros(parameters, parameters),
     };
     for (estimate, weight) in estimates.iter().zip(&weights) {
         effect.slopes += &estimate.slopes * (weight / total);

@@ -257,15 +257,15 @@ impl HeldErrors {
     /// Replaces the tunnel's covariance by that of the other flights.
     fn take_posterior(&mut self, model: &Model, maneuver_id: &str) {
         for (_, coefficient) in &model.coefficients {
-            let Some(known) = coefficient.held.get(maneuver_id) else {
+            let Some(differences) = coefficient.held.get(maneuver_id) else {
                 continue;
             };
             let place = |name: &String| self.names.iter().position(|n| n == name);
-            let places: Vec<Option<usize>> = known.derivatives.iter().map(place).collect();
+            let places: Vec<Option<usize>> = differences.derivatives.iter().map(place).collect();
             for (i, row) in places.iter().enumerate() {
                 for (j, column) in places.iter().enumerate() {
                     if let (Some(row), Some(column)) = (row, column) {
-                        self.covariance[(*row, *column)] = known.covariance[(i, j)];
+                        self.covariance[(*row, *column)] = differences.covariance[(i, j)];
                     }
                 }
             }

@@ -50,7 +50,7 @@ pub fn add_open_scales(observed: &ObservedDifferences, scales: &[Scale], posteri
         };
         let (above, below) = (above - &centre, below - &centre);
         let squares = &above * above.transpose() + &below * below.transpose();
-        let mut own = posterior.covariance.view_mut((0, 0), (n, n));
-        own += squares * OUTER;
+        let mut of_differences = posterior.covariance.view_mut((0, 0), (n, n));
+        of_differences += squares * OUTER;
     }
 }

@@ -192,8 +192,9 @@ impl TermSources<'_> {
         let rows = evidence
             .iter()
             .flat_map(|e| e.estimates.iter().chain(e.combined));
-        let own = rows.filter(|row| row.derivative == name && row.status == Status::Estimated);
-        let size = median(own.filter_map(|row| row.value).map(f64::abs))?;
+        let estimates =
+            rows.filter(|row| row.derivative == name && row.status == Status::Estimated);
+        let size = median(estimates.filter_map(|row| row.value).map(f64::abs))?;
         let table = TableOnGrid {
             source: PriorSource::Magnitude,
             mean: vec![0.0; grid.len()],
