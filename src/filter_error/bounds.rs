@@ -134,7 +134,7 @@ impl FilterBounds {
             series.map(|series| series.with_parameters(places, n))
         });
         let series: Vec<BlockSeries> = series.collect();
-        let innovations = coloured::covariance(&aligned, &series).widened();
+        let innovations = coloured::covariance(&aligned, &series).widened_by_student_t();
         let others = filter.other_information(response);
         let others = others.view((0, 0), (n, n));
         let corrected = innovations + &self.inverse * others * &self.inverse;

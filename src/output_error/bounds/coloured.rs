@@ -76,7 +76,7 @@ pub struct CovarianceEstimate {
 impl CovarianceEstimate {
     /// Covariance widened by Student's t, so that ±1.96 standard errors are an interval of 95 %.
     #[must_use]
-    pub fn widened(mut self) -> DMatrix<f64> {
+    pub fn widened_by_student_t(mut self) -> DMatrix<f64> {
         for (j, degrees_of_freedom) in self.degrees_of_freedom.iter().enumerate() {
             let factor = student::widening_95(*degrees_of_freedom);
             self.covariance.row_mut(j).scale_mut(factor);
@@ -456,7 +456,7 @@ mod tests {
             max_relative = 0.02
         );
         assert_relative_eq!(estimate.degrees_of_freedom[0], 8.0, max_relative = 1e-9);
-        let longer = estimate.clone().widened()[(0, 0)] / estimate.covariance[(0, 0)];
+        let longer = estimate.clone().widened_by_student_t()[(0, 0)] / estimate.covariance[(0, 0)];
         assert_relative_eq!(longer.sqrt(), 2.306 / 1.960, max_relative = 1e-3);
     }
 
@@ -534,7 +534,7 @@ mod tests {
             let estimate = estimate_mean(&values, &vec![true; samples]);
             let within = |variance: f64| u32::from(mean.abs() < 1.96 * variance.sqrt());
             normal += within(estimate.covariance[(0, 0)]);
-            student += within(estimate.widened()[(0, 0)]);
+            student += within(estimate.widened_by_student_t()[(0, 0)]);
         }
         let (normal, student) = (
             f64::from(normal) / f64::from(draws),

@@ -33,7 +33,7 @@ pub fn bounds<D: Bounded>(inverse: &DMatrix<f64>, data: &D, fit: &Fit<D::Respons
     let white = data.white_covariance(&fit.response, &fit.weights);
     let covariance = estimates_covariance(&inverse, &white);
     let (series, inputs) = data.noisy(&fit.values, &fit.response, &fit.weights);
-    let residuals = coloured::covariance(&inverse, &series).widened();
+    let residuals = coloured::covariance(&inverse, &series).widened_by_student_t();
     let corrected =
         raise_variances(residuals, &covariance) + estimates_covariance(&inverse, &inputs);
     Bounds {
