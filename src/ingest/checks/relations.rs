@@ -45,7 +45,7 @@ pub const BODY_AXES: usize = 3;
 /// Effect of gusts on a relation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum GustEffect {
-    /// Both sides feel the gusts alike, or hardly.
+    /// Gusts disturb both sides alike, or hardly.
     Slight,
     /// Gusts along a body axis disturb the measured side.
     Disturb {

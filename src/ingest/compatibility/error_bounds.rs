@@ -20,7 +20,7 @@ pub const MODEL_SCALE: f64 = 0.002;
 /// a scale error and a delay.
 const GUST_RESPONSE: f64 = 0.5;
 
-/// Outputs that feel the gusts into which the aircraft turns.
+/// Outputs that measure the gusts into which the aircraft turns.
 const VANES: [&str; 2] = [signal::ALPHA_VANE, signal::BETA_VANE];
 
 /// Standard deviations of the shared parameters.

@@ -13,7 +13,7 @@ pub struct GustPath {
     pub count: usize,
 }
 
-/// Velocity and rotation of the air over the ground in body axes. The aerodynamics feel the
+/// Velocity and rotation of the air over the ground in body axes. The aerodynamics depend on the
 /// velocities and rates of the aircraft less these; gyros and attitudes do not.
 ///
 /// The air near the c.g. rotates like a rigid body with the gust gradients: `p_g` = ∂w/∂y, `q_g` =
