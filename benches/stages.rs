@@ -10,7 +10,7 @@ use std::path::Path;
 use criterion::{Criterion, criterion_group, criterion_main};
 use harvest::aero::Axis;
 use harvest::config::{Config, Overrides};
-use harvest::dynamics::motion::{MassProperties, Window};
+use harvest::dynamics::motion::{ManeuverSignals, MassProperties};
 use harvest::dynamics::{Longitudinal, OUTPUTS};
 use harvest::estimate::{self, Context};
 use harvest::flight::Record;
@@ -73,7 +73,7 @@ fn load() -> anyhow::Result<BenchFlight> {
 fn case(bench: &BenchFlight, free: bool) -> Result<Case<3, Longitudinal>, String> {
     let derivatives: Vec<_> = bench
         .config
-        .buildup
+        .aero_model
         .derivatives_of(Axis::Longitudinal)
         .collect();
     let tunnel = |name: &str| {
@@ -96,11 +96,11 @@ fn case(bench: &BenchFlight, free: bool) -> Result<Case<3, Longitudinal>, String
     let samples = range.len();
     let surfaces = bench
         .config
-        .buildup
+        .aero_model
         .derivatives
         .iter()
         .filter_map(|d| d.regressor.surface());
-    let window = Window::cut(
+    let window = ManeuverSignals::cut(
         &bench.config.aircraft,
         &bench.record,
         range,
@@ -122,7 +122,7 @@ fn case(bench: &BenchFlight, free: bool) -> Result<Case<3, Longitudinal>, String
 fn responses(c: &mut Criterion, bench: &BenchFlight) -> Result<(), String> {
     let values: BTreeMap<String, f64> = bench
         .config
-        .buildup
+        .aero_model
         .derivatives
         .iter()
         .filter_map(|d| {
@@ -183,7 +183,7 @@ fn stages(c: &mut Criterion) -> anyhow::Result<()> {
     });
     let context = Context::new(
         &config.aircraft,
-        &config.buildup,
+        &config.aero_model,
         &config.tunnel,
         &config.estimate,
     );

@@ -80,7 +80,7 @@ impl Error {
         }
     }
 
-    /// True if a repetition may succeed without a change by the analyst.
+    /// `true` if a repetition may succeed without a change by the analyst.
     #[must_use]
     pub fn is_transient(&self) -> bool {
         match self {
@@ -103,9 +103,10 @@ impl Error {
 table! {
     /// Everything that was rejected or could not be made, while the rest of the campaign went on.
     ///
-    /// With a row of another stage than `recording` and `trend` `harvest` exits with 2: neither a signal
-    /// that a recording lacks nor a derivative with too few maneuvers for a trend is a rejection. A flight
-    /// or maneuver that is rejected for want of a signal has a row of its own.
+    /// `harvest` exits with 2 if a row has a stage other than `recording` and `trend`. These two
+    /// are no rejections: a signal that the recording lacks, and a derivative with too few
+    /// maneuvers for a trend. A flight or maneuver that is rejected for want of a signal has a row
+    /// of its own.
     pub struct Problem in "problems" per "thing that was rejected or could not be made" {
         /// Stage that found the problem; `recording` for an absence in the recording.
         pub stage: ProblemStage,
@@ -150,8 +151,8 @@ impl ProblemStage {
     }
 }
 
-/// Longest text that is compared as a name, bytes: the time of a comparison grows with both lengths, and
-/// a damaged file has names of megabytes.
+/// Longest text that is compared as a name, bytes. The time of a comparison grows with the product
+/// of the lengths, and a damaged file may have names of megabytes.
 const LONGEST_NAME: usize = 200;
 
 /// Similarity of two names from 0 to 1, ignoring case (Jaro and Winkler).

@@ -14,13 +14,15 @@
 //! 4. **Maneuver.** [`segment::maneuvers`] finds each [`maneuver::Maneuver`] in the record and its
 //!    [`maneuver::Class`]. The equations of motion give the delays of the surfaces, from all
 //!    maneuvers together.
-//! 5. **Case.** A [`dynamics::motion::Window`] is the maneuver's part of the record. An
-//!    [`output_error::Case`] adds the [`aero::Buildup`]: regressors, free and held derivatives,
+//! 5. **Case.** A [`dynamics::motion::ManeuverSignals`] is the maneuver's part of the record. An
+//!    [`output_error::Case`] adds the [`aero::AeroModel`]: regressors, free and held derivatives,
 //!    measured outputs.
 //! 6. **Estimate.** [`output_error::newton_raphson`] minimises the cost of the case to a
 //!    [`output_error::Fit`], and [`output_error::cramer_rao`] bounds it. In moving air
-//!    [`filter_error`] replaces output error. [`estimate::maneuver`] returns the rows
-//!    [`tables::FitRow`] and [`tables::EstimateRow`].
+//!    [`filter_error`] replaces output error: a [`filter_error::filter::Filter`] gives the cost of
+//!    one maneuver, a [`filter_error::joint_filter::JointFilter`] that of several,
+//!    [`filter_error::scoring`] minimises it, and [`filter_error::bounds`] bounds the estimates.
+//!    [`estimate::maneuver`] returns the rows [`tables::FitRow`] and [`tables::EstimateRow`].
 //! 7. **Model and trend.** [`model::model`] fuses the [`aero::WindTunnel`] and the estimates to the
 //!    posterior ([`tables::PosteriorRow`]); [`trend::trends`] fits the estimates of a derivative
 //!    across angle of attack ([`tables::TrendRow`]). [`compare::compare_posterior`] sets the

@@ -4,8 +4,8 @@
 //! A prepared maneuver takes some two megabytes in vectors of a few hundred kilobytes. By default
 //! glibc returns such blocks to the kernel at once and takes them anew, page by page. On a virtual
 //! machine these page faults cost a quarter of the time of an estimate. Only blocks up to
-//! [`LARGEST_KEPT`] are kept, and no more than [`MOST_KEPT`] at the end of the heap, so that the
-//! pages of a large flight are returned as before.
+//! [`LARGEST_KEPT`] are kept, and no more than [`MOST_KEPT`] at the end of the heap. The pages of a
+//! large flight are thus returned as before.
 
 /// Size above which glibc requests a block from the kernel and returns it when freed, bytes.
 /// Buffers of the archive's files are such blocks.

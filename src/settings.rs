@@ -162,11 +162,11 @@ pub fn element_default(attribute: &str) -> Option<String> {
 /// A group whose keys stand in two places of a file: outside `expert:`, and under the stage's
 /// `expert:`.
 pub trait SplitGroup: Sized {
-    type InSight: DeserializeOwned + Default;
+    type AnalystKeys: DeserializeOwned + Default;
     type Expert: DeserializeOwned + Default;
 
-    fn join(in_sight: Self::InSight, expert: Self::Expert) -> Self;
-    fn keys_in_sight() -> Vec<Key>;
+    fn merge(analyst: Self::AnalystKeys, expert: Self::Expert) -> Self;
+    fn keys_of_analyst() -> Vec<Key>;
     fn keys_of_experts() -> Vec<Key>;
 }
 
@@ -338,7 +338,7 @@ macro_rules! settings {
                 #[serde(deny_unknown_fields, default)]
                 struct Written {
                     $($field: $type = $default,)*
-                    $($($split: <$split_type as $crate::settings::SplitGroup>::InSight = Default::default(),)*)?
+                    $($($split: <$split_type as $crate::settings::SplitGroup>::AnalystKeys = Default::default(),)*)?
                     expert: WrittenExpert = WrittenExpert::default(),
                 }
             }
@@ -358,7 +358,7 @@ macro_rules! settings {
                     Ok($name {
                         $($field: written.$field,)*
                         $($expert: written.expert.$expert,)*
-                        $($($split: $crate::settings::SplitGroup::join(written.$split, written.expert.$split),)*)?
+                        $($($split: $crate::settings::SplitGroup::merge(written.$split, written.expert.$split),)*)?
                         $($($other: $other_default,)*)?
                     })
                 }
@@ -372,7 +372,7 @@ macro_rules! settings {
                         keys_of_fields!($name: $($field: $type, $($doc)+;)*),
                         $($(below(
                             &[stringify!($split)],
-                            <$split_type as $crate::settings::SplitGroup>::keys_in_sight(),
+                            <$split_type as $crate::settings::SplitGroup>::keys_of_analyst(),
                         ),)*)?
                         below(
                             &["expert"],
@@ -437,7 +437,7 @@ macro_rules! settings {
             struct_with_defaults! {
                 #[derive(Debug, serde::Deserialize)]
                 #[serde(deny_unknown_fields, default)]
-                pub struct InSight {
+                pub struct AnalystKeys {
                     $($field: $type = $default,)*
                 }
             }
@@ -451,18 +451,18 @@ macro_rules! settings {
             }
 
             impl SplitGroup for $name {
-                type InSight = InSight;
+                type AnalystKeys = AnalystKeys;
                 type Expert = Expert;
 
-                fn join(in_sight: InSight, expert: Expert) -> $name {
+                fn merge(analyst: AnalystKeys, expert: Expert) -> $name {
                     $name {
-                        $($field: in_sight.$field,)*
+                        $($field: analyst.$field,)*
                         $($expert: expert.$expert,)*
                         $($($other: $other_default,)*)?
                     }
                 }
 
-                fn keys_in_sight() -> Vec<Key> {
+                fn keys_of_analyst() -> Vec<Key> {
                     keys_of_fields!($name: $($field: $type, $($doc)+;)*)
                 }
 

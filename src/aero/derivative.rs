@@ -145,14 +145,14 @@ impl Output {
         }
     }
 
-    /// Returns true for a measured state. Without one its axis is not estimated; an acceleration
-    /// that is not recorded is only left out of the likelihood.
+    /// `true` for a measured state. Without one its axis is not estimated; an acceleration that is
+    /// not recorded is only left out of the likelihood.
     #[must_use]
     pub fn is_state(self) -> bool {
         !matches!(self, Output::An | Output::Ax | Output::Ay)
     }
 
-    /// Returns true for an attitude, the integral of the rates.
+    /// `true` for an attitude, the integral of the rates.
     #[must_use]
     pub fn is_attitude(self) -> bool {
         matches!(self, Output::Theta | Output::Phi)

@@ -59,10 +59,10 @@ impl DerivativeUnit {
         }
     }
 
-    /// Factor from values in a unit as a database spells it (`per_rad`, `1/deg`, `N_per_deg`, `nd`)
-    /// to values in this one.
+    /// Factor that converts values from the unit `written`, as a database spells it (`per_rad`,
+    /// `1/deg`, `N_per_deg`, `nd`), to this unit.
     ///
-    /// Exactly one for its own name; `None` for a unit of another quantity.
+    /// Exactly 1 if `written` is this unit's name; `None` for a unit of another quantity.
     #[must_use]
     pub fn factor_from(self, written: &str) -> Option<f64> {
         if written.trim() == self.name() {

@@ -1,5 +1,5 @@
-//! Interpolation in a table: linear, or the monotone cubic of Fritsch and Carlson (1980)
-//! with the slopes of Fritsch and Butland (1984), which never overshoots the points on either side.
+//! Interpolation in a table: linear, or the monotone cubic of Fritsch and Carlson (1980) with the
+//! slopes of Fritsch and Butland (1984). It never overshoots the points on either side.
 //!
 //! On an interval of length h with the values y₀, y₁ and the slopes d₀, d₁ the cubic is Hermite's.
 //! The slope d at a point is the weighted harmonic mean of the chords on either side, with slopes δ₋

@@ -27,9 +27,9 @@ pub enum Regressor {
     AlphaRate,
     /// A control surface or any other recorded signal, in its own unit.
     Surface(String),
-    /// A thrust-vectoring vane, deg; the derivative is a force in lbf/deg over q̄S or a moment in
-    /// ft·lbf/deg over q̄S and the reference length (the bracketed terms of 2.10, 2.12, 2.13, 3.9,
-    /// 3.12, 3.13).
+    /// A thrust-vectoring vane, deg. The derivative is a force in lbf/deg over q̄S, or a moment in
+    /// ft·lbf/deg over q̄S and the reference length: the bracketed terms of 2.10, 2.12, 2.13, 3.9,
+    /// 3.12, 3.13.
     Vane(String),
     /// Magnitude of a regressor.
     Magnitude(Box<Regressor>),
@@ -65,8 +65,8 @@ impl Regressor {
         }
     }
 
-    /// True if the regressor is at most linear in α̇: no magnitude contains α̇, and no product has
-    /// it in both factors. The motion then follows from the loads by a linear equation.
+    /// `true` if the regressor is at most linear in α̇: no magnitude contains α̇, and no product
+    /// has it in both factors. The motion then follows from the loads by a linear equation.
     fn is_linear_in_alpha_rate(&self) -> bool {
         match self {
             Regressor::Magnitude(of) => !of.has_alpha_rate(),
@@ -78,7 +78,7 @@ impl Regressor {
         }
     }
 
-    /// True if any part of the regressor is α̇.
+    /// `true` if any part of the regressor is α̇.
     #[must_use]
     pub fn has_alpha_rate(&self) -> bool {
         self.leaves().contains(&&Regressor::AlphaRate)
@@ -142,8 +142,8 @@ impl Regressor {
         }
     }
 
-    /// Factor of proportion to the first part that has one, from the factors and the measured
-    /// values of the parts; `None` if no part has one.
+    /// Factor of proportion to the first part that has one, computed from the factors and measured
+    /// values of the parts. `None` if no part has one.
     pub fn factor(
         &self,
         factor_of: &impl Fn(&Regressor) -> Option<f64>,

@@ -51,7 +51,7 @@ pub struct Sensors {
     /// 2.9 and 3.8.
     #[serde(default)]
     pub vane_model: VaneModel,
-    /// Thrust in the axial accelerometer's equation. An accelerometer feels thrust; `false`
+    /// Thrust in the axial accelerometer's equation. An accelerometer measures thrust; `false`
     /// reproduces the print of eq. 2.8.
     #[serde(default = "default_true")]
     pub thrust_in_ax: bool,

@@ -12,4 +12,4 @@ mod vanes;
 pub use geometry::{Aircraft, Sensors, Vane, VaneModel};
 pub use position::Position;
 pub use thrust_line::{Thrust, ThrustLine};
-pub use vanes::{Flow, Reading};
+pub use vanes::{Reading, VaneFlow};

@@ -16,7 +16,7 @@ use crate::numerics::trig::{angle_of, sin_cos};
 
 /// Flow at the c.g. and rotation: angles in rad, velocity in ft/s, body rates in rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Flow {
+pub struct VaneFlow {
     pub alpha: f64,
     pub beta: f64,
     pub velocity: f64,
@@ -44,7 +44,7 @@ struct LocalVelocity {
 }
 
 /// Sine and cosine of an angle from a given direction, times the speed, with the angle's slopes.
-struct Turn {
+struct AngleFromDirection {
     sine: f64,
     cosine: f64,
     by_alpha: f64,
@@ -55,7 +55,7 @@ struct Turn {
 impl LocalVelocity {
     /// Angle in the plane of symmetry from a direction given by sine and cosine.
     #[inline(always)]
-    fn alpha_from(&self, direction: (f64, f64)) -> Turn {
+    fn alpha_from(&self, direction: (f64, f64)) -> AngleFromDirection {
         let [u, _, w] = self.velocity;
         let per_square = 1.0 / (u * u + w * w);
         let slope = |d: [f64; 3]| (u * d[2] - w * d[0]) * per_square;
@@ -64,7 +64,7 @@ impl LocalVelocity {
 
     /// Angle from the plane of symmetry, from a direction given by sine and cosine.
     #[inline(always)]
-    fn beta_from(&self, direction: (f64, f64)) -> Turn {
+    fn beta_from(&self, direction: (f64, f64)) -> AngleFromDirection {
         let [u, v, w] = self.velocity;
         let across = (u * u + w * w).sqrt();
         let per_square = 1.0 / (across * across + v * v);
@@ -73,15 +73,15 @@ impl LocalVelocity {
         self.turn((across, v), direction, slope)
     }
 
-    /// Turn of a vector in a plane from a direction, with the slope of its angle along a change of velocity.
+    /// Angle of a vector in a plane from a direction, with the slope of its angle along a change of velocity.
     #[inline(always)]
     fn turn(
         &self,
         (forward, aside): (f64, f64),
         (s, c): (f64, f64),
         slope: impl Fn([f64; 3]) -> f64,
-    ) -> Turn {
-        Turn {
+    ) -> AngleFromDirection {
+        AngleFromDirection {
             sine: aside * c - forward * s,
             cosine: forward * c + aside * s,
             by_alpha: slope(self.by_alpha),
@@ -91,7 +91,7 @@ impl LocalVelocity {
     }
 }
 
-impl Turn {
+impl AngleFromDirection {
     /// Reading of a vane, where the angle is from the direction `from`.
     #[inline(always)]
     fn reading(&self, from: f64) -> Reading {
@@ -110,7 +110,7 @@ impl Turn {
     }
 }
 
-impl Flow {
+impl VaneFlow {
     #[inline(always)]
     fn at(&self, arm: [f64; 3]) -> LocalVelocity {
         let (directions, v) = (sin_cos([self.alpha, self.beta]), self.velocity);
@@ -140,7 +140,7 @@ impl Vane {
     /// Reading of an α vane, with the c.g. at `cg`.
     #[inline(always)]
     #[must_use]
-    pub fn alpha_reading(self, model: VaneModel, flow: &Flow, cg: Position) -> Reading {
+    pub fn alpha_reading(self, model: VaneModel, flow: &VaneFlow, cg: Position) -> Reading {
         let arm = self.position().arm(cg);
         let exact = match model {
             VaneModel::Exact => {
@@ -207,7 +207,7 @@ impl Vane {
     /// Reading of a β vane, with the c.g. at `cg`.
     #[inline(always)]
     #[must_use]
-    pub fn beta_reading(self, model: VaneModel, flow: &Flow, cg: Position) -> Reading {
+    pub fn beta_reading(self, model: VaneModel, flow: &VaneFlow, cg: Position) -> Reading {
         let arm = self.position().arm(cg);
         let exact = match model {
             VaneModel::Exact => {
@@ -230,14 +230,14 @@ impl Sensors {
     /// Reading of the α vane, with the c.g. at `cg`.
     #[inline(always)]
     #[must_use]
-    pub fn alpha_reading(&self, flow: &Flow, cg: Position) -> Reading {
+    pub fn alpha_reading(&self, flow: &VaneFlow, cg: Position) -> Reading {
         self.alpha_vane.alpha_reading(self.vane_model, flow, cg)
     }
 
     /// Reading of the β vane, with the c.g. at `cg`.
     #[inline(always)]
     #[must_use]
-    pub fn beta_reading(&self, flow: &Flow, cg: Position) -> Reading {
+    pub fn beta_reading(&self, flow: &VaneFlow, cg: Position) -> Reading {
         self.beta_vane.beta_reading(self.vane_model, flow, cg)
     }
 
@@ -246,8 +246,8 @@ impl Sensors {
     /// tangents of the angles' remaining errors, which are almost linear.
     #[inline(always)]
     #[must_use]
-    pub fn flow_at_cg(&self, read: &Flow, cg: Position) -> Flow {
-        let mut flow = Flow {
+    pub fn flow_at_cg(&self, read: &VaneFlow, cg: Position) -> VaneFlow {
+        let mut flow = VaneFlow {
             alpha: read.alpha * (1.0 / self.alpha_vane.factor),
             beta: read.beta * (1.0 / self.beta_vane.factor),
             ..*read
@@ -333,16 +333,16 @@ mod tests {
         }
     }
 
-    const FLOW: Flow = Flow {
+    const FLOW: VaneFlow = VaneFlow {
         alpha: 0.6,
         beta: 0.1,
         velocity: 280.0,
         rates: [0.3, -0.1, 0.15],
     };
 
-    fn slopes_match(read: impl Fn(&Flow) -> Reading) {
+    fn slopes_match(read: impl Fn(&VaneFlow) -> Reading) {
         let (h, at) = (1e-6, read(&FLOW));
-        let numeric = |f: &dyn Fn(&mut Flow, f64)| {
+        let numeric = |f: &dyn Fn(&mut VaneFlow, f64)| {
             let (mut up, mut down) = (FLOW, FLOW);
             f(&mut up, h);
             f(&mut down, -h);
@@ -372,12 +372,12 @@ mod tests {
     fn a_vane_ahead_of_the_cg_reads_less_alpha_when_the_nose_goes_up() {
         for model in [VaneModel::Exact, VaneModel::SmallAngle] {
             let s = sensors(model);
-            let still = Flow {
+            let still = VaneFlow {
                 rates: [0.0; 3],
                 beta: 0.0,
                 ..FLOW
             };
-            let nose_up = Flow {
+            let nose_up = VaneFlow {
                 rates: [0.0, 0.2, 0.0],
                 ..still
             };
@@ -389,13 +389,13 @@ mod tests {
     fn a_vane_on_the_right_tip_reads_more_alpha_when_the_right_wing_goes_down() {
         for model in [VaneModel::Exact, VaneModel::SmallAngle] {
             let s = sensors(model);
-            let still = Flow {
+            let still = VaneFlow {
                 rates: [0.0; 3],
                 alpha: 0.1,
                 beta: 0.0,
                 ..FLOW
             };
-            let rolling = Flow {
+            let rolling = VaneFlow {
                 rates: [0.2, 0.0, 0.0],
                 ..still
             };
@@ -408,13 +408,13 @@ mod tests {
         // The nose moving right meets the air from the right.
         for model in [VaneModel::Exact, VaneModel::SmallAngle] {
             let s = sensors(model);
-            let still = Flow {
+            let still = VaneFlow {
                 rates: [0.0; 3],
                 alpha: 0.1,
                 beta: 0.0,
                 ..FLOW
             };
-            let yawing = Flow {
+            let yawing = VaneFlow {
                 rates: [0.0, 0.0, 0.2],
                 ..still
             };
@@ -424,7 +424,7 @@ mod tests {
 
     #[test]
     fn exact_and_printed_forms_agree_for_small_angles_at_the_cg_s_height() {
-        let small = Flow {
+        let small = VaneFlow {
             alpha: 0.02,
             beta: 0.0,
             velocity: 500.0,
@@ -440,7 +440,7 @@ mod tests {
     fn the_inversion_returns_the_angles_at_the_cg() {
         for model in [VaneModel::Exact, VaneModel::SmallAngle] {
             let s = sensors(model);
-            let read = Flow {
+            let read = VaneFlow {
                 alpha: s.alpha_reading(&FLOW, CG).angle,
                 beta: s.beta_reading(&FLOW, CG).angle,
                 ..FLOW

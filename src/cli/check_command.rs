@@ -25,8 +25,8 @@ pub fn check(options: &Options) -> anyhow::Result<ExitCode> {
     );
     out!(
         "model      {} derivatives, {} biases",
-        config.buildup.derivatives.len(),
-        config.buildup.biases.len()
+        config.aero_model.derivatives.len(),
+        config.aero_model.biases.len()
     );
     out!("tunnel     {}", config.tunnel_name());
     out!(
@@ -83,7 +83,7 @@ fn print_notes(config: &Config) {
         out!("note       channel `{column}`: it has no `signal`, and no formula or table uses it");
     }
     let of_hold = config.estimate.hold.warning().map(str::to_owned);
-    for warning in of_hold.into_iter().chain(config.buildup.lag_warning()) {
+    for warning in of_hold.into_iter().chain(config.aero_model.lag_warning()) {
         out!("note       {warning}");
     }
     let doubts = doubts(config);

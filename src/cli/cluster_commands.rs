@@ -7,9 +7,11 @@ use anyhow::Context;
 use clap::{Args, ValueEnum};
 
 use super::bars::Bars;
-use super::options::{ATTENTION, Options, Patience, REJECTED, TRY_AGAIN, exit_code, start_threads};
+use super::options::{
+    ATTENTION, Options, REJECTED, TRY_AGAIN, WaitOptions, exit_code, start_threads,
+};
 use super::run_summary::print_summary;
-use crate::cluster::plan::{Dealt, Shard, ShardPlan, array};
+use crate::cluster::plan::{DealtKind, Shard, ShardPlan, array};
 use crate::cluster::scripts::{self, CampaignCommands, LARGEST_ARRAY};
 use crate::cluster::shard;
 use crate::config::Config;
@@ -55,7 +57,7 @@ pub struct MergeOptions {
     #[command(flatten)]
     options: Options,
     #[command(flatten)]
-    patience: Patience,
+    wait_options: WaitOptions,
     /// The plan of maneuvers
     #[arg(long, value_name = "FILE")]
     plan: PathBuf,
@@ -83,7 +85,7 @@ enum Scheduler {
     Pbs,
 }
 
-fn plan_file(config: &Config, of: Dealt) -> PathBuf {
+fn plan_file(config: &Config, of: DealtKind) -> PathBuf {
     // A shared store is seen by all machines.
     config
         .shared_store
@@ -97,8 +99,8 @@ pub fn plan(options: &PlanOptions) -> anyhow::Result<ExitCode> {
     start_threads(options.options.threads)?;
     let config = options.options.load()?;
     let of = match options.of {
-        DealtArgument::Flights => Dealt::Flights,
-        DealtArgument::Maneuvers => Dealt::Maneuvers,
+        DealtArgument::Flights => DealtKind::Flights,
+        DealtArgument::Maneuvers => DealtKind::Maneuvers,
     };
     let file = options
         .out
@@ -139,10 +141,10 @@ impl ShareOptions {
         &self,
         until: Stage,
         options: &Options,
-        patience: &Patience,
+        wait_options: &WaitOptions,
     ) -> Option<anyhow::Result<ExitCode>> {
         let (plan, shard) = (self.plan.as_deref()?, self.shard?);
-        Some(match compute(plan, shard, until, options, patience) {
+        Some(match compute(plan, shard, until, options, wait_options) {
             Err(error)
                 if error
                     .downcast_ref::<Error>()
@@ -165,14 +167,14 @@ fn compute(
     shard: Shard,
     until: Stage,
     options: &Options,
-    patience: &Patience,
+    wait_options: &WaitOptions,
 ) -> anyhow::Result<ExitCode> {
     start_threads(options.threads)?;
     let config = options.load()?;
     let plan = shard::read_plan(file)?;
     anyhow::ensure!(
         until <= plan.of.last_stage()
-            && (until == Stage::Estimate) == (plan.of == Dealt::Maneuvers),
+            && (until == Stage::Estimate) == (plan.of == DealtKind::Maneuvers),
         "{} is a plan of {}: its shards are for `harvest {}`",
         file.display(),
         plan.of.name(),
@@ -183,7 +185,7 @@ fn compute(
         &plan,
         shard,
         until,
-        patience.wait(),
+        wait_options.longest_wait(),
         &Bars::new(options.quiet, None),
     )?;
     if !options.quiet {
@@ -224,7 +226,7 @@ pub fn merge(options: &MergeOptions) -> anyhow::Result<ExitCode> {
     let config = options.options.load()?;
     let bars = Bars::new(options.options.quiet, None);
     let plan = shard::read_plan(&options.plan)?;
-    match shard::merge(&config, &plan, options.patience.wait(), &bars) {
+    match shard::merge(&config, &plan, options.wait_options.longest_wait(), &bars) {
         Err(error) if error.is_transient() => Ok(ask_for_another_try(&error.into())),
         Err(error) => Err(error.into()),
         Ok(outcome) => {
@@ -250,8 +252,8 @@ pub fn submit(options: &SubmitOptions) -> anyhow::Result<ExitCode> {
         program: shown(&files::program()?),
         arguments: options.options.typed(),
         folder: shown(&folder),
-        flights: shown(&plan_file(&config, Dealt::Flights)),
-        maneuvers: shown(&plan_file(&config, Dealt::Maneuvers)),
+        flights: shown(&plan_file(&config, DealtKind::Flights)),
+        maneuvers: shown(&plan_file(&config, DealtKind::Maneuvers)),
         out: shown(&folder.join(&out)),
     };
     let engine = match options.engine {
@@ -262,8 +264,14 @@ pub fn submit(options: &SubmitOptions) -> anyhow::Result<ExitCode> {
         atomic::place(&out.join(script.name), script.text.as_bytes())?;
     }
     let bars = Bars::new(options.options.quiet, None);
-    let file = plan_file(&config, Dealt::Flights);
-    let plan = shard::deal(&config, Dealt::Flights, config.cluster.shards, &file, &bars)?;
+    let file = plan_file(&config, DealtKind::Flights);
+    let plan = shard::deal(
+        &config,
+        DealtKind::Flights,
+        config.cluster.shards,
+        &file,
+        &bars,
+    )?;
     let submit = out.join("submit.sh");
     if !options.options.quiet {
         print_plan(&plan, &file);

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::bars::Bars;
-use super::options::{Options, Patience, REJECTED, exit_code, start_threads};
+use super::options::{Options, REJECTED, WaitOptions, exit_code, start_threads};
 use crate::night::{has_rejections, model_export, model_export::Draws};
 
 /// Help below the options.
@@ -34,7 +34,7 @@ pub struct ExportOptions {
     #[command(flatten)]
     options: Options,
     #[command(flatten)]
-    patience: Patience,
+    wait_options: WaitOptions,
     /// The folder to write into [default: export in the folder of the reports]
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
@@ -65,7 +65,13 @@ pub fn export(options: &ExportOptions) -> anyhow::Result<ExitCode> {
         number: options.draws,
         seed: options.seed,
     };
-    let exported = model_export::export(&config, &folder, draws, options.patience.wait(), &bars)?;
+    let exported = model_export::export(
+        &config,
+        &folder,
+        draws,
+        options.wait_options.longest_wait(),
+        &bars,
+    )?;
     if !options.options.quiet {
         let (values, from_flight) = (exported.values, exported.from_flight);
         out!("{values} values, {from_flight} of them from flight");

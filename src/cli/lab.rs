@@ -91,7 +91,7 @@ struct Execution {
 
 /// Arguments of a command under its former name, ignored.
 #[derive(Args, Debug)]
-pub struct Former {
+pub struct IgnoredArguments {
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     arguments: Vec<String>,
 }

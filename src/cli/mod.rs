@@ -151,11 +151,11 @@ enum Command {
     #[command(subcommand)]
     Lab(lab::LabCommand),
     #[command(hide = true)]
-    Simulate(lab::Former),
+    Simulate(lab::IgnoredArguments),
     #[command(hide = true)]
-    Validate(lab::Former),
+    Validate(lab::IgnoredArguments),
     #[command(hide = true)]
-    BenchCase(lab::Former),
+    BenchCase(lab::IgnoredArguments),
 }
 
 /// Runs the program.

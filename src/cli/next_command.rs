@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::bars::Bars;
-use super::options::{Options, Patience, REJECTED, exit_code, start_threads};
+use super::options::{Options, REJECTED, WaitOptions, exit_code, start_threads};
 use crate::flight_plan::{PlannedFlight, Request, plan_next_flight};
 use crate::night::has_rejections;
 use crate::tables::NextCardRow;
@@ -42,7 +42,7 @@ pub struct NextOptions {
     #[command(flatten)]
     options: Options,
     #[command(flatten)]
-    patience: Patience,
+    wait_options: WaitOptions,
     /// Minutes of the flight for its cards
     #[arg(long, value_name = "MINUTES", value_parser = minutes)]
     minutes: f64,
@@ -78,7 +78,13 @@ pub fn next(options: &NextOptions) -> anyhow::Result<ExitCode> {
     let default = || config.reports.join("next");
     let folder = options.out.clone().unwrap_or_else(default);
     let bars = Bars::new(options.options.quiet, None);
-    let planned = plan_next_flight(&config, &request, &folder, options.patience.wait(), &bars)?;
+    let planned = plan_next_flight(
+        &config,
+        &request,
+        &folder,
+        options.wait_options.longest_wait(),
+        &bars,
+    )?;
     if !options.options.quiet {
         print(&planned, options.minutes);
     }

@@ -8,7 +8,7 @@ use clap::Args;
 use super::bars::Bars;
 use super::changes::{self, MOST_LISTED};
 use super::cluster_commands;
-use super::options::{ATTENTION, Options, Patience, REJECTED, exit_code, start_threads};
+use super::options::{ATTENTION, Options, REJECTED, WaitOptions, exit_code, start_threads};
 use crate::night::status::NightStatus;
 use crate::night::{diff, explain, gc, status, verify};
 
@@ -66,7 +66,7 @@ pub struct GcOptions {
     #[command(flatten)]
     options: Options,
     #[command(flatten)]
-    patience: Patience,
+    wait_options: WaitOptions,
     /// Remove what is shown; without it nothing is
     #[arg(long)]
     yes: bool,
@@ -225,7 +225,7 @@ pub fn verify(options: &VerifyOptions) -> anyhow::Result<ExitCode> {
 /// Prints what no published night needs, and removes it if asked for.
 pub fn gc(options: &GcOptions) -> anyhow::Result<ExitCode> {
     let config = options.options.load()?;
-    let unneeded = gc::gc(&config, options.yes, options.patience.wait())?;
+    let unneeded = gc::gc(&config, options.yes, options.wait_options.longest_wait())?;
     if !options.options.quiet {
         for name in unneeded
             .nights

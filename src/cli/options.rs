@@ -31,14 +31,14 @@ pub fn exit_code(condition: bool, code: u8) -> ExitCode {
 }
 
 #[derive(Args, Debug)]
-pub struct Patience {
+pub struct WaitOptions {
     /// Longest wait for another run to leave the store and the reports
     #[arg(long = "wait", value_name = "SECONDS", default_value_t = 0)]
     pub seconds: u64,
 }
 
-impl Patience {
-    pub fn wait(&self) -> Duration {
+impl WaitOptions {
+    pub fn longest_wait(&self) -> Duration {
         Duration::from_secs(self.seconds)
     }
 }

@@ -10,7 +10,7 @@ use clap::Args;
 
 use super::bars::Bars;
 use super::cluster_commands::ShareOptions;
-use super::options::{Options, Patience, REJECTED, start_threads};
+use super::options::{Options, REJECTED, WaitOptions, start_threads};
 use super::run_summary::print_summary;
 use super::signals::log_signals;
 use crate::config::Config;
@@ -23,7 +23,7 @@ pub struct RunOptions {
     #[command(flatten)]
     options: Options,
     #[command(flatten)]
-    patience: Patience,
+    wait_options: WaitOptions,
     /// Append stages, problems and the result to a file, one JSON object per line with the time of
     /// day (UTC)
     #[arg(long, value_name = "FILE")]
@@ -42,7 +42,7 @@ pub struct StageOptions {
 pub fn run_stage(until: Stage, options: &StageOptions) -> anyhow::Result<ExitCode> {
     let shard = options
         .share
-        .compute(until, &options.run.options, &options.run.patience);
+        .compute(until, &options.run.options, &options.run.wait_options);
     shard.unwrap_or_else(|| run_campaign(until, &options.run))
 }
 
@@ -75,7 +75,7 @@ fn publish(until: Stage, options: &RunOptions, log: Option<&Arc<Log>>) -> anyhow
     if let Some(log) = log {
         log_signals(log, bars.work()).context("cannot log signals")?;
     }
-    let outcome = night::run(&config, until, options.patience.wait(), &bars)?;
+    let outcome = night::run(&config, until, options.wait_options.longest_wait(), &bars)?;
     if !quiet {
         print_summary(&config, &outcome, until);
     }

@@ -38,8 +38,8 @@ pub fn log_signals(log: &Arc<Log>, work: &Arc<CurrentItems>) -> std::io::Result<
     Ok(())
 }
 
-/// Turns the signal for a file above the shell's size limit (`ulimit -f`) into an error of the
-/// write, like that of a full disk, so that the program does not end there.
+/// Turns the signal for a file above the shell's size limit (`ulimit -f`) into a write error, like
+/// that of a full disk. The signal would end the program.
 ///
 /// # Errors
 /// The system refuses to report signals.

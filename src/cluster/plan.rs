@@ -15,19 +15,19 @@ const FORM: u32 = 3;
 /// Kind of items that a plan deals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Dealt {
+pub enum DealtKind {
     /// Flights: ingest, segment, evidence on the surfaces.
     Flights,
     /// Maneuvers of flights that are ingested and segmented: estimate.
     Maneuvers,
 }
 
-impl Dealt {
+impl DealtKind {
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
-            Dealt::Flights => "flights",
-            Dealt::Maneuvers => "maneuvers",
+            DealtKind::Flights => "flights",
+            DealtKind::Maneuvers => "maneuvers",
         }
     }
 
@@ -35,8 +35,8 @@ impl Dealt {
     #[must_use]
     pub fn last_stage(self) -> Stage {
         match self {
-            Dealt::Flights => Stage::Segment,
-            Dealt::Maneuvers => Stage::Estimate,
+            DealtKind::Flights => Stage::Segment,
+            DealtKind::Maneuvers => Stage::Estimate,
         }
     }
 }
@@ -57,7 +57,7 @@ pub struct Item {
 
 /// A flight or maneuver to be dealt.
 #[derive(Clone, Debug, PartialEq)]
-pub struct DealtWork {
+pub struct ShardWork {
     /// Id of the flight or maneuver.
     pub id: String,
     /// Flight of the archive.
@@ -71,7 +71,7 @@ pub struct DealtWork {
 #[serde(deny_unknown_fields)]
 pub struct ShardPlan {
     form: u32,
-    pub of: Dealt,
+    pub of: DealtKind,
     pub shards: usize,
     pub items: Vec<Item>,
     /// Corrections of the surfaces' delays from all flights; a plan of flights has none.
@@ -89,16 +89,16 @@ impl ShardPlan {
     /// cost differs from the mean by at most the cost of the most expensive item.
     #[must_use]
     pub fn deal(
-        of: Dealt,
+        of: DealtKind,
         shards: usize,
-        work: Vec<DealtWork>,
+        work: Vec<ShardWork>,
         delays: Vec<DelayCorrection>,
         lineage: &Lineage,
     ) -> ShardPlan {
         let shards = shards.max(1);
         let total: f64 = work.iter().map(|work| work.cost).sum();
         let mut before = 0.0;
-        let item = |work: DealtWork| {
+        let item = |work: ShardWork| {
             let middle = (before + 0.5 * work.cost) / total.max(f64::MIN_POSITIVE);
             before += work.cost;
             #[expect(
@@ -229,11 +229,11 @@ impl FromStr for Shard {
 mod tests {
     use super::*;
 
-    fn work(costs: &[f64]) -> Vec<DealtWork> {
+    fn work(costs: &[f64]) -> Vec<ShardWork> {
         costs
             .iter()
             .enumerate()
-            .map(|(i, cost)| DealtWork {
+            .map(|(i, cost)| ShardWork {
                 id: format!("m{i:03}"),
                 flight_id: "f".to_owned(),
                 cost: *cost,
@@ -246,7 +246,7 @@ mod tests {
         for n in [1, 4, 24, 200] {
             let costs: Vec<f64> = (0..106).map(|i| 1.0 + f64::from(i * i % 17)).collect();
             let plan = ShardPlan::deal(
-                Dealt::Maneuvers,
+                DealtKind::Maneuvers,
                 n,
                 work(&costs),
                 vec![],
@@ -268,7 +268,7 @@ mod tests {
     #[test]
     fn items_that_cost_nothing_are_dealt_all_the_same() {
         let plan = ShardPlan::deal(
-            Dealt::Flights,
+            DealtKind::Flights,
             3,
             work(&[0.0, 0.0]),
             vec![],
@@ -280,7 +280,7 @@ mod tests {
     #[test]
     fn a_plan_with_an_item_twice_or_in_no_shard_is_refused() {
         let plan = ShardPlan::deal(
-            Dealt::Maneuvers,
+            DealtKind::Maneuvers,
             2,
             work(&[1.0, 1.0]),
             vec![],

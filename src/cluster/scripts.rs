@@ -1,5 +1,5 @@
 //! Scripts for a batch scheduler: an array over flights, the plan of their maneuvers, an array over
-//! maneuvers, the merge; each waits for the one before.
+//! maneuvers, and the merge. Each job waits for the one before.
 //!
 //! Slurm cancels a dependency on an array (`afterok`) if `RequeueExit` requeues one of its tasks. A
 //! task that needs another try therefore requeues itself (`scontrol requeue`), which the dependency

@@ -9,14 +9,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::time::Duration;
 
-use super::plan::{Dealt, DealtWork, Item, Shard, ShardPlan, array};
+use super::plan::{DealtKind, Item, Shard, ShardPlan, ShardWork, array};
 use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::flight::is_stretch;
 use crate::lineage::{Lineage, Stage};
 use crate::maneuver::{Maneuver, Status};
 use crate::night::{RunOutcome, campaign_lineage, run};
-use crate::pipeline::{AbsentArtefacts, Campaign, Conductor, Progress, bring_maneuvers};
+use crate::pipeline::{AbsentArtefacts, Campaign, Conductor, Progress, load_or_make_maneuvers};
 use crate::recorder::FlightCorrections;
 use crate::store::archive::{self, FlightFiles};
 use crate::store::files;
@@ -36,13 +36,13 @@ pub fn read_plan(file: &Path) -> Result<ShardPlan> {
 /// No archive, a store in use; for maneuvers, flights that are not yet ingested and segmented.
 pub fn deal(
     config: &Config,
-    dealt: Dealt,
+    dealt: DealtKind,
     shards: usize,
     file: &Path,
     progress: &dyn Progress,
 ) -> Result<ShardPlan> {
     let archive = archive::find(&config.archive)?;
-    let mut conductor = Conductor::join(
+    let mut conductor = Conductor::open_shared(
         config,
         archive,
         AbsentArtefacts::Report,
@@ -51,8 +51,8 @@ pub fn deal(
     )?;
     conductor.remember_contents()?;
     let (work, delays, corrections) = match dealt {
-        Dealt::Flights => (flights(&conductor), vec![], vec![]),
-        Dealt::Maneuvers => maneuvers(&mut conductor)?,
+        DealtKind::Flights => (flights(&conductor), vec![], vec![]),
+        DealtKind::Maneuvers => maneuvers(&mut conductor)?,
     };
     let mut plan = ShardPlan::deal(dealt, shards, work, delays, &campaign_lineage(&conductor));
     plan.corrections = corrections;
@@ -86,7 +86,7 @@ pub fn compute(
     let flight_ids: BTreeSet<&str> = items.iter().map(|item| item.flight_id.as_str()).collect();
     let mut archive = archive::find(&config.archive)?;
     archive.retain(|f| flight_ids.contains(f.flight_id.as_str()));
-    let conductor = Conductor::join(config, archive, AbsentArtefacts::Make, wait, progress)?;
+    let conductor = Conductor::open_shared(config, archive, AbsentArtefacts::Make, wait, progress)?;
     check_lineage(plan, &conductor, Some(&flight_ids))?;
     let mut campaign = conductor.campaign(until.min(Stage::Segment))?;
     if let Some((flight, why)) = campaign.unread.first_key_value() {
@@ -94,12 +94,12 @@ pub fn compute(
         return Err(Error::store(Path::new(flight), &what));
     }
     match plan.of {
-        Dealt::Maneuvers => {
+        DealtKind::Maneuvers => {
             campaign.correct_flights(&plan.corrections);
             estimate(&conductor, &campaign, plan, &items)?;
         }
-        Dealt::Flights if until >= Stage::Segment => conductor.surfaces(&mut campaign)?,
-        Dealt::Flights => {}
+        DealtKind::Flights if until >= Stage::Segment => conductor.surfaces(&mut campaign)?,
+        DealtKind::Flights => {}
     }
     let store = &conductor.runner.store;
     store.send_unsent()?;
@@ -145,7 +145,7 @@ pub fn merge(
     wait: Duration,
     progress: &dyn Progress,
 ) -> Result<RunOutcome> {
-    if plan.of != Dealt::Maneuvers {
+    if plan.of != DealtKind::Maneuvers {
         let what = "a merge takes the plan of maneuvers (harvest plan --of maneuvers)";
         return Err(Error::config(&config.store, None, what));
     }
@@ -189,7 +189,7 @@ fn check_lineage(
 }
 
 /// Every flight whose files can be read, at the cost of its bytes.
-fn flights(conductor: &Conductor) -> Vec<DealtWork> {
+fn flights(conductor: &Conductor) -> Vec<ShardWork> {
     let contents = &conductor.runner.contents;
     let bytes = |file: &FlightFiles| -> f64 {
         let digests = file.files.iter().filter_map(|path| contents.of(path).ok());
@@ -201,7 +201,7 @@ fn flights(conductor: &Conductor) -> Vec<DealtWork> {
             .fingerprint(&file.flight_id)
             .is_ok()
     };
-    let work = |file: &FlightFiles| DealtWork {
+    let work = |file: &FlightFiles| ShardWork {
         id: file.flight_id.clone(),
         flight_id: file.flight_id.clone(),
         cost: bytes(file),
@@ -211,7 +211,7 @@ fn flights(conductor: &Conductor) -> Vec<DealtWork> {
 }
 
 /// Work on maneuvers, with the corrections that all flights together decide.
-type ManeuverWork = (Vec<DealtWork>, Vec<DelayCorrection>, Vec<FlightCorrections>);
+type ManeuverWork = (Vec<ShardWork>, Vec<DelayCorrection>, Vec<FlightCorrections>);
 
 /// Lists the maneuvers of the campaign as work for shards, with the corrections of surfaces and
 /// instruments, which need the evidence of all flights.
@@ -236,7 +236,7 @@ fn maneuvers(conductor: &mut Conductor) -> Result<ManeuverWork> {
     let work = |m: &Maneuver| {
         let mut archive = conductor.archive.iter();
         let file = archive.find(|f| is_stretch(&m.flight_id, &f.flight_id))?;
-        Some(DealtWork {
+        Some(ShardWork {
             id: m.maneuver_id.clone(),
             flight_id: file.flight_id.clone(),
             cost: cost(config, m),
@@ -279,7 +279,7 @@ fn estimate(
         })
     };
     let maneuvers: Result<Vec<&Maneuver>> = items.iter().map(maneuver).collect();
-    bring_maneuvers(
+    load_or_make_maneuvers(
         &conductor.runner,
         &campaign.flights,
         &maneuvers?,

@@ -2,8 +2,8 @@
 //! with the earlier trend of that group. z is the difference over its standard error, the root of
 //! the sum of both squared standard errors.
 //!
-//! If both campaigns share flights, their errors are not independent, and z is too small: the
-//! comparison may miss small changes, but reports no false ones.
+//! If the two campaigns share flights, their errors are not independent, and z is too small. The
+//! comparison may then miss small changes, but reports no false ones.
 
 use std::path::Path;
 

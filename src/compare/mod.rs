@@ -1,11 +1,12 @@
 //! Compare sets flight against the wind tunnel and against earlier campaigns, derivative by
 //! derivative.
 //!
-//! [`tunnel`] compares the posterior of each derivative at the tunnel's breakpoints, and each maneuver
-//! at its own α and Mach number. [`earlier_campaign`] compares trends with those of an earlier
-//! campaign. A difference is judged by its standard error: the posterior's standard deviation, or
-//! √(bound² + tunnel's uncertainty²) of a maneuver, with the tunnel's uncertainty where it states one. [`ranges`] puts verdicts into words; [`extrapolation`] lists where the tunnel
-//! was read outside its tables.
+//! [`tunnel`] compares the posterior of each derivative at the tunnel's breakpoints, and each
+//! maneuver at its own α and Mach number. [`earlier_campaign`] compares trends with those of an
+//! earlier campaign. A difference is judged by its standard error. That of the posterior is its
+//! standard deviation. That of a maneuver is √(bound² + tunnel's uncertainty²), or its bound if the
+//! tunnel states no uncertainty. [`ranges`] puts verdicts into words; [`extrapolation`] lists where
+//! the tunnel was read outside its tables.
 
 pub mod earlier_campaign;
 pub mod extrapolation;

@@ -17,15 +17,16 @@ use crate::tables::{
 use crate::trend;
 
 /// Compares the posterior of each derivative with the tunnel: one row per derivative and α, in the
-/// order of the posterior, at the tunnel's breakpoints where it has some there. Over Mach number and
-/// third variable the point nearest to the maneuvers near that α counts.
+/// order of the posterior. The angles are the tunnel's breakpoints where it has some. Over Mach
+/// number and third variable the point nearest to the maneuvers near that α counts.
 ///
-/// The posterior's standard deviation has the tunnel's uncertainty in it, so it alone is the error of
-/// the difference. The verdict is `nothing learnt` where flight gave less than `learnt_pct` of the
-/// information; `sign differs` where both are on different sides of zero, the posterior beyond its
-/// error; `agrees` within `agreement_z` errors or `agreement_pct` percent; else `flight higher` or
-/// `flight lower` in the algebraic sense: −0.3 is lower than −0.2. `difference_pct` is in percent
-/// of the tunnel value's magnitude, so it has the same sign.
+/// The posterior's standard deviation has the tunnel's uncertainty in it, so it alone is the error
+/// of the difference. Verdicts, in this order:
+/// - `nothing learnt`: flight gave less than `learnt_pct` of the information;
+/// - `sign differs`: flight and tunnel have opposite signs, and the posterior exceeds its error;
+/// - `agrees`: the difference is within `agreement_z` errors or `agreement_pct` percent;
+/// - `flight higher`, `flight lower`: otherwise, in the algebraic sense (−0.3 is lower than −0.2).
+///   `difference_pct` is in percent of the tunnel value's magnitude, so it has the same sign.
 #[must_use]
 pub fn compare_posterior(
     posterior: &[PosteriorRow],

@@ -6,7 +6,7 @@ use super::checked::Config;
 use crate::aero::{Axis, Derivative, Output};
 use crate::error::did_you_mean;
 use crate::flight::signal;
-use crate::flight::stand_in::{StandIn, cost};
+use crate::flight::stand_in::{StandIn, consequence_of_absence};
 use crate::maneuver::{Class, Status};
 use crate::segment::absent_signals;
 
@@ -110,7 +110,10 @@ impl<'a> Recorder<'a> {
             let Some(stand_in) = StandIn::of(signal, has) else {
                 continue;
             };
-            let (own, absent) = (cost(signal, has), (signal, stand_in.in_words()));
+            let (own, absent) = (
+                consequence_of_absence(signal, has),
+                (signal, stand_in.in_words()),
+            );
             match costs.iter_mut().find(|(cost, _)| *cost == own) {
                 Some((_, signals)) => signals.push(absent),
                 None => costs.push((own, vec![absent])),
@@ -119,7 +122,9 @@ impl<'a> Recorder<'a> {
         let mut lines: Vec<String> = costs.iter().map(|(cost, s)| absence(s, cost)).collect();
         let optional = signal::OPTIONAL.into_iter();
         let absent = optional.filter(|signal| !has(signal));
-        lines.extend(absent.map(|signal| format!("no `{signal}`: {}", cost(signal, has))));
+        lines.extend(
+            absent.map(|signal| format!("no `{signal}`: {}", consequence_of_absence(signal, has))),
+        );
         lines
     }
 
@@ -169,7 +174,7 @@ impl<'a> Recorder<'a> {
         let config = self.config;
         let has = |signal: &str| self.has_signal(signal);
         let of_recognition = absent_signals(&config.classes, &config.segment, has);
-        let derivatives = config.buildup.derivatives.iter();
+        let derivatives = config.aero_model.derivatives.iter();
         let of_model = derivatives.flat_map(|d| d.regressor.signals());
         let of_instruments = config.estimate.calibration.keys().map(String::as_str);
         let used = of_recognition.iter().map(|absent| absent.signal.as_str());
@@ -232,7 +237,7 @@ impl<'a> Recorder<'a> {
 
     /// Derivatives of a class's axis whose regressors contain a surface.
     fn derivatives_of(&self, surface: &str, class: &Class) -> impl Iterator<Item = &Derivative> {
-        let derivatives = self.config.buildup.derivatives_of(class.axis);
+        let derivatives = self.config.aero_model.derivatives_of(class.axis);
         derivatives.filter(move |d| d.regressor.signals().any(|s| s == surface))
     }
 
@@ -249,7 +254,7 @@ impl<'a> Recorder<'a> {
             let own = absent.iter().find(|absent| absent.signal == name);
             own.is_some_and(|absent| !absent.unrecognised.is_empty())
         };
-        let derivatives = config.buildup.derivatives_of(class.axis);
+        let derivatives = config.aero_model.derivatives_of(class.axis);
         let of_model = derivatives.flat_map(|d| d.regressor.signals());
         let of_model = of_model.filter(|name| !signal::is_own(name) && !has(name));
         let mut lost: BTreeSet<&str> = of_model.filter(|name| self.needs(class, name)).collect();

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::cluster::ClusterSettings;
 use super::written::ReportSettings;
-use crate::aero::{Buildup, WindTunnel};
+use crate::aero::{AeroModel, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::flight::Channel;
 use crate::maneuver::{Class, Event};
@@ -37,7 +37,7 @@ pub struct Config {
     /// Columns of the channel map that give no signal, and that no formula uses.
     pub unused_columns: Vec<String>,
     pub constants: BTreeMap<String, f64>,
-    pub buildup: Buildup,
+    pub aero_model: AeroModel,
     pub tunnel: WindTunnel,
     pub classes: Vec<Class>,
     pub events: Vec<Event>,
@@ -78,9 +78,9 @@ impl Config {
     /// Names of derivatives and sums in the order of the model.
     #[must_use]
     pub fn derivative_names(&self) -> Vec<String> {
-        let derivatives = self.buildup.derivatives.iter().map(|d| &d.name);
+        let derivatives = self.aero_model.derivatives.iter().map(|d| &d.name);
         derivatives
-            .chain(self.buildup.combined.iter().map(|c| &c.name))
+            .chain(self.aero_model.combined.iter().map(|c| &c.name))
             .cloned()
             .collect()
     }

@@ -8,7 +8,7 @@ use super::instruments::{self, InstrumentErrors};
 use super::source::{Files, Source};
 use super::written::PipelineFile;
 use super::{channel_map, check, events, moved, places, questions, tunnel_tables};
-use crate::aero::{Axis, Buildup};
+use crate::aero::{AeroModel, Axis};
 use crate::error::Result;
 use crate::maneuver::{Class, Status};
 use crate::output_error::calibration_errors::Calibration;
@@ -66,7 +66,7 @@ impl Config {
         overrides.replace_keys(&mut pipeline);
         let aircraft = files.aircraft()?;
         share_keys(&mut pipeline, &aircraft.instruments);
-        let buildup = files.model()?;
+        let aero_model = files.model()?;
         let mut classes = files.classes()?;
         let name = folder.file_name().map_or_else(
             || "pipeline".to_owned(),
@@ -83,13 +83,13 @@ impl Config {
         let default_reports = Path::new("reports").join(&name);
         let reports = pipeline.reports.unwrap_or(default_reports);
         places::reachable(Path::new(&pipeline.archive))?;
-        let read_tables = |file| tunnel_tables::read_optional(file, &buildup, &pipeline.tunnel);
+        let read_tables = |file| tunnel_tables::read_optional(file, &aero_model, &pipeline.tunnel);
         let tunnel = read_tables(pipeline.wind_tunnel.as_deref())?;
         let held_at_nothing = match &pipeline.wind_tunnel {
             Some(_) => 0,
             None => classes.iter_mut().map(Class::hold_nothing).sum(),
         };
-        name_surfaces(&mut classes, &buildup, &pipeline.segment);
+        name_surfaces(&mut classes, &aero_model, &pipeline.segment);
         let proof = files.proof_of_match()?;
         let match_database = proof.as_ref().and_then(|proof| proof.database.as_deref());
         let match_database = read_tables(match_database)?;
@@ -109,7 +109,7 @@ impl Config {
             unused_columns: channel_map::unused(&aircraft.channels, &channels),
             channels,
             constants: aircraft.constants,
-            buildup,
+            aero_model,
             classes,
             ingest: pipeline.ingest,
             segment: pipeline.segment,
@@ -175,9 +175,9 @@ fn share_keys(pipeline: &mut PipelineFile, errors: &BTreeMap<String, InstrumentE
 }
 
 /// Enters into each class the surfaces whose derivatives it estimates and whose steps are found.
-fn name_surfaces(classes: &mut [Class], buildup: &Buildup, segment: &segment::Settings) {
+fn name_surfaces(classes: &mut [Class], aero_model: &AeroModel, segment: &segment::Settings) {
     for class in classes {
-        let estimated = buildup
+        let estimated = aero_model
             .derivatives_of(class.axis)
             .filter(|derivative| class.statuses.get(&derivative.name) == Some(&Status::Estimated));
         let surfaces = estimated.filter_map(|derivative| derivative.regressor.surface());

@@ -148,7 +148,7 @@ fn every_default_can_be_written_under_its_key() {
     assert!(parsed > 100, "{parsed} defaults");
 }
 
-/// Names that the parser accepts at a path, taken from its error about an unknown name; `None` if
+/// Names that the parser accepts at a path, taken from its error about an unknown name. `None` if
 /// it takes a single value or any name.
 fn expected(file: fn(&Source) -> Option<String>, path: &[&str]) -> Option<Vec<String>> {
     let text = yaml(&[path, &["no_such_key"]].concat(), "0");

@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 
 use super::written::{AircraftFile, ClassFile, ModelFile};
 use super::yaml_bounds;
-use crate::aero::Buildup;
+use crate::aero::AeroModel;
 use crate::error::{Error, Result, did_you_mean};
 use crate::maneuver::Class;
 use crate::proof_of_match;
@@ -245,9 +245,9 @@ impl Files {
         self.aircraft.parse()
     }
 
-    pub fn model(&self) -> Result<Buildup> {
+    pub fn model(&self) -> Result<AeroModel> {
         let file = self.model.parse::<ModelFile>()?;
-        file.buildup()
+        file.aero_model()
             .map_err(|(name, what)| self.model.error(&name, format!("{name}: {what}")))
     }
 

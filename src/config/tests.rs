@@ -98,7 +98,7 @@ impl Copy {
 fn the_shipped_pipeline_is_right() {
     let config = Copy::new().load(Overrides::default()).unwrap();
     assert_eq!(config.classes.len(), 9);
-    assert_eq!(config.buildup.derivatives.len(), 48);
+    assert_eq!(config.aero_model.derivatives.len(), 48);
 }
 
 #[test]
@@ -278,7 +278,13 @@ fn a_lag_is_not_held_by_evidence() {
         copy.spoil(&file, "held: [", "held: [CA_q, ");
     }
     let config = copy.load(Overrides::default()).unwrap();
-    assert!(config.buildup.lag_warning().unwrap().starts_with("CA_q: "));
+    assert!(
+        config
+            .aero_model
+            .lag_warning()
+            .unwrap()
+            .starts_with("CA_q: ")
+    );
     copy.spoil("pipeline.yaml", "  hold: table\n", "  hold: evidence\n");
     let e = copy.error();
     assert!(

@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use crate::aero::{Buildup, Derivative, DerivativeUnit, WindTunnel, wind_tunnel};
+use crate::aero::{AeroModel, Derivative, DerivativeUnit, WindTunnel, wind_tunnel};
 use crate::error::{Error, Result, similarity};
 use crate::store;
 use crate::store::files::TunnelRow;
@@ -16,24 +16,24 @@ pub(super) const MISSPELT: f64 = 0.93;
 /// Reads the tunnel's tables, in the units of the model's derivatives.
 pub(super) fn read(
     path: &Path,
-    buildup: &Buildup,
+    aero_model: &AeroModel,
     settings: &wind_tunnel::Settings,
 ) -> Result<WindTunnel> {
     let error = |line: Option<usize>, what: String| Error::config(path, line, what);
     let mut tunnel = WindTunnel::new(settings.clone());
     let mut read = RowsRead::default();
-    let derivatives = buildup.derivatives.iter();
+    let derivatives = aero_model.derivatives.iter();
     let derivatives: BTreeMap<String, &Derivative> = derivatives
         .map(|d| (wind_tunnel::key(&d.name), d))
         .collect();
-    for (line, mut row) in tunnel_rows(path, buildup, settings)? {
+    for (line, mut row) in tunnel_rows(path, aero_model, settings)? {
         check(&row)
             .and_then(|()| convert(&mut row, &derivatives))
             .and_then(|()| read.add(line, &row))
             .map_err(|what| error(Some(line), what))?;
         tunnel.insert_at(&row.derivative, row.third, row.point());
     }
-    if let Some((line, what)) = read.misspelt(buildup) {
+    if let Some((line, what)) = read.misspelt(aero_model) {
         return Err(error(Some(line), what));
     }
     if let Some(third) = settings.third.as_ref().filter(|_| !read.has_third) {
@@ -49,12 +49,12 @@ pub(super) fn read(
 /// Reads the tables of a file; without a file there are none.
 pub(super) fn read_optional(
     path: Option<&Path>,
-    buildup: &Buildup,
+    aero_model: &AeroModel,
     settings: &wind_tunnel::Settings,
 ) -> Result<WindTunnel> {
     path.map_or_else(
         || Ok(WindTunnel::new(settings.clone())),
-        |path| read(path, buildup, settings),
+        |path| read(path, aero_model, settings),
     )
 }
 
@@ -62,12 +62,12 @@ pub(super) fn read_optional(
 /// sums.
 pub(crate) fn tunnel_rows(
     path: &Path,
-    buildup: &Buildup,
+    aero_model: &AeroModel,
     settings: &wind_tunnel::Settings,
 ) -> Result<Vec<(usize, TunnelRow)>> {
-    let derivatives = buildup.derivatives.iter().map(|d| &d.name);
+    let derivatives = aero_model.derivatives.iter().map(|d| &d.name);
     let names: Vec<String> = derivatives
-        .chain(buildup.combined.iter().map(|c| &c.name))
+        .chain(aero_model.combined.iter().map(|c| &c.name))
         .map(|name| wind_tunnel::key(name))
         .collect();
     let third = settings.third.as_ref().map(|third| third.name.as_str());
@@ -214,9 +214,9 @@ impl RowsRead {
 
     /// Line and message for the first name that the model lacks, if it resembles a name of the
     /// model that has no rows.
-    fn misspelt(&self, buildup: &Buildup) -> Option<(usize, String)> {
-        let derivatives = buildup.derivatives.iter().map(|d| &d.name);
-        let names = derivatives.chain(buildup.combined.iter().map(|c| &c.name));
+    fn misspelt(&self, aero_model: &AeroModel) -> Option<(usize, String)> {
+        let derivatives = aero_model.derivatives.iter().map(|d| &d.name);
+        let names = derivatives.chain(aero_model.combined.iter().map(|c| &c.name));
         let (found, lacking): (Vec<&String>, Vec<&String>) =
             names.partition(|name| self.first_lines.contains_key(&wind_tunnel::key(name)));
         let found: BTreeSet<String> = found

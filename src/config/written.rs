@@ -8,7 +8,7 @@ use serde::Deserialize;
 use super::cluster::ClusterSettings;
 use super::instruments::InstrumentErrors;
 use crate::aero::{
-    Axis, Bias, Buildup, Coefficient, Combined, Derivative, Output, Regressor, wind_tunnel,
+    AeroModel, Axis, Bias, Coefficient, Combined, Derivative, Output, Regressor, wind_tunnel,
 };
 use crate::aircraft::Aircraft;
 use crate::maneuver::class::Recognition;
@@ -64,7 +64,7 @@ settings! {
         /// Derivatives for simulators.
         #[serde(default)]
         pub export: export::Settings,
-        /// Report and published nights.
+        /// Settings of the report and of the published nights.
         #[serde(default)]
         pub report: ReportSettings,
         /// Resources on a batch cluster.
@@ -102,8 +102,8 @@ pub struct AircraftFile {
     pub instruments: BTreeMap<String, InstrumentErrors>,
 }
 
-/// Line of the channel map: a column with its signal; a formula or a table with its signal; or a column
-/// that only formulas and tables use, without one.
+/// Line of the channel map: a column, a formula or a table with its signal; or a column without a
+/// signal that only formulas and tables use.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ChannelLine {
@@ -186,7 +186,7 @@ impl DerivativeLine {
 impl ModelFile {
     /// Build-up of the file. The error has the name of a derivative, and the fault of its
     /// regressor.
-    pub fn buildup(self) -> Result<Buildup, (String, String)> {
+    pub fn aero_model(self) -> Result<AeroModel, (String, String)> {
         let file = self;
         let combined = |line: CombinedLine| Combined {
             name: line.name,
@@ -194,7 +194,7 @@ impl ModelFile {
             slope: line.slope,
         };
         let derivatives = file.derivatives.into_iter();
-        Ok(Buildup {
+        Ok(AeroModel {
             derivatives: derivatives
                 .map(DerivativeLine::derivative)
                 .collect::<Result<_, _>>()?,

@@ -1,10 +1,11 @@
-//! Equations of an axis in moving air: its states, and the rates that the aerodynamics feel.
+//! Equations of an axis in moving air: its states, and the body rates relative to the air.
 //!
-//! The first state is the flow angle with gusts included, which the vane and the aerodynamics
-//! sense. A rotary gust g makes the aerodynamics feel the rate q + g, while the gyro and the
-//! kinematics keep q. In the state vector the felt rates follow the axis's own states. A gust is
-//! constant during a step of the integration, so a felt rate has the acceleration of its own rate;
-//! between steps gusts decay and grow ([`InGusts::decayed`]).
+//! The first state is the flow angle with gusts included. The vane measures it, and the
+//! aerodynamics depend on it. With a rotary gust g the aerodynamics depend on the rate q + g
+//! relative to the air; the gyro and the kinematics have q. In the state vector the rates relative
+//! to the air follow the states of the axis in still air. A gust is constant during a step of the
+//! integration, so both rates of a pair have the same acceleration. Between steps gusts decay and
+//! grow ([`InGusts::decayed`]).
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -19,147 +20,150 @@ use super::motion::Motion;
 use crate::aero::{Axis, Regressor};
 use crate::aircraft::Aircraft;
 
-/// Equations of an axis whose last states are the rates that the aerodynamics feel.
+/// Equations of an axis whose last states are the body rates relative to the air.
 pub trait InGusts<const NX: usize>: Equations<NX> {
     /// Index of the state that is the flow angle, gusts included.
     const ANGLE: usize = 0;
     /// Index of the output that measures the flow angle.
     const VANE: usize = 0;
-    /// Pairs of states (rate of the gyro, rate that the aerodynamics feel), one for each rotary gust.
-    const FELT_RATES: &'static [(usize, usize)];
+    /// Pairs of states (rate of the gyro, rate relative to the air), one for each rotary gust.
+    const AIR_RELATIVE_RATES: &'static [(usize, usize)];
 
-    /// Number of states without the felt rates.
+    /// Number of states without the rates relative to the air.
     #[must_use]
-    fn own_states() -> usize {
-        NX - Self::FELT_RATES.len()
+    fn states_in_still_air() -> usize {
+        NX - Self::AIR_RELATIVE_RATES.len()
     }
 
     /// State after the rotary gusts have decayed to a share of themselves.
     #[inline(always)]
     #[must_use]
     fn decayed(mut x: SVector<f64, NX>, share: f64) -> SVector<f64, NX> {
-        for &(rate, felt) in Self::FELT_RATES {
-            x[felt] = x[rate] + share * (x[felt] - x[rate]);
+        for &(rate, relative) in Self::AIR_RELATIVE_RATES {
+            x[relative] = x[rate] + share * (x[relative] - x[rate]);
         }
         x
     }
 }
 
-/// The longitudinal axis with the pitch rate that the aerodynamics feel.
+/// Longitudinal axis with the pitch rate relative to the air as a further state.
 #[derive(Clone, Copy, Debug)]
 pub struct LongitudinalInGusts;
 
-/// The lateral-directional axis with the roll and yaw rates that the aerodynamics feel.
+/// Lateral-directional axis with the roll and yaw rates relative to the air as further states.
 #[derive(Clone, Copy, Debug)]
 pub struct LateralInGusts;
 
 impl InGusts<4> for LongitudinalInGusts {
-    const FELT_RATES: &'static [(usize, usize)] = &[(1, 3)];
+    const AIR_RELATIVE_RATES: &'static [(usize, usize)] = &[(1, 3)];
 }
 
 impl InGusts<6> for LateralInGusts {
-    const FELT_RATES: &'static [(usize, usize)] = &[(1, 4), (2, 5)];
+    const AIR_RELATIVE_RATES: &'static [(usize, usize)] = &[(1, 4), (2, 5)];
 }
 
-/// The axis's own states, without the felt rates.
+/// States without the rates relative to the air.
 #[inline(always)]
-fn own<const N: usize, const M: usize>(x: &SVector<f64, M>) -> SVector<f64, N> {
+fn without_relative_rates<const N: usize, const M: usize>(x: &SVector<f64, M>) -> SVector<f64, N> {
     SVector::from_fn(|i, _| x[i])
 }
 
-/// State with the felt rates equal to the gyro's.
+/// State with the rates relative to the air equal to the gyro's.
 #[inline(always)]
-fn with_felt<const N: usize, const M: usize>(
+fn with_relative_rates<const N: usize, const M: usize>(
     x: &SVector<f64, N>,
-    felt: &[(usize, usize)],
+    relative: &[(usize, usize)],
 ) -> SVector<f64, M> {
     let mut wide = SVector::zeros();
     for i in 0..N {
         wide[i] = x[i];
     }
-    for &(rate, felt) in felt {
-        wide[felt] = x[rate];
+    for &(rate, relative) in relative {
+        wide[relative] = x[rate];
     }
     wide
 }
 
-/// Rates of all states: a felt rate accelerates as its own rate does.
+/// Rates of all states: a rate relative to the air accelerates as the gyro's rate does.
 #[inline(always)]
-fn wide_rates<const N: usize, const M: usize>(own: &Rates<N>, felt: &[(usize, usize)]) -> Rates<M> {
+fn rates_in_gusts<const N: usize, const M: usize>(
+    still_air: &Rates<N>,
+    relative: &[(usize, usize)],
+) -> Rates<M> {
     let (mut by_state, mut by_coefficient) = (SMatrix::zeros(), SMatrix::zeros());
     let mut copy_row = |from: usize, to: usize| {
         for j in 0..N {
-            by_state[(to, j)] = own.by_state[(from, j)];
+            by_state[(to, j)] = still_air.by_state[(from, j)];
         }
         for k in 0..COEFFICIENTS {
-            by_coefficient[(to, k)] = own.by_coefficient[(from, k)];
+            by_coefficient[(to, k)] = still_air.by_coefficient[(from, k)];
         }
     };
     for i in 0..N {
         copy_row(i, i);
     }
-    for &(rate, felt) in felt {
-        copy_row(rate, felt);
+    for &(rate, relative) in relative {
+        copy_row(rate, relative);
     }
     Rates {
-        rates: with_felt(&own.rates, felt),
+        rates: with_relative_rates(&still_air.rates, relative),
         by_state,
         by_coefficient,
     }
 }
 
-/// Outputs, which read no felt rate.
+/// Outputs, which depend on no rate relative to the air.
 #[inline(always)]
-fn wide_outputs<const N: usize, const M: usize>(own: &Outputs<N>) -> Outputs<M> {
+fn outputs_in_gusts<const N: usize, const M: usize>(still_air: &Outputs<N>) -> Outputs<M> {
     let mut by_state = SMatrix::<f64, OUTPUTS, M>::zeros();
     for o in 0..OUTPUTS {
         for j in 0..N {
-            by_state[(o, j)] = own.by_state[(o, j)];
+            by_state[(o, j)] = still_air.by_state[(o, j)];
         }
     }
     Outputs {
-        outputs: own.outputs,
+        outputs: still_air.outputs,
         by_state,
-        by_coefficient: own.by_coefficient,
+        by_coefficient: still_air.by_coefficient,
     }
 }
 
 /// Implements the equations of an axis in gusts by those of the axis.
 macro_rules! in_gusts {
     (
-        $name:ident: $own:ident, $own_states:literal, $states:literal, $names:expr,
+        $name:ident: $axis:ident, $axis_states:literal, $states:literal, $names:expr,
         regressors $regressors:expr, rates by state $by_state:expr, by coefficient $by_coefficient:expr
     ) => {
         impl Equations<$states> for $name {
-            type RateInputs = <$own as Equations<$own_states>>::RateInputs;
-            type SensorInputs = <$own as Equations<$own_states>>::SensorInputs;
+            type RateInputs = <$axis as Equations<$axis_states>>::RateInputs;
+            type SensorInputs = <$axis as Equations<$axis_states>>::SensorInputs;
 
-            const AXIS: Axis = <$own as Equations<$own_states>>::AXIS;
+            const AXIS: Axis = <$axis as Equations<$axis_states>>::AXIS;
             const STATES: [&'static str; $states] = $names;
             const REGRESSOR_STATES: &'static [usize] = $regressors;
             const RATES_BY_STATE: &'static [(usize, usize)] = $by_state;
             const RATES_BY_COEFFICIENT: &'static [(usize, usize)] = $by_coefficient;
             const OUTPUTS_BY_STATE: &'static [(usize, usize)] = Self::OUTPUT_SLOPES;
             const OUTPUTS_BY_COEFFICIENT: &'static [(usize, usize)] =
-                <$own as Equations<$own_states>>::OUTPUTS_BY_COEFFICIENT;
+                <$axis as Equations<$axis_states>>::OUTPUTS_BY_COEFFICIENT;
 
             #[inline(always)]
             fn rate_inputs(aircraft: &Aircraft, motion: &Motion) -> Self::RateInputs {
-                $own::rate_inputs(aircraft, motion)
+                $axis::rate_inputs(aircraft, motion)
             }
 
             #[inline(always)]
             fn sensor_inputs(aircraft: &Aircraft, motion: &Motion) -> Self::SensorInputs {
-                $own::sensor_inputs(aircraft, motion)
+                $axis::sensor_inputs(aircraft, motion)
             }
 
             #[inline(always)]
             fn measured_state(motion: &Motion) -> SVector<f64, $states> {
-                with_felt(&$own::measured_state(motion), Self::FELT_RATES)
+                with_relative_rates(&$axis::measured_state(motion), Self::AIR_RELATIVE_RATES)
             }
 
             fn state_of(regressor: &Regressor) -> Option<usize> {
-                $own::state_of(regressor).map(felt_state::<$states, Self>)
+                $axis::state_of(regressor).map(relative_state::<$states, Self>)
             }
 
             fn state_regressor(
@@ -167,8 +171,8 @@ macro_rules! in_gusts {
                 velocity: f64,
                 regressor: &Regressor,
             ) -> Option<(usize, f64)> {
-                let (state, factor) = $own::state_regressor(aircraft, velocity, regressor)?;
-                Some((felt_state::<$states, Self>(state), factor))
+                let (state, factor) = $axis::state_regressor(aircraft, velocity, regressor)?;
+                Some((relative_state::<$states, Self>(state), factor))
             }
 
             #[inline(always)]
@@ -177,7 +181,7 @@ macro_rules! in_gusts {
                 motion: &Motion,
                 inputs: &Self::RateInputs,
             ) -> [f64; COEFFICIENTS] {
-                $own::implied_coefficients(aircraft, motion, inputs)
+                $axis::implied_coefficients(aircraft, motion, inputs)
             }
 
             #[inline(always)]
@@ -186,7 +190,10 @@ macro_rules! in_gusts {
                 x: &SVector<f64, $states>,
                 c: &[f64; COEFFICIENTS],
             ) -> Rates<$states> {
-                wide_rates(&$own::rates(inputs, &own(x), c), Self::FELT_RATES)
+                rates_in_gusts(
+                    &$axis::rates(inputs, &without_relative_rates(x), c),
+                    Self::AIR_RELATIVE_RATES,
+                )
             }
 
             #[inline(always)]
@@ -196,20 +203,28 @@ macro_rules! in_gusts {
                 x: &SVector<f64, $states>,
                 c: &[f64; COEFFICIENTS],
             ) -> Outputs<$states> {
-                wide_outputs(&$own::outputs(inputs, sensors, &own(x), c))
+                outputs_in_gusts(&$axis::outputs(
+                    inputs,
+                    sensors,
+                    &without_relative_rates(x),
+                    c,
+                ))
             }
         }
     };
 }
 
-/// State that a regressor along an own state follows: the felt rate in place of the gyro's.
-fn felt_state<const NX: usize, E: InGusts<NX>>(state: usize) -> usize {
-    let felt = E::FELT_RATES.iter().find(|(rate, _)| *rate == state);
-    felt.map_or(state, |(_, felt)| *felt)
+/// State that a regressor along a state of still air follows: the rate relative to the air in place
+/// of the gyro's.
+fn relative_state<const NX: usize, E: InGusts<NX>>(state: usize) -> usize {
+    let relative = E::AIR_RELATIVE_RATES
+        .iter()
+        .find(|(rate, _)| *rate == state);
+    relative.map_or(state, |(_, relative)| *relative)
 }
 
 impl LongitudinalInGusts {
-    /// The axis's own entries, and those of `a_n` and `a_x` through the pitching moment.
+    /// Entries of the axis in still air, and those of `a_n` and `a_x` through the pitching moment.
     const OUTPUT_SLOPES: &'static [(usize, usize)] = &[
         (0, 0),
         (0, 1),
@@ -225,7 +240,7 @@ impl LongitudinalInGusts {
 }
 
 impl LateralInGusts {
-    /// The axis's own entries, and those of `a_y` through the moments.
+    /// Entries of the axis in still air, and those of `a_y` through the moments.
     const OUTPUT_SLOPES: &'static [(usize, usize)] = &[
         (0, 0),
         (0, 1),

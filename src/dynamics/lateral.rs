@@ -8,10 +8,12 @@
 //! f_y = q̄S CY/m
 //! ```
 //!
-//! f_x and f_z are taken as measured, brought to the c.g. In 3.1 they stand as C_D sin β and
-//! T cos α sin β, with a minus sign: thrust turns the path towards the nose. Moments follow Euler's
-//! equations about x and z for a symmetric airframe. The engines' angular momentum H along +x has the
-//! yawing moment +q H.
+//! f_x and f_z are the measured forces, transferred to the c.g. Eq. 3.1 writes them as C_D sin β
+//! and T cos α sin β, with a minus sign: thrust turns the path towards the nose. Moments follow
+//! Euler's equations about x and z for a symmetric airframe. The engines' angular momentum H along
+//! +x has the yawing moment +q H.
+//!
+//! The accelerometer reads a_y = (f_y + l_y)/g, with the effect l of its arm.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -23,7 +25,7 @@ use super::equations::{COEFFICIENTS, Equations, Outputs, Rates};
 use super::lever::lever;
 use super::motion::Motion;
 use crate::aero::{Axis, Regressor};
-use crate::aircraft::{Aircraft, Flow, Position, Vane, VaneModel};
+use crate::aircraft::{Aircraft, Position, Vane, VaneFlow, VaneModel};
 use crate::numerics::trig::sin_cos;
 use crate::units::{DEG, G0_FT_S2};
 
@@ -79,6 +81,13 @@ const SIDE_FORCE: usize = 0;
 const ROLLING_MOMENT: usize = 1;
 const YAWING_MOMENT: usize = 2;
 
+// Indices of the outputs.
+const BETA_VANE: usize = 0;
+const ROLL_RATE: usize = 1;
+const YAW_RATE: usize = 2;
+const BANK_ANGLE: usize = 3;
+const AY: usize = 4;
+
 impl RateInputs {
     /// ṗ and ṙ, rad/s².
     #[inline(always)]
@@ -130,18 +139,18 @@ impl Equations<4> for Lateral {
         (R, YAWING_MOMENT),
     ];
     const OUTPUTS_BY_STATE: &'static [(usize, usize)] = &[
-        (0, BETA),
-        (0, P),
-        (0, R),
-        (1, P),
-        (2, R),
-        (3, PHI),
-        (4, BETA),
-        (4, P),
-        (4, R),
+        (BETA_VANE, BETA),
+        (BETA_VANE, P),
+        (BETA_VANE, R),
+        (ROLL_RATE, P),
+        (YAW_RATE, R),
+        (BANK_ANGLE, PHI),
+        (AY, BETA),
+        (AY, P),
+        (AY, R),
     ];
     const OUTPUTS_BY_COEFFICIENT: &'static [(usize, usize)] =
-        &[(4, SIDE_FORCE), (4, ROLLING_MOMENT), (4, YAWING_MOMENT)];
+        &[(AY, SIDE_FORCE), (AY, ROLLING_MOMENT), (AY, YAWING_MOMENT)];
 
     #[inline(always)]
     fn rate_inputs(aircraft: &Aircraft, m: &Motion) -> RateInputs {
@@ -295,7 +304,7 @@ impl Equations<4> for Lateral {
                 .vane
                 .beta_small(x[BETA], sensors.vane_by_rates, rates),
             VaneModel::Exact => {
-                let flow = Flow {
+                let flow = VaneFlow {
                     alpha: sensors.alpha,
                     beta: x[BETA],
                     velocity: sensors.velocity,
@@ -317,20 +326,20 @@ impl Equations<4> for Lateral {
             by_state: SMatrix::zeros(),
             by_coefficient: SMatrix::zeros(),
         };
-        out.by_state[(0, BETA)] = DEG * vane.by_beta;
-        out.by_state[(0, P)] = DEG * vane.by_rates[0];
-        out.by_state[(0, R)] = DEG * vane.by_rates[2];
-        out.by_state[(1, P)] = DEG;
-        out.by_state[(2, R)] = DEG;
-        out.by_state[(3, PHI)] = DEG;
+        out.by_state[(BETA_VANE, BETA)] = DEG * vane.by_beta;
+        out.by_state[(BETA_VANE, P)] = DEG * vane.by_rates[0];
+        out.by_state[(BETA_VANE, R)] = DEG * vane.by_rates[2];
+        out.by_state[(ROLL_RATE, P)] = DEG;
+        out.by_state[(YAW_RATE, R)] = DEG;
+        out.by_state[(BANK_ANGLE, PHI)] = DEG;
         let [by_p_dot, _, by_r_dot] = right.by_accelerations;
         for (state, j, by_rate) in [(P, 0, right.by_rates[0]), (R, 1, right.by_rates[2])] {
-            out.by_state[(4, state)] =
+            out.by_state[(AY, state)] =
                 g * (by_rate + by_p_dot * k.coupling[0][j] + by_r_dot * k.coupling[1][j]);
         }
-        out.by_coefficient[(4, SIDE_FORCE)] = g * k.force;
+        out.by_coefficient[(AY, SIDE_FORCE)] = g * k.force;
         for (column, j) in [(ROLLING_MOMENT, 0), (YAWING_MOMENT, 1)] {
-            out.by_coefficient[(4, column)] =
+            out.by_coefficient[(AY, column)] =
                 g * (by_p_dot * k.moment[0][j] + by_r_dot * k.moment[1][j]);
         }
         out

@@ -12,6 +12,14 @@
 //! C_L = CN cos α − CA sin α. Moments, with that of the thrust's line, follow Euler's equation about y for a
 //! symmetric airframe (I_xy = I_yz = 0). The engines' angular momentum H along +x has the moment
 //! −r H.
+//!
+//! The accelerometers read, with the effect l of their arms,
+//!
+//! ```text
+//! a_n = ((q̄S CN − T_z)/m − l_z)/g,   a_x = ((T_x − q̄S CA)/m + l_x)/g
+//! ```
+//!
+//! without T_x if the accelerometer does not sense thrust.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -23,7 +31,7 @@ use super::equations::{COEFFICIENTS, Equations, OUTPUTS, Outputs, Rates};
 use super::lever::lever;
 use super::motion::Motion;
 use crate::aero::{Axis, Regressor};
-use crate::aircraft::{Aircraft, Flow, Position, Vane, VaneModel};
+use crate::aircraft::{Aircraft, Position, Vane, VaneFlow, VaneModel};
 use crate::numerics::trig::sin_cos;
 use crate::units::{DEG, G0_FT_S2};
 
@@ -80,6 +88,13 @@ const NORMAL_FORCE: usize = 0;
 const PITCHING_MOMENT: usize = 1;
 const AXIAL_FORCE: usize = 2;
 
+// Indices of the outputs.
+const ALPHA_VANE: usize = 0;
+const PITCH_RATE: usize = 1;
+const PITCH_ATTITUDE: usize = 2;
+const AN: usize = 3;
+const AX: usize = 4;
+
 impl Longitudinal {
     /// α̇ that a measured motion implies, rad/s: 2.1 with the measured specific forces. The rate of
     /// change of a gust is not part of it.
@@ -114,20 +129,20 @@ impl Equations<3> for Longitudinal {
         (Q, PITCHING_MOMENT),
     ];
     const OUTPUTS_BY_STATE: &'static [(usize, usize)] = &[
-        (0, ALPHA),
-        (0, Q),
-        (1, Q),
-        (2, THETA),
-        (3, ALPHA),
-        (3, Q),
-        (4, ALPHA),
-        (4, Q),
+        (ALPHA_VANE, ALPHA),
+        (ALPHA_VANE, Q),
+        (PITCH_RATE, Q),
+        (PITCH_ATTITUDE, THETA),
+        (AN, ALPHA),
+        (AN, Q),
+        (AX, ALPHA),
+        (AX, Q),
     ];
     const OUTPUTS_BY_COEFFICIENT: &'static [(usize, usize)] = &[
-        (3, NORMAL_FORCE),
-        (3, PITCHING_MOMENT),
-        (4, PITCHING_MOMENT),
-        (4, AXIAL_FORCE),
+        (AN, NORMAL_FORCE),
+        (AN, PITCHING_MOMENT),
+        (AX, PITCHING_MOMENT),
+        (AX, AXIAL_FORCE),
     ];
 
     #[inline(always)]
@@ -272,7 +287,7 @@ impl Equations<3> for Longitudinal {
                     .alpha_small(x[ALPHA], sensors.vane_by_rates, rates)
             }
             VaneModel::Exact => {
-                let flow = Flow {
+                let flow = VaneFlow {
                     alpha: x[ALPHA],
                     beta: sensors.beta,
                     velocity: sensors.velocity,
@@ -295,16 +310,16 @@ impl Equations<3> for Longitudinal {
             by_state: SMatrix::zeros(),
             by_coefficient: SMatrix::<f64, OUTPUTS, COEFFICIENTS>::zeros(),
         };
-        out.by_state[(0, ALPHA)] = DEG * vane.by_alpha;
-        out.by_state[(0, Q)] = DEG * vane.by_rates[1];
-        out.by_state[(1, Q)] = DEG;
-        out.by_state[(2, THETA)] = DEG;
-        out.by_state[(3, Q)] = -g * down.by_rates[1];
-        out.by_state[(4, Q)] = g * forward.by_rates[1];
-        out.by_coefficient[(3, NORMAL_FORCE)] = g * sensors.force;
-        out.by_coefficient[(3, PITCHING_MOMENT)] = -g * down.by_accelerations[1] * k.moment;
-        out.by_coefficient[(4, AXIAL_FORCE)] = -g * sensors.force;
-        out.by_coefficient[(4, PITCHING_MOMENT)] = g * forward.by_accelerations[1] * k.moment;
+        out.by_state[(ALPHA_VANE, ALPHA)] = DEG * vane.by_alpha;
+        out.by_state[(ALPHA_VANE, Q)] = DEG * vane.by_rates[1];
+        out.by_state[(PITCH_RATE, Q)] = DEG;
+        out.by_state[(PITCH_ATTITUDE, THETA)] = DEG;
+        out.by_state[(AN, Q)] = -g * down.by_rates[1];
+        out.by_state[(AX, Q)] = g * forward.by_rates[1];
+        out.by_coefficient[(AN, NORMAL_FORCE)] = g * sensors.force;
+        out.by_coefficient[(AN, PITCHING_MOMENT)] = -g * down.by_accelerations[1] * k.moment;
+        out.by_coefficient[(AX, AXIAL_FORCE)] = -g * sensors.force;
+        out.by_coefficient[(AX, PITCHING_MOMENT)] = g * forward.by_accelerations[1] * k.moment;
         out
     }
 }

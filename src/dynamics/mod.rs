@@ -2,9 +2,9 @@
 //! slopes.
 //!
 //! Each axis integrates its own states and takes everything else as measured. The estimation uses
-//! an axis through [`Equations`]: rates of the states and outputs as functions of the states x and
-//! the axis's three coefficients c, with the slopes along both. The build-up of c from x and the
-//! derivatives belongs to the method.
+//! an axis through [`Equations`]: rates of the states, and outputs, as functions of the states x
+//! and the axis's three coefficients c. Both have exact slopes along x and c. The build-up of c
+//! from x and the derivatives belongs to the method.
 //!
 //! Units inside: rad, rad/s, ft, slug, lbf, s. Outputs are in the units of the signals: deg, deg/s,
 //! g.

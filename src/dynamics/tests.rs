@@ -224,8 +224,8 @@ fn slopes_differ_from_zero_only_at_declared_entries() {
     assert_slopes_at_declared_entries::<6, LateralInGusts>();
 }
 
-/// Checks that rates and outputs with a felt rate equal to the gyro's are those of still air, and
-/// that the regressors of rates follow the felt rates.
+/// Checks that rates and outputs with a rate relative to the air equal to the gyro's are those of still air, and
+/// that the regressors of rates follow the rates relative to the air.
 fn assert_still_air<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>() {
     let motion = general_motion();
     let (inputs, sensors) = (
@@ -240,15 +240,15 @@ fn assert_still_air<const NX: usize, E: Equations<NX>, const NG: usize, G: InGus
     );
     let x = G::measured_state(&motion);
     let rates = G::rates(&inputs, &x, &C).rates;
-    assert_eq!(G::own_states(), NX);
+    assert_eq!(G::states_in_still_air(), NX);
     assert_eq!(rates.rows(0, NX), still.rows(0, NX));
     assert_eq!(G::outputs(&inputs, &sensors, &x, &C).outputs, read);
     let mut gust = x;
-    for &(rate, felt) in G::FELT_RATES {
-        assert_eq!((x[felt], rates[felt]), (x[rate], rates[rate]));
-        gust[felt] += 0.1;
+    for &(rate, relative) in G::AIR_RELATIVE_RATES {
+        assert_eq!((x[relative], rates[relative]), (x[rate], rates[rate]));
+        gust[relative] += 0.1;
         assert_abs_diff_eq!(
-            G::decayed(gust, 0.75)[felt] - x[rate],
+            G::decayed(gust, 0.75)[relative] - x[rate],
             0.075,
             epsilon = 1e-15
         );
@@ -258,8 +258,12 @@ fn assert_still_air<const NX: usize, E: Equations<NX>, const NG: usize, G: InGus
         Regressor::PitchRate,
         Regressor::YawRate,
     ] {
-        let felt = |state| G::FELT_RATES.iter().find(|(rate, _)| *rate == state);
-        let expected = E::state_of(&regressor).map(|state| felt(state).unwrap().1);
+        let relative = |state| {
+            G::AIR_RELATIVE_RATES
+                .iter()
+                .find(|(rate, _)| *rate == state)
+        };
+        let expected = E::state_of(&regressor).map(|state| relative(state).unwrap().1);
         assert_eq!(G::state_of(&regressor), expected);
     }
 }

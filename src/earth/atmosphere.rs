@@ -1,5 +1,5 @@
-//! U.S. Standard Atmosphere, 1976, to a geopotential height of 32 km (105,000 ft): density
-//! ρ = p/(R T) from layers in which the temperature is linear in the height.
+//! U.S. Standard Atmosphere, 1976, to a geopotential height of 32 km (105,000 ft). Its layers have
+//! a temperature linear in the height, and the density is ρ = p/(R T).
 
 use crate::units::M_PER_FT;
 
@@ -33,8 +33,9 @@ impl Air {
 
 /// kg/m³ in a slug/ft³.
 const KG_M3_PER_SLUG_FT3: f64 = 515.378_818_393_2;
-/// Pascals in a pound-force per square foot: newtons in a pound-force (`LBF` of `units/unit.rs`) over
-/// [`M_PER_FT`]², rounded to fourteen digits; the quotient itself would change published bits.
+/// Pascals in a pound-force per square foot: newtons in a pound-force (`LBF` of `units/unit.rs`)
+/// over [`M_PER_FT`]². The value is rounded to fourteen digits; the quotient itself would change
+/// published bits.
 const PA_PER_PSF: f64 = 47.880_258_980_336;
 /// Gas constant of air, J/(kg K).
 const GAS: f64 = 287.052_87;

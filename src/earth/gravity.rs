@@ -22,7 +22,7 @@ const FLATTENING: f64 = 1.0 / 298.257_223_563;
 const ROTATION: f64 = 0.003_449_786_506_84;
 
 /// Gravity in ft/s² at a geodetic latitude and a height above the ellipsoid. It contains the
-/// centrifugal part: a body at rest on the rotating earth feels it.
+/// centrifugal part: an accelerometer at rest on the rotating earth measures it.
 ///
 /// At 25,000 ft it is 0.3% under the accelerometers' unit of 32.174 ft/s²: over a maneuver that is
 /// 0.2 to 0.4° of θ.

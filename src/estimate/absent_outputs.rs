@@ -2,8 +2,8 @@
 //! maneuver shows through them alone.
 //!
 //! Normal and side force also turn the flight path, so α and β determine their derivatives without
-//! `an` and `ay`. The axial force turns it by its share sin α only, which does not separate it from the
-//! normal force: without `ax` its derivatives have the tunnel's values.
+//! `an` and `ay`. The axial force turns it by its share sin α only, which does not separate axial
+//! from normal force. Without `ax` the derivatives of the axial force have the tunnel's values.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -30,9 +30,9 @@ pub(super) fn class_of_recorded_outputs(task: &Task) -> (Class, BTreeMap<String,
 /// output alone, each with the reason.
 fn unseen(task: &Task) -> BTreeMap<String, String> {
     let axis = task.class.axis;
-    let derivatives = task.context.buildup.derivatives_of(axis);
-    let of_derivatives = derivatives.map(|d| (&d.name, output_that_hides(task, d)));
-    let biases = task.context.buildup.biases_of(axis);
+    let derivatives = task.context.aero_model.derivatives_of(axis);
+    let of_derivatives = derivatives.map(|d| (&d.name, output_required_by(task, d)));
+    let biases = task.context.aero_model.biases_of(axis);
     let biases = biases.filter(|b| task.status(&b.name) == Some(Status::Estimated));
     let of_biases = biases.map(|b| (&b.name, Some(b.output).filter(|o| task.is_absent(*o))));
     of_derivatives
@@ -46,9 +46,9 @@ fn reason(absent: Output) -> String {
     format!("`{}` is not recorded", absent.signal())
 }
 
-/// The absent output without which a derivative of the class is not estimated, or not held as the
-/// class holds it: `ax` for the axial force, `an` or `ax` for a regressor that contains the measured α̇.
-fn output_that_hides(task: &Task, derivative: &Derivative) -> Option<Output> {
+/// Absent output that a derivative needs in order to have the class's status. The axial force needs
+/// `ax`; a regressor with the measured α̇ needs `an` or `ax`.
+fn output_required_by(task: &Task, derivative: &Derivative) -> Option<Output> {
     let is_free = match task.status(&derivative.name)? {
         Status::Estimated => true,
         Status::Held => task.context.settings.hold == Hold::Evidence,
@@ -60,7 +60,7 @@ fn output_that_hides(task: &Task, derivative: &Derivative) -> Option<Output> {
 }
 
 fn is_axial_force(task: &Task, name: &str) -> bool {
-    let derivative = task.context.buildup.derivative(name);
+    let derivative = task.context.aero_model.derivative(name);
     derivative
         .is_some_and(|d| d.coefficient == Coefficient::CA && task.absent_of_regressor(d).is_none())
 }

@@ -30,7 +30,7 @@ pub(super) struct Filtered {
     pub noise: Noise,
     /// −log of the likelihood.
     pub cost: f64,
-    /// True if gusts account for a drift of the attitude.
+    /// `true` if gusts account for a drift of the attitude.
     pub attitude_drifts: bool,
     /// Lag-one correlation of each output's innovations.
     autocorrelation: [f64; OUTPUTS],
@@ -55,7 +55,7 @@ pub(super) enum Air {
     Unknown(NoMinimum),
 }
 
-/// Returns true if filter error is to estimate a maneuver with this fit by output error.
+/// `true` if filter error is to estimate a maneuver with this fit by output error.
 pub(super) fn needs_filter(method: Method, measurements: &Measurements, fit: &Fit) -> bool {
     match method {
         Method::OutputError => false,
@@ -78,13 +78,13 @@ impl Air {
         let group: Group<NX, E, NG, G> = Group::single(task, member);
         let constant = group.constant();
         let filters = group.filters(&constant, None);
-        let found = minimise_from_two_starts(&group, &filters, implied, output_error);
-        let slope_fit = found.and_then(|found| {
-            let slope_fit = group.slope_fit(constant, filters, found);
+        let minimum = minimise_from_two_starts(&group, &filters, implied, output_error);
+        let fit_with_slopes = minimum.and_then(|minimum| {
+            let slope_fit = group.slope_fit(constant, filters, minimum);
             Ok(group.with_slopes(slope_fit.ok_or(NoMinimum::Diverges)?))
         });
-        let end = match &slope_fit {
-            Ok(slope_fit) => Some(slope_fit.end()),
+        let end = match &fit_with_slopes {
+            Ok(fit) => Some(fit.end()),
             Err(why) => why.end(),
         };
         let filter = end.and_then(|end| end.response.members.first());
@@ -92,9 +92,8 @@ impl Air {
         if filter.is_some_and(|filter| sensor_noise::explains(measurements, output_error, filter)) {
             return Air::IsStill;
         }
-        let filtered = slope_fit.and_then(|slope_fit| {
-            Filtered::new(&group, &slope_fit, output_error).ok_or(NoMinimum::Diverges)
-        });
+        let filtered = fit_with_slopes
+            .and_then(|fit| Filtered::new(&group, &fit, output_error).ok_or(NoMinimum::Diverges));
         match filtered {
             Ok(filtered) => Air::Moves(Box::new(filtered)),
             Err(why) => Air::Unknown(why),
@@ -131,7 +130,7 @@ impl Filtered {
             second_opinion: member.second_opinion_on(&slope_fit.held),
             noise,
             cost: slope_fit.cost(),
-            attitude_drifts: noise.is_of_air(G::FELT_RATES.len(), case.step_s),
+            attitude_drifts: noise.is_of_air(G::AIR_RELATIVE_RATES.len(), case.step_s),
             autocorrelation: lag_one(&case.measurements, &fit.response.outputs),
             output_error_costs: [output_error.initial_cost, output_error.final_cost],
             likelihood_gain: white_cost(&case.measurements, output_error)
@@ -141,9 +140,9 @@ impl Filtered {
     }
 }
 
-/// Iterates from moving air, or from still air if the residuals of output error are white; from the
-/// other start if the first gives no estimates. Both starts are tried if a rotary gust is as large
-/// as its rate: the gust may then be mistaken for the effect of the rate.
+/// Iterates from moving air, or from still air if the residuals of output error are white. If this
+/// gives no estimates, iterates from the other start. Both starts are tried if a rotary gust is as
+/// large as its rate: the gust may then be mistaken for the effect of the rate.
 ///
 /// # Errors
 /// Why no start leads to a minimum: the reason of the iteration that ended at the least cost.
@@ -162,7 +161,7 @@ fn minimise_from_two_starts<const NX: usize, E: Equations<NX>, const NG: usize, 
     let moving = start(implied, Noise::starting(member.deviations));
     let still = start(
         output_error.values.clone(),
-        Noise::slight(member.deviations),
+        Noise::with_small_gusts(member.deviations),
     );
     let starts = if is_white(&case.measurements, output_error) {
         [still, moving]
@@ -172,11 +171,12 @@ fn minimise_from_two_starts<const NX: usize, E: Equations<NX>, const NG: usize, 
     let (mut least, mut failures) = (None::<Minimum>, vec![]);
     for start in &starts {
         match group.minimum(filters, start) {
-            Ok(found) => least = least.into_iter().chain([found]).min_by(Minimum::by_cost),
+            Ok(minimum) => least = least.into_iter().chain([minimum]).min_by(Minimum::by_cost),
             Err(why) => failures.push(why),
         }
-        let found = least.as_ref();
-        if found.is_some_and(|found| !is_mostly_air(filters, found, &case.motion.states)) {
+        let is_plausible =
+            |minimum: &Minimum| !is_mostly_air(filters, minimum, &case.motion.states);
+        if least.as_ref().is_some_and(is_plausible) {
             break;
         }
     }
@@ -184,16 +184,16 @@ fn minimise_from_two_starts<const NX: usize, E: Equations<NX>, const NG: usize, 
     least.ok_or_else(|| why().unwrap_or(NoMinimum::Diverges))
 }
 
-/// True if, in the filter of one maneuver, a rotary gust exceeds the share [`MOSTLY`] of the rate
+/// `true` if, in the filter of one maneuver, a rotary gust exceeds the share [`MOSTLY`] of the rate
 /// to which it adds.
 fn is_mostly_air<const NX: usize, const NG: usize, G: InGusts<NG>>(
     filters: &[Filter<NG, G>],
-    found: &Minimum,
+    minimum: &Minimum,
     states: &[SVector<f64, NX>],
 ) -> bool {
     filters.iter().any(|filter| {
-        let gusts = filter.noise(&found.scored.parameters).gusts;
-        let mut rates = G::FELT_RATES.iter().zip(gusts);
+        let gusts = filter.noise(&minimum.scored.parameters).gusts;
+        let mut rates = G::AIR_RELATIVE_RATES.iter().zip(gusts);
         rates.any(|((rate, _), gust)| {
             let values = states.iter().map(|x| x[*rate]);
             let values = DVector::from_iterator(states.len(), values);

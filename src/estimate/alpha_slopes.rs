@@ -1,9 +1,10 @@
 //! Change of the derivatives over the angles of attack that a maneuver sweeps.
 //!
-//! The build-up has one value of each derivative in a maneuver. In the wind tunnel's tables t(α) it changes:
-//! along a derivative's regressor r the coefficient has the further term (t(α) − t(ᾱ)) r, along α itself the
-//! term T(α) − T(ᾱ) − T'(ᾱ) (α − ᾱ). T is the tabulated sum of constant and α t with the slope t at its points, or
-//! without such a sum the integral of t. Held derivatives change as estimated ones do.
+//! The build-up has one value of each derivative in a maneuver. In the wind tunnel's tables t(α) it
+//! changes. For a regressor r other than α the coefficient gains the term (t(α) − t(ᾱ)) r. For α
+//! itself it gains T(α) − T(ᾱ) − T'(ᾱ) (α − ᾱ). T is the tabulated sum of the constant and α t,
+//! with the slope t at its points. Without such a sum T is the integral of t. Held derivatives
+//! change as estimated ones do.
 //!
 //! Slopes of two kinds act in a maneuver:
 //!
@@ -20,7 +21,7 @@ use super::task::Task;
 use super::tunnel_change::{AlphaRange, TunnelChange};
 use crate::aero::{Coefficient, Derivative, Regressor};
 use crate::dynamics::Equations;
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::filter_error::bounds::WidePass;
 use crate::filter_error::slopes::SlopePrior;
 use crate::numerics::mean::mean;
@@ -33,8 +34,8 @@ pub(super) struct AlphaSlopes {
     pub slopes: Vec<AlphaSlope>,
     /// Derivatives along α and constants, one pair per coefficient, that take the slopes' lines.
     lines: Vec<[Derivative; 2]>,
-    /// Window of the maneuver, with the signals of the slopes.
-    pub window: Window,
+    /// Signals of the maneuver, with those of the slopes.
+    pub window: ManeuverSignals,
 }
 
 /// Slope of a coefficient or derivative.
@@ -61,7 +62,7 @@ impl AlphaSlopes {
     /// Slopes over α of the derivatives that are free in `wide`, along the motion as measured.
     pub fn new<const NX: usize, E: Equations<NX>>(
         task: &Task,
-        window: &Window,
+        window: &ManeuverSignals,
         wide: &Case<NX, E>,
     ) -> AlphaSlopes {
         let motion = window.motion(task.context.aircraft);
@@ -77,14 +78,14 @@ impl AlphaSlopes {
         slopes
     }
 
-    /// Model with the slopes held at these values, in their order.
+    /// Model with the slopes added as held derivatives; `values[i]` belongs to slope `i`.
     pub fn held_in<'s>(&'s self, model: &Model<'s>, values: &[f64]) -> Model<'s> {
         let mut held = model.clone();
-        let both = || self.slopes.iter().zip(values);
+        let slopes_and_values = || self.slopes.iter().zip(values);
         held.held
-            .extend(both().map(|(slope, value)| (&slope.term, *value)));
+            .extend(slopes_and_values().map(|(slope, value)| (&slope.term, *value)));
         for (part, derivative) in self.parts_of_lines() {
-            let of_line = both().filter(|(slope, _)| slope.has_line_in(derivative));
+            let of_line = slopes_and_values().filter(|(slope, _)| slope.has_line_in(derivative));
             let value = of_line.map(|(slope, value)| slope.line[part] * value).sum();
             held.held.push((derivative, value));
         }
@@ -104,8 +105,8 @@ impl AlphaSlopes {
     /// Pass whose parameters of the slopes move their lines as well.
     pub fn with_lines(&self, mut pass: WidePass) -> WidePass {
         for (part, derivative) in self.parts_of_lines() {
-            let own = self.slopes.iter().filter(|s| s.has_line_in(derivative));
-            for slope in own {
+            let slopes = self.slopes.iter().filter(|s| s.has_line_in(derivative));
+            for slope in slopes {
                 pass.add_column(&derivative.name, slope.line[part], &slope.term.name);
             }
         }
@@ -131,8 +132,8 @@ impl AlphaSlopes {
             change.slope
         };
         let line = [along, -along * mean(alphas.iter().copied())];
-        let both = change.values.iter().zip(alphas);
-        let rest: Vec<f64> = both
+        let pairs = change.values.iter().zip(alphas);
+        let rest: Vec<f64> = pairs
             .map(|(value, alpha)| value - line[0] * alpha - line[1])
             .collect();
         self.window = self.window.with_samples(&change.name, &rest);
@@ -147,9 +148,9 @@ impl AlphaSlopes {
 
 impl CoefficientChange {
     /// No change, at as many samples as there are angles of attack.
-    fn none(of: &str, coefficient: Coefficient, alphas: &[f64]) -> CoefficientChange {
+    fn none(name: &str, coefficient: Coefficient, alphas: &[f64]) -> CoefficientChange {
         CoefficientChange {
-            name: format!("{of} over alpha"),
+            name: format!("{name} over alpha"),
             coefficient,
             values: vec![0.0; alphas.len()],
             slope: 0.0,
@@ -159,8 +160,8 @@ impl CoefficientChange {
     /// Adds the changes of a derivative, per unit of its regressor; along α itself those of the coefficient.
     fn add(&mut self, changes: &[f64], alphas: &[f64], regressor: Option<&[f64]>) {
         let Some(regressor) = regressor else {
-            let both = self.values.iter_mut().zip(changes);
-            return both.for_each(|(value, change)| *value += change);
+            let pairs = self.values.iter_mut().zip(changes);
+            return pairs.for_each(|(value, change)| *value += change);
         };
         for ((value, change), r) in self.values.iter_mut().zip(changes).zip(regressor) {
             *value += change * r;
@@ -170,14 +171,14 @@ impl CoefficientChange {
 }
 
 impl AlphaSlope {
-    /// Returns true if the derivative belongs to the lines of the slope's coefficient.
+    /// `true` if the derivative belongs to the lines of the slope's coefficient.
     fn has_line_in(&self, derivative: &Derivative) -> bool {
         self.term.coefficient == derivative.coefficient
     }
 }
 
-/// Changes of the coefficients over α by the derivatives that are free in `wide`: one standard deviation of each
-/// derivative's own change, then the changes in the tunnel.
+/// Changes of the coefficients over α by the derivatives that are free in `wide`: first one
+/// standard deviation of each derivative's change, then the changes in the tunnel.
 fn changes<const NX: usize, E: Equations<NX>>(
     task: &Task,
     alphas: &[f64],
@@ -190,7 +191,7 @@ fn changes<const NX: usize, E: Equations<NX>>(
         CoefficientChange::none(&format!("{coefficient:?}"), coefficient, alphas)
     });
     for (j, name) in wide.names.iter().take(wide.derivatives()).enumerate() {
-        let derivative = task.context.buildup.derivative(name);
+        let derivative = task.context.aero_model.derivative(name);
         let Some(derivative) = derivative.filter(|d| d.regressor != Regressor::Constant) else {
             continue;
         };
@@ -200,9 +201,9 @@ fn changes<const NX: usize, E: Equations<NX>>(
             let sum = &mut in_tunnel[derivative.coefficient.index()];
             sum.add(&changes, alphas, regressor.as_deref());
         }
-        let own = own_change(task, derivative, alphas, range.mean);
+        let deviation = own_change(task, derivative, alphas, range.mean);
         let mut change = CoefficientChange::none(name, derivative.coefficient, alphas);
-        change.add(&own, alphas, regressor.as_deref());
+        change.add(&deviation, alphas, regressor.as_deref());
         changes.push((change, SlopePrior::DEVIATION));
     }
     changes.extend(in_tunnel.map(|change| (change, SlopePrior::SHARE)));
@@ -212,8 +213,8 @@ fn changes<const NX: usize, E: Equations<NX>>(
 /// One standard deviation of a derivative's own change from the mean `at` of the angles to each sample; along α
 /// itself, of the coefficient's.
 ///
-/// The error of the table has the standard uncertainty u, and fades over the length ℓ as in the posterior of
-/// the campaign: over a small distance d it changes by √3 u d/ℓ.
+/// The table's error has the standard uncertainty u and the correlation length ℓ of the posterior's
+/// prior. Over a small distance d it changes by √3 u d/ℓ.
 fn own_change(task: &Task, derivative: &Derivative, alphas: &[f64], at: f64) -> Vec<f64> {
     let length = task.context.settings.tunnel_error_length_deg;
     let slope = 3f64.sqrt() * task.held_uncertainty(derivative) / length;

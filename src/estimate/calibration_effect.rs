@@ -7,9 +7,9 @@ use nalgebra::DVector;
 use super::prepared_case::PreparedCase;
 use super::task::Task;
 use crate::aircraft::Aircraft;
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{Equations, OUTPUTS};
-use crate::output_error::calibration_errors::{Calibration, FittedManeuver, Misreading};
+use crate::output_error::calibration_errors::{Calibration, FittedManeuver, SignalError};
 use crate::output_error::{Diverged, Fit, calibration_errors};
 
 /// Added to the reason of a fit whose bounds lack the effect of calibration errors.
@@ -28,7 +28,7 @@ pub(super) fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
     if task.has_exact_signals() {
         return;
     }
-    let errors = misreadings(&[task], &prepared.window);
+    let errors = signal_errors(&[task], &prepared.window);
     match gradient_shifts(
         task.context.aircraft,
         prepared,
@@ -45,20 +45,23 @@ pub(super) fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
 
 /// Errors of one standard deviation each of the signals of a window. Of several maneuvers each error
 /// has its largest size.
-pub(super) fn misreadings<'a>(tasks: &[&Task<'a>], window: &Window) -> Vec<Misreading<'a>> {
+pub(super) fn signal_errors<'a>(
+    tasks: &[&Task<'a>],
+    window: &ManeuverSignals,
+) -> Vec<SignalError<'a>> {
     // A signal that the maneuver does not use has no effect.
     let is_used = |signal: &str| !window.signal(signal).is_empty();
     let mut sizes: BTreeMap<&str, Calibration> = BTreeMap::new();
-    for (signal, own) in tasks.iter().flat_map(|task| task.signal_errors()) {
+    for (signal, of_task) in tasks.iter().flat_map(|task| task.error_sizes()) {
         let size = sizes.entry(signal).or_default();
-        size.bias = size.bias.max(own.bias);
-        size.scale_pct = size.scale_pct.max(own.scale_pct);
+        size.bias = size.bias.max(of_task.bias);
+        size.scale_pct = size.scale_pct.max(of_task.scale_pct);
     }
     let used = sizes.into_iter().filter(|(signal, _)| is_used(signal));
-    let readings = used.flat_map(|(signal, size)| size.misreadings(signal));
+    let readings = used.flat_map(|(signal, size)| size.signal_errors(signal));
     let delays = tasks.first().map_or(&[][..], |task| task.context.delays);
     let delays = delays.iter().filter(|d| is_used(&d.surface));
-    let late = delays.map(|d| Misreading::late(&d.surface, d.uncertainty_s));
+    let late = delays.map(|d| SignalError::delay(&d.surface, d.uncertainty_s));
     readings.chain(late).collect()
 }
 
@@ -67,7 +70,7 @@ pub(super) fn misreadings<'a>(tasks: &[&Task<'a>], window: &Window) -> Vec<Misre
 pub(super) fn gradient_shifts<const NX: usize, E: Equations<NX>>(
     aircraft: &Aircraft,
     prepared: &PreparedCase<NX, E>,
-    errors: &[Misreading],
+    errors: &[SignalError],
     values: &[f64],
     weights: &[f64; OUTPUTS],
 ) -> Result<Vec<DVector<f64>>, Diverged> {

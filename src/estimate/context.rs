@@ -1,7 +1,7 @@
 //! Everything that all maneuvers of a campaign are estimated with.
 
 use super::settings::Settings;
-use crate::aero::{Buildup, WindTunnel};
+use crate::aero::{AeroModel, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::surfaces::DelayCorrection;
 
@@ -9,7 +9,7 @@ use crate::surfaces::DelayCorrection;
 #[derive(Clone, Debug)]
 pub struct Context<'a> {
     pub aircraft: &'a Aircraft,
-    pub buildup: &'a Buildup,
+    pub aero_model: &'a AeroModel,
     pub tunnel: &'a WindTunnel,
     /// Table of starting values: the tunnel's, except in studies of the iteration.
     pub start: &'a WindTunnel,
@@ -23,13 +23,13 @@ impl<'a> Context<'a> {
     #[must_use]
     pub fn new(
         aircraft: &'a Aircraft,
-        buildup: &'a Buildup,
+        aero_model: &'a AeroModel,
         tunnel: &'a WindTunnel,
         settings: &'a Settings,
     ) -> Context<'a> {
         Context {
             aircraft,
-            buildup,
+            aero_model,
             tunnel,
             start: tunnel,
             settings,

@@ -15,11 +15,11 @@ use crate::output_error::{Case, Fit, InitialState, Outcome};
 use crate::units::{DEG, Unit};
 
 /// Motion that a fit explains without the corrections of a filter, and the second opinion on it.
-pub(super) struct Explanation<'a> {
+pub(super) struct ExplainedMotion<'a> {
     /// Outputs of the equations; `None` if they diverge.
     pub outputs: Option<&'a [[f64; OUTPUTS]]>,
-    /// True if gusts explain a drift of the attitude: it integrates the rates, and the rotary gusts
-    /// in them.
+    /// `true` if gusts explain a drift of the attitude: it integrates the rates, and the rotary
+    /// gusts in them.
     pub attitude_drifts: bool,
     pub second_opinion: &'a Regression,
 }
@@ -29,7 +29,7 @@ pub(super) struct Credibility<'c, 'a, const NX: usize, E: Equations<NX>> {
     pub task: &'c Task<'a>,
     pub case: &'c Case<NX, E>,
     pub fit: &'c Fit,
-    pub explanation: Explanation<'c>,
+    pub explanation: ExplainedMotion<'c>,
 }
 
 impl<const NX: usize, E: Equations<NX>> Credibility<'_, '_, NX, E> {
@@ -121,8 +121,8 @@ impl<const NX: usize, E: Equations<NX>> Credibility<'_, '_, NX, E> {
 
     /// Initial states further from the measured ones than an instrument's error, by more than their
     /// uncertainty. The smaller of two distances counts: from the first sample, which may be an
-    /// outlier, and from the mean of several, during which the aircraft may move. The first outputs
-    /// are the measured states.
+    /// outlier, and from the mean of several samples, during which the aircraft may move. The first
+    /// outputs are the measured states.
     fn impossible_initial_states(&self) -> Vec<String> {
         let (case, fit) = (self.case, self.fit);
         let first = case.parameters() - NX;

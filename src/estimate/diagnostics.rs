@@ -6,7 +6,7 @@ use super::estimated::Estimated;
 use super::task::Task;
 use crate::aero::{Derivative, Regressor};
 use crate::dynamics::Equations;
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::flight::signal;
 use crate::maneuver::Status;
 use crate::output_error::identifiability::{Collinearity, collinearity, correlation, excitation};
@@ -26,7 +26,7 @@ struct RegressorHistory<'a> {
 pub(super) struct Diagnostics<'d, 'm, const NX: usize, E: Equations<NX>> {
     pub task: &'d Task<'m>,
     pub case: &'d Case<NX, E>,
-    pub window: &'d Window,
+    pub window: &'d ManeuverSignals,
     pub model: &'d Model<'m>,
 }
 
@@ -78,7 +78,7 @@ impl<'m, const NX: usize, E: Equations<NX>> Diagnostics<'_, 'm, NX, E> {
             .collect();
         // In the order of the model, held or not, so that a pair has one name in all maneuvers.
         acting.sort_by_key(|d| {
-            let mut derivatives = self.task.context.buildup.derivatives.iter();
+            let mut derivatives = self.task.context.aero_model.derivatives.iter();
             derivatives.position(|other| other.name == d.name)
         });
         let all = Model {
@@ -169,8 +169,8 @@ impl<'m, const NX: usize, E: Equations<NX>> Diagnostics<'_, 'm, NX, E> {
         }
         let row = |(i, j): (usize, usize)| {
             let ((first, a), (second, b)) = (&distinct[i], &distinct[j]);
-            let both = correlation(a, b)?;
-            Some(self.correlation_row(CorrelationKind::Regressors, [first, second], both))
+            let coefficient = correlation(a, b)?;
+            Some(self.correlation_row(CorrelationKind::Regressors, [first, second], coefficient))
         };
         pairs(distinct.len()).filter_map(row).collect()
     }
@@ -196,8 +196,8 @@ impl<'m, const NX: usize, E: Equations<NX>> Diagnostics<'_, 'm, NX, E> {
         pairs(names.len())
             .filter(|&(i, j)| matrix[(i, j)].abs() >= least)
             .map(|(i, j)| {
-                let both = [names[i].as_str(), names[j].as_str()];
-                self.correlation_row(CorrelationKind::Estimates, both, matrix[(i, j)])
+                let pair = [names[i].as_str(), names[j].as_str()];
+                self.correlation_row(CorrelationKind::Estimates, pair, matrix[(i, j)])
             })
             .collect()
     }

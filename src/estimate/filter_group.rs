@@ -5,7 +5,7 @@ use std::marker::PhantomData;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::calibration_effect::{NOT_COUNTED, misreadings};
+use super::calibration_effect::{NOT_COUNTED, signal_errors};
 use super::filter_minimum::{Minimum, NoMinimum};
 use super::group_member::GroupMember;
 use super::held_slopes::HeldSlopes;
@@ -171,7 +171,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
                 .bounds
                 .are_exceeded_by(&effect.change, SMALL_CHANGE)
         {
-            effect.become_uncertainty();
+            effect.replace_change_by_variance();
         }
         slope_fit
     }
@@ -331,7 +331,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
         if tasks.iter().all(|task| task.has_exact_signals()) {
             return;
         }
-        let errors = misreadings(&tasks, &first.slopes.window);
+        let errors = signal_errors(&tasks, &first.slopes.window);
         let mut together = vec![DVector::zeros(fit.values.len()); errors.len()];
         for (i, (member, filter)) in self.members.iter().zip(&slope_fit.filters).enumerate() {
             let parameters = self

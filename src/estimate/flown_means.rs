@@ -1,17 +1,17 @@
 //! Means of a maneuver's record: attitude, height of the c.g., inertias, positions of the surfaces.
 
-use crate::aero::Buildup;
+use crate::aero::AeroModel;
 use crate::flight::{Record, signal};
 use crate::maneuver::{Maneuver, Means};
 use crate::numerics::mean::finite_mean;
 
 /// Means over a maneuver's finite samples; `None` if a signal of the equations has none.
 #[must_use]
-pub fn means(record: &Record, maneuver: &Maneuver, buildup: &Buildup) -> Option<Means> {
+pub fn means(record: &Record, maneuver: &Maneuver, aero_model: &AeroModel) -> Option<Means> {
     let first = record.sample_at(maneuver.start_s);
     let last = record.sample_at(maneuver.end_s);
     let mean = |name: &str| finite_mean(record.values(name)?.get(first..=last)?.iter().copied());
-    let surfaces = buildup.derivatives.iter();
+    let surfaces = aero_model.derivatives.iter();
     let surfaces = surfaces.flat_map(|d| d.regressor.signals());
     Some(Means {
         theta_deg: mean(signal::THETA)?,

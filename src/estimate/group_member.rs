@@ -10,9 +10,9 @@ use super::prepared_case::{PreparedCase, all_free};
 use super::task::{Task, values_by_name};
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
 use crate::filter_error::bounds::WidePass;
+use crate::filter_error::calibration_gradients::Recorded;
 use crate::filter_error::filter::Filter;
-use crate::filter_error::misread::Recorded;
-use crate::output_error::calibration_errors::Misreading;
+use crate::output_error::calibration_errors::SignalError;
 use crate::output_error::{Case, Diverged, Model, equation_error};
 
 /// Maneuver of a group.
@@ -94,7 +94,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
     /// Changes of the gradient by calibration errors.
     pub fn gradient_shifts<const NG: usize, G: InGusts<NG>>(
         &self,
-        errors: &[Misreading],
+        errors: &[SignalError],
         held: &HeldSlopes,
         filter: &Filter<NG, G>,
         parameters: &[f64],

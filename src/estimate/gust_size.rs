@@ -7,8 +7,8 @@ use crate::flight::signal;
 use crate::numerics::mean::mean;
 use crate::units::DEG;
 
-/// Scale of turbulence at altitude, ft (MIL-F-8785C, Dryden): with it the random walk of the angle
-/// is the high-frequency part of a gust of some speed.
+/// Scale of turbulence at altitude, ft (MIL-F-8785C, Dryden). It relates the random walk of the
+/// angle, which is the high-frequency part of a gust, to the gust's speed.
 const GUST_SCALE_FT: f64 = 1750.0;
 
 /// Speed of the gusts across the flight path, ft/s rms.

@@ -13,7 +13,7 @@ use super::fitting::{StartingPoints, fit_output_error};
 use super::task::Task;
 use crate::aero::{Derivative, Regressor};
 use crate::dynamics::Equations;
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::maneuver::{Class, Status};
 use crate::numerics::digits::rounded;
 use crate::output_error::coloured::ResidualNoise;
@@ -83,7 +83,7 @@ impl Choice {
 /// The choice of a maneuver's held derivatives.
 struct Choosing<'t, 'a, const NX: usize, E: Equations<NX>> {
     task: &'t Task<'a>,
-    window: Window,
+    window: ManeuverSignals,
     /// Model with every candidate free.
     all_free: Model<'a>,
     wide: Case<NX, E>,
@@ -99,7 +99,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
             .iter()
             .chain(all_free.held.iter().map(|(d, _)| d))
             .flat_map(|d| d.regressor.signals());
-        let window = Window::cut(
+        let window = ManeuverSignals::cut(
             task.context.aircraft,
             task.record,
             range.clone(),
@@ -254,7 +254,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
         match because {
             None => "held together with derivatives that were freed later".to_owned(),
             Some(HoldingReason::NotExcited) => {
-                match self.task.context.buildup.derivative(&names[parameter]) {
+                match self.task.context.aero_model.derivative(&names[parameter]) {
                     Some(Derivative {
                         regressor: Regressor::Surface(s) | Regressor::Vane(s),
                         ..
@@ -302,7 +302,7 @@ pub(super) fn choose_held<const NX: usize, E: Equations<NX>>(
 /// `None` for constants, biases and initial states, for a derivative without a table, and for
 /// one whose table is all zero and states no uncertainty.
 fn tunnel_uncertainty(task: &Task, name: &str) -> Option<f64> {
-    let derivative = task.context.buildup.derivative(name)?;
+    let derivative = task.context.aero_model.derivative(name)?;
     if derivative.regressor == Regressor::Constant || task.tunnel_value(name).is_none() {
         return None;
     }
@@ -317,8 +317,9 @@ pub(super) fn undetermined_without_tunnel<const NX: usize, E: Equations<NX>>(
     fit: &Fit,
 ) -> String {
     let names = fit.undetermined.iter().filter_map(|&j| case.names.get(j));
-    let is_derivative =
-        |name: &&String| task.context.buildup.derivative(name).is_some() && !task.is_constant(name);
+    let is_derivative = |name: &&String| {
+        task.context.aero_model.derivative(name).is_some() && !task.is_constant(name)
+    };
     let lacking: Vec<&str> = names
         .filter(is_derivative)
         .filter(|name| tunnel_uncertainty(task, name).is_none())

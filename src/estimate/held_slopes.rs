@@ -35,10 +35,10 @@ impl HeldSlopes {
 
     /// The slopes moved by a fraction of the way to other values.
     pub fn towards(&self, values: &DVector<f64>, share: f64) -> Self {
-        let both = self.values.iter().zip(values.iter());
+        let pairs = self.values.iter().zip(values.iter());
         HeldSlopes {
             names: self.names.clone(),
-            values: both.map(|(from, to)| from + share * (to - from)).collect(),
+            values: pairs.map(|(from, to)| from + share * (to - from)).collect(),
             priors: self.priors.clone(),
         }
     }
@@ -49,7 +49,7 @@ impl HeldSlopes {
         pass.slope_effect(bounds, &self.names, &self.values, &self.priors)
     }
 
-    /// True if no derivative changes over α.
+    /// `true` if no derivative changes over α.
     pub fn is_constant(&self) -> bool {
         self.values.iter().all(|v| *v == 0.0)
     }

@@ -10,8 +10,8 @@ use crate::maneuver::Class;
 /// Reason why a derivative that the class estimates is inactive in a maneuver.
 const RESTS: &str = "its surface rests";
 
-/// The class without the derivatives of surfaces that rest and without what only outputs show that are
-/// not recorded, and the reason for each of these.
+/// The class without the derivatives of resting surfaces and without those that need an absent
+/// output, and the reason for each derivative left out.
 pub(super) fn class_of_maneuver(task: &Task) -> (Class, BTreeMap<String, String>) {
     let (class, mut reasons) = class_of_recorded_outputs(task);
     let seen = Task {

@@ -4,7 +4,7 @@ use super::prepared_case::PreparedCase;
 use super::task::Task;
 use super::whiteness::sample_noise;
 use crate::aero::Output;
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
 use crate::filter_error::filter::Filter;
 use crate::output_error::surface_noise::noisy_surfaces;
@@ -14,7 +14,7 @@ use crate::output_error::{Measurements, Model, NoisyInputs};
 pub(super) fn new_filter<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
     task: &Task,
     prepared: &PreparedCase<NX, E>,
-    window: &Window,
+    window: &ManeuverSignals,
     model: &Model,
 ) -> Filter<NG, G> {
     let measurements = prepared.case.measurements.clone();
@@ -27,7 +27,7 @@ pub(super) fn new_filter<const NX: usize, E: Equations<NX>, const NG: usize, G: 
 pub(super) fn noisy_inputs<const NX: usize, E: Equations<NX>>(
     task: &Task,
     prepared: &PreparedCase<NX, E>,
-    window: &Window,
+    window: &ManeuverSignals,
     model: &Model,
 ) -> NoisyInputs {
     NoisyInputs {
@@ -56,7 +56,7 @@ fn bias_uncertainty(task: &Task, output: Output) -> Option<f64> {
     let size = stated
         .filter(|bias| *bias > 0.0)
         .or_else(|| ordinary.filter(|_| is_determined))?;
-    Some(size.max(task.signal_error(signal).bias))
+    Some(size.max(task.error_size(signal).bias))
 }
 
 /// Standard deviations of the outputs' own noise: of the second differences of the measured

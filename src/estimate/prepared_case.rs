@@ -4,7 +4,7 @@ use super::task::Task;
 use crate::aero::Output;
 use crate::aircraft::Aircraft;
 use crate::dynamics::Equations;
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::maneuver::Maneuver;
 use crate::output_error::surface_noise::noisy_surfaces;
 use crate::output_error::{Case, Model, NoisyInputs, pressure_noise};
@@ -14,7 +14,7 @@ pub(super) struct PreparedCase<'a, const NX: usize, E: Equations<NX>> {
     pub model: Model<'a>,
     /// Signals of the surfaces that act.
     pub surfaces: Vec<&'a str>,
-    pub window: Window,
+    pub window: ManeuverSignals,
     pub case: Case<NX, E>,
     /// Share of the recorded output samples that the cost leaves out.
     pub left_out: f64,
@@ -35,7 +35,7 @@ impl<'a, const NX: usize, E: Equations<NX>> PreparedCase<'a, NX, E> {
         let surfaces: Vec<&str> = derivatives.flat_map(|d| d.regressor.signals()).collect();
         let settings = task.context.settings;
         check_marked_share(task, &surfaces)?;
-        let window = Window::cut(
+        let window = ManeuverSignals::cut(
             task.context.aircraft,
             task.record,
             range.clone(),

@@ -33,7 +33,7 @@ pub(super) fn class_of_moving_surfaces(task: &Task) -> (Class, BTreeSet<String>)
 
 /// Derivatives to be estimated whose surfaces rest.
 fn derivatives_at_rest(task: &Task) -> BTreeSet<String> {
-    let derivatives = task.context.buildup.derivatives_of(task.class.axis);
+    let derivatives = task.context.aero_model.derivatives_of(task.class.axis);
     let at_rest = derivatives.filter(|derivative| {
         let mut signals = derivative.regressor.signals();
         task.status(&derivative.name) == Some(Status::Estimated)
@@ -42,14 +42,14 @@ fn derivatives_at_rest(task: &Task) -> BTreeSet<String> {
     at_rest.map(|derivative| derivative.name.clone()).collect()
 }
 
-/// True for a signal that shows no more than noise in the maneuver.
+/// `true` for a signal that shows no more than noise in the maneuver.
 fn is_at_rest(task: &Task, name: &str) -> bool {
     let samples = task.record.values(name).and_then(|v| v.get(task.range()));
     samples.is_some_and(is_noise)
 }
 
-/// True if samples show no motion: their scatter about the mean is small, and no larger than white
-/// noise with their differences from sample to sample would have.
+/// `true` if samples show no motion: their scatter about the mean is small, and no larger than that
+/// of white noise with the same differences from sample to sample.
 fn is_noise(samples: &[f64]) -> bool {
     let steps = samples.windows(2).map(|pair| (pair[1] - pair[0]).powi(2));
     let count = samples.len().saturating_sub(1).max(1) as f64;

@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use super::estimated::{Estimated, rejected_fit};
 use super::task::Task;
 use crate::aero::{Combined, Output};
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::maneuver::Status;
 use crate::output_error::theil::OutputAgreement;
 use crate::output_error::{Fit, Measurements};
@@ -31,11 +31,11 @@ impl<'t, 'a> RowMaker<'t, 'a> {
 
     /// Derivatives and biases of the axis.
     fn terms(&self) -> Vec<Term<'a>> {
-        let (buildup, axis) = (self.task.context.buildup, self.task.class.axis);
-        let derivatives = buildup
+        let (aero_model, axis) = (self.task.context.aero_model, self.task.class.axis);
+        let derivatives = aero_model
             .derivatives_of(axis)
             .map(|d| (d.name.as_str(), d.unit().name()));
-        let biases = buildup
+        let biases = aero_model
             .biases_of(axis)
             .map(|b| (b.name.as_str(), b.unit().name()));
         derivatives
@@ -74,7 +74,7 @@ impl<'t, 'a> RowMaker<'t, 'a> {
     /// Rows of the sums whose parts were both estimated.
     pub fn combined_rows(&self, names: &[String], fit: &Fit) -> Vec<EstimateRow> {
         let place_of = |name: &str| names.iter().position(|n| n == name);
-        let sums = self.task.context.buildup.combined.iter();
+        let sums = self.task.context.aero_model.combined.iter();
         sums.filter_map(|c| self.combined_row(c, place_of(&c.constant)?, place_of(&c.slope)?, fit))
             .collect()
     }
@@ -91,7 +91,7 @@ impl<'t, 'a> RowMaker<'t, 'a> {
         let variance =
             |m: &DMatrix<f64>| m[(i, i)] + 2.0 * alpha * m[(i, j)] + alpha * alpha * m[(j, j)];
         let deviation = |m: &DMatrix<f64>| variance(m).max(0.0).sqrt();
-        let unit = self.task.context.buildup.unit_of(&combined.name)?.name();
+        let unit = self.task.context.aero_model.unit_of(&combined.name)?.name();
         Some(EstimateRow {
             value: Some(fit.values[i] + alpha * fit.values[j]),
             bound: fit.covariance.as_ref().map(deviation),
@@ -171,7 +171,7 @@ impl<'t, 'a> RowMaker<'t, 'a> {
         &self,
         measured: &Measurements,
         fit: &Fit,
-        window: &Window,
+        window: &ManeuverSignals,
         surfaces: &[&str],
     ) -> History {
         let outputs = self.task.class.axis.outputs().into_iter().enumerate();

@@ -36,18 +36,18 @@ impl Distance {
     /// is underestimated.
     pub fn between(fit: &Fit, second: &Regression) -> Option<Distance> {
         let corrected = fit.covariance_corrected.as_ref()?;
-        let both: Vec<usize> = (0..second.values.len())
+        let common: Vec<usize> = (0..second.values.len())
             .filter(|&j| second.values[j].is_some())
             .collect();
-        let differences = both
+        let differences = common
             .iter()
             .filter_map(|&j| Some(fit.values[j] - second.values[j]?));
         let differences = DVector::from_vec(differences.collect());
-        let sum = DMatrix::from_fn(both.len(), both.len(), |i, j| {
-            corrected[(both[i], both[j])] + second.covariance[(both[i], both[j])]
+        let sum = DMatrix::from_fn(common.len(), common.len(), |i, j| {
+            corrected[(common[i], common[j])] + second.covariance[(common[i], common[j])]
         });
-        (!both.is_empty()).then_some(Distance {
-            derivatives: both.len(),
+        (!common.is_empty()).then_some(Distance {
+            derivatives: common.len(),
             square: differences.dot(&(inverse(&sum)? * &differences)),
         })
     }

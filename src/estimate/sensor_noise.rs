@@ -15,8 +15,8 @@ use crate::output_error::{Fit, Measurements, Outcome};
 /// Raftery 1995).
 const VERY_STRONG: f64 = 5.0;
 
-/// True if coloured noise of the sensors explains the residuals of output error better than moving
-/// air does. It is never so if the innovations of the filter are white.
+/// `true` if coloured noise of the sensors explains the residuals of output error better than
+/// moving air does. It is never so if the innovations of the filter are white.
 pub(super) fn explains(
     measurements: &Measurements,
     output_error: &Fit,
@@ -35,8 +35,8 @@ pub(super) fn explains(
 /// Gain in log-likelihood of coloured noise over white noise, summed over the outputs.
 fn colour_gain(measurements: &Measurements, computed: &[[f64; OUTPUTS]]) -> f64 {
     let residuals = |o: usize| -> Vec<f64> {
-        let both = measurements.values.iter().zip(computed);
-        let counted = both.zip(&measurements.used);
+        let pairs = measurements.values.iter().zip(computed);
+        let counted = pairs.zip(&measurements.used);
         counted
             .map(|((z, y), used)| if used[o] { z[o] - y[o] } else { f64::NAN })
             .collect()

@@ -107,9 +107,10 @@ impl From<Start> for StartingValues {
 settings! {
     /// Settings of the estimation, of all classes.
     pub struct Settings {
-        /// Method: `filter_error` estimates the air's motion with the derivatives, `output_error`
-        /// takes the air as still, as in the paper, and `auto` takes filter error where the residuals
-        /// of output error are coloured. In gusts `output_error` charges them to the derivatives.
+        /// Method. `filter_error` estimates the motion of the air with the derivatives.
+        /// `output_error` assumes still air, as the paper does. `auto` uses filter error where the
+        /// residuals of output error are coloured. In gusts `output_error` charges them to the
+        /// derivatives.
         pub method: Method = Method::default(),
         /// Weights of the residuals: `table` takes each class's own (Tables 2 and 4), `estimated` the
         /// inverse of the residuals' variances. `estimated` changes every estimate and its bound.
@@ -127,21 +128,22 @@ settings! {
         /// Start of the iteration: `equation_error`, or `wind_tunnel` as in the paper. The other
         /// start is tried where the iteration does not converge.
         pub start: Start = Start::default(),
-        /// Choice of the derivatives that are held at the tunnel's value: `table` takes each
-        /// class's own (Tables 1 and 3), `evidence` holds what the tunnel determines better than
-        /// the maneuver. The intervals of `evidence` cover less than those of `table`.
+        /// Choice of the derivatives that are held at the tunnel's value. `table` takes those of
+        /// the class (Tables 1 and 3). `evidence` holds what the tunnel determines better than the
+        /// maneuver. The intervals of `evidence` cover less than those of `table`.
         pub hold: Hold = Hold::default(),
-        /// Use of fits that converged and are not credible, by the limits of `expert: doubt:`:
-        /// `leave_out` of trends, predictions and joint estimates with the outcome `doubtful`, or
-        /// `use` as `converged`.
+        /// Use of fits that converged and are not credible by the limits of `expert: doubt:`.
+        /// `leave_out` excludes them from trends, predictions and joint estimates, with the outcome
+        /// `doubtful`. `use` counts them as `converged`.
         pub doubtful: Doubtful = Doubtful::default(),
         /// Standard uncertainty of a held derivative whose table states none, percent of the root
         /// mean square of the table. Larger: wider `bound_corrected`, and `evidence` holds fewer
         /// derivatives.
         pub held_uncertainty_pct: f64 = 20.0,
-        /// Values that maneuvers hold, in the tables from the stage `model` on: `posterior` reads them
-        /// from the posterior of the other flights, `tunnel` from the wind tunnel, as in the paper.
-        /// Trends are of the estimates as published, the posterior of those with the tunnel's values.
+        /// Source of the held values in the tables from the stage `model` on. `posterior` takes
+        /// them from the posterior of the other flights, `tunnel` from the wind tunnel, as in the
+        /// paper. Trends are of the estimates as published, the posterior of those with the
+        /// tunnel's values.
         #[serde(skip_serializing)]
         pub held_values: HeldValues = HeldValues::default(),
         /// Delays of the surfaces, estimated from all maneuvers of the campaign.

@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use super::air_motion::{Air, Filtered, needs_filter};
 use super::calibration_effect::add_calibration_errors;
 use super::context::Context;
-use super::credibility::{Credibility, Explanation};
+use super::credibility::{Credibility, ExplainedMotion};
 use super::diagnostics::Diagnostics;
 use super::estimated::{Covariance, Estimated};
 use super::filter_minimum::NoMinimum;
@@ -164,7 +164,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> SingleEstimation<'t, 'a, NX, E> 
         let information = fit
             .final_cost
             .map(|_| cost::sums(&fit.response, &fit.weights).information);
-        let explanation = Explanation {
+        let explanation = ExplainedMotion {
             outputs: fit.final_cost.map(|_| &*fit.response.outputs),
             attitude_drifts: false,
             second_opinion: &self.second_opinion,
@@ -180,7 +180,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> SingleEstimation<'t, 'a, NX, E> 
     /// Rows of a fit by filter error.
     fn estimated_in_gusts(&self, filtered: &Filtered) -> Estimated {
         let second = filtered.second_opinion.as_ref();
-        let explanation = Explanation {
+        let explanation = ExplainedMotion {
             outputs: filtered.outputs_along_air.as_deref(),
             attitude_drifts: filtered.attitude_drifts,
             second_opinion: second.unwrap_or(&self.second_opinion),
@@ -199,7 +199,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> SingleEstimation<'t, 'a, NX, E> 
         fit: &Fit,
         start: StartingValues,
         information: Option<&DMatrix<f64>>,
-        explanation: Explanation,
+        explanation: ExplainedMotion,
     ) -> Estimated {
         let (task, case) = (self.task, &self.prepared.case);
         let mut estimated = self.make_rows(fit, start);

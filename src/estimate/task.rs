@@ -24,7 +24,7 @@ pub(super) struct Task<'a> {
 impl<'a> Task<'a> {
     /// Errors of the signals, root mean squares: those that remain where the flight itself determines
     /// them, elsewhere those that calibration states.
-    pub(super) fn signal_errors(&self) -> impl Iterator<Item = (&'a str, Calibration)> {
+    pub(super) fn error_sizes(&self) -> impl Iterator<Item = (&'a str, Calibration)> {
         let stated = &self.context.settings.calibration;
         let remaining = &self.record.remaining_errors;
         let signals: BTreeSet<&str> = stated
@@ -35,17 +35,17 @@ impl<'a> Task<'a> {
         let task = *self;
         signals
             .into_iter()
-            .map(move |signal| (signal, task.signal_error(signal)))
+            .map(move |signal| (signal, task.error_size(signal)))
     }
 
     /// `true` if no signal has a stated or found error, and no surface a delay.
     pub(super) fn has_exact_signals(&self) -> bool {
-        self.signal_errors().next().is_none() && self.context.delays.is_empty()
+        self.error_sizes().next().is_none() && self.context.delays.is_empty()
     }
 
-    /// Errors of one signal, as [`Self::signal_errors`] has them; zero for a signal that counts as
+    /// Errors of one signal, as [`Self::error_sizes`] has them; zero for a signal that counts as
     /// exact.
-    pub(super) fn signal_error(&self, signal: &str) -> Calibration {
+    pub(super) fn error_size(&self, signal: &str) -> Calibration {
         let stated = self.context.settings.calibration.get(signal);
         let stated = stated.copied().unwrap_or_default();
         let remaining = self.record.remaining_errors.get(signal);
@@ -73,7 +73,7 @@ impl<'a> Task<'a> {
     /// True for the constant of a coefficient.
     pub(super) fn is_constant(&self, name: &str) -> bool {
         self.context
-            .buildup
+            .aero_model
             .derivative(name)
             .is_some_and(|d| d.regressor == Regressor::Constant)
     }
@@ -113,7 +113,7 @@ impl<'a> Task<'a> {
             initial_state: basis.settings.initial_state,
             ..Model::default()
         };
-        for derivative in basis.buildup.derivatives_of(self.class.axis) {
+        for derivative in basis.aero_model.derivatives_of(self.class.axis) {
             match self.status(&derivative.name) {
                 Some(Status::Estimated) => model.free.push(derivative),
                 Some(Status::Held) => model.held.push((derivative, self.held_value(derivative)?)),
@@ -131,7 +131,7 @@ impl<'a> Task<'a> {
         }
         let free = |bias: &&Bias| self.status(&bias.name) == Some(Status::Estimated);
         model.biases = basis
-            .buildup
+            .aero_model
             .biases_of(self.class.axis)
             .filter(free)
             .collect();
@@ -171,7 +171,7 @@ impl<'a> Task<'a> {
         let mut model = self.class_model()?;
         model.free = self
             .context
-            .buildup
+            .aero_model
             .derivatives_of(self.class.axis)
             .filter(|d| active(d))
             .collect();

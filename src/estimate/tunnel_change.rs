@@ -48,7 +48,7 @@ impl TunnelChange<'_, '_> {
     /// Tunnel's change of a coefficient beyond that by its slope along α at the mean.
     fn change_along_alpha(&self, slope: &str) -> Option<Vec<f64>> {
         let range = self.range;
-        let sums = &self.task.context.buildup.combined;
+        let sums = &self.task.context.aero_model.combined;
         let sum = sums.iter().find(|sum| sum.slope == slope);
         let Some(curve) = sum.and_then(|sum| self.tabulated_sum(&sum.name, slope)) else {
             return Some(range.integrate_from_mean(&self.change_from_mean(slope)?));
@@ -128,7 +128,8 @@ impl AlphaRange {
     }
 }
 
-/// Value of a quantity at a place between two angles.
+/// Linear interpolation between the entries `low` and `low + 1`; `share` is the fraction of the
+/// step above `low`.
 fn interpolate(quantity: &[f64], (low, share): (usize, f64)) -> f64 {
     quantity[low] + share * (quantity[low + 1] - quantity[low])
 }

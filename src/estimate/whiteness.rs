@@ -21,12 +21,12 @@ pub(super) fn sample_noise(measurements: &Measurements, output: usize) -> f64 {
     differences::noise_of_second(median(sizes).unwrap_or(0.0))
 }
 
-/// True for a fit by output error whose residuals show no motion of the air.
+/// `true` for a fit by output error whose residuals show no motion of the air.
 pub(super) fn is_white(measurements: &Measurements, fit: &Fit) -> bool {
     fit.outcome == Outcome::Converged && are_white(measurements, &fit.response.outputs)
 }
 
-/// True if the residuals of every output are as white noise.
+/// `true` if the residuals of every output are as white noise.
 pub(super) fn are_white(measurements: &Measurements, computed: &[[f64; OUTPUTS]]) -> bool {
     let correlations = lag_one(measurements, computed);
     correlations.iter().all(|r| *r < COLOURED)
@@ -60,8 +60,8 @@ pub(super) fn white_cost(measurements: &Measurements, fit: &Fit) -> Option<f64> 
     fit.final_cost?;
     let mut cost = 0.0;
     for o in 0..OUTPUTS {
-        let both = measurements.values.iter().zip(&fit.response.outputs);
-        let counted = both.zip(&measurements.used).filter(|(_, used)| used[o]);
+        let pairs = measurements.values.iter().zip(&fit.response.outputs);
+        let counted = pairs.zip(&measurements.used).filter(|(_, used)| used[o]);
         let squares: Vec<f64> = counted.map(|((z, y), _)| (z[o] - y[o]).powi(2)).collect();
         if squares.is_empty() {
             continue;

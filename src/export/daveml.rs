@@ -54,11 +54,18 @@ pub fn document(contents: &ExportContents, tables: &[ExportTable]) -> String {
             name,
             &unit(&table.unit),
             &table.sources(),
-            Mark::Output,
+            VariableRole::Output,
         );
         let words =
             format!("1 where flight gave half or more of the information on {name}, else 0");
-        variable(&mut xml, name, &flag(name), "nd", &words, Mark::Output);
+        variable(
+            &mut xml,
+            name,
+            &flag(name),
+            "nd",
+            &words,
+            VariableRole::Output,
+        );
     }
     for coefficient in COEFFICIENTS {
         coefficients(contents, tables, coefficient, &mut xml);
@@ -108,19 +115,19 @@ fn header(contents: &ExportContents, xml: &mut Xml) {
 
 /// Role of a variable.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Mark {
+enum VariableRole {
     Input,
     Output,
 }
 
-fn variable(xml: &mut Xml, name: &str, id: &str, units: &str, words: &str, mark: Mark) {
+fn variable(xml: &mut Xml, name: &str, id: &str, units: &str, words: &str, role: VariableRole) {
     xml.open(
         "variableDef",
         &[("name", name), ("varID", id), ("units", units)],
     );
     xml.text("description", &[], words);
     xml.empty(
-        if mark == Mark::Input {
+        if role == VariableRole::Input {
             "isInput"
         } else {
             "isOutput"
@@ -137,7 +144,7 @@ fn inputs(contents: &ExportContents, tables: &[ExportTable], xml: &mut Xml) {
         "alpha",
         "deg",
         "angle of attack, positive nose up",
-        Mark::Input,
+        VariableRole::Input,
     );
     variable(
         xml,
@@ -145,10 +152,17 @@ fn inputs(contents: &ExportContents, tables: &[ExportTable], xml: &mut Xml) {
         "beta",
         "deg",
         "sideslip, positive wind from the right",
-        Mark::Input,
+        VariableRole::Input,
     );
     if tables.iter().any(|t| !t.machs.is_empty()) {
-        variable(xml, "machNumber", "mach", "nd", "Mach number", Mark::Input);
+        variable(
+            xml,
+            "machNumber",
+            "mach",
+            "nd",
+            "Mach number",
+            VariableRole::Input,
+        );
     }
     if let Some(third) = third(contents, tables) {
         variable(
@@ -157,16 +171,16 @@ fn inputs(contents: &ExportContents, tables: &[ExportTable], xml: &mut Xml) {
             third,
             "nd",
             "the tables' third variable, in the unit of its name",
-            Mark::Input,
+            VariableRole::Input,
         );
     }
-    let has_lag = contents.buildup.lags().next().is_some();
-    let is_used = |rate: &Regressor| *rate != Regressor::AlphaRate || has_lag;
+    let has_alpha_rate = contents.aero_model.along_alpha_rate().next().is_some();
+    let is_used = |rate: &Regressor| *rate != Regressor::AlphaRate || has_alpha_rate;
     for (_, id, words) in RATES.iter().filter(|(rate, ..)| is_used(rate)) {
-        variable(xml, id, id, "rad", words, Mark::Input);
+        variable(xml, id, id, "rad", words, VariableRole::Input);
     }
     let mut surfaces: Vec<&str> = contents
-        .buildup
+        .aero_model
         .derivatives
         .iter()
         .flat_map(|d| d.regressor.signals())
@@ -185,7 +199,7 @@ fn inputs(contents: &ExportContents, tables: &[ExportTable], xml: &mut Xml) {
             signal,
             Unit::of_signal(signal).name,
             "surface, vane or other signal, in the unit of its name",
-            Mark::Input,
+            VariableRole::Input,
         );
     }
 }

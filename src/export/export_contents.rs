@@ -2,7 +2,7 @@
 
 use super::export_table::ExportTable;
 use super::settings::Settings;
-use crate::aero::{Buildup, Coefficient, Derivative, Regressor, WindTunnel};
+use crate::aero::{AeroModel, Coefficient, Derivative, Regressor, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::model::CorrelatedDerivatives;
 use crate::tables::PosteriorRow;
@@ -12,7 +12,7 @@ use crate::tables::PosteriorRow;
 pub struct ExportContents<'a> {
     pub title: &'a str,
     pub aircraft: &'a Aircraft,
-    pub buildup: &'a Buildup,
+    pub aero_model: &'a AeroModel,
     pub tunnel: &'a WindTunnel,
     pub posterior: &'a [PosteriorRow],
     /// Correlations between derivatives of the posterior.
@@ -28,7 +28,7 @@ pub(super) fn terms<'a>(
     coefficient: Coefficient,
     of_vanes: bool,
 ) -> impl Iterator<Item = &'a Derivative> {
-    contents.buildup.derivatives.iter().filter(move |d| {
+    contents.aero_model.derivatives.iter().filter(move |d| {
         let is_vane = matches!(d.regressor, Regressor::Vane(_));
         d.coefficient == coefficient
             && is_vane == of_vanes

@@ -28,7 +28,7 @@ pub struct GridCell {
     pub source: String,
 }
 
-/// True for breakpoints that are equal but for rounding.
+/// `true` for breakpoints that are equal but for rounding.
 pub(super) fn is_same_breakpoint(a: f64, b: f64) -> bool {
     (a - b).abs() < 1e-6
 }

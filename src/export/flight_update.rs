@@ -13,8 +13,8 @@ const MOSTLY: f64 = 50.0;
 /// model.
 #[must_use]
 pub fn tables(contents: &ExportContents) -> Vec<ExportTable> {
-    let derivatives = contents.buildup.derivatives.iter().map(|d| &d.name);
-    let names = derivatives.chain(contents.buildup.combined.iter().map(|c| &c.name));
+    let derivatives = contents.aero_model.derivatives.iter().map(|d| &d.name);
+    let names = derivatives.chain(contents.aero_model.combined.iter().map(|c| &c.name));
     names.filter_map(|name| contents.table(name)).collect()
 }
 
@@ -61,7 +61,7 @@ impl ExportContents<'_> {
         }
         (!cells.is_empty()).then_some(ExportTable {
             derivative: name.to_owned(),
-            unit: self.buildup.unit_of(name)?.name().to_owned(),
+            unit: self.aero_model.unit_of(name)?.name().to_owned(),
             alphas_deg,
             machs,
             thirds,

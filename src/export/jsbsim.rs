@@ -30,7 +30,7 @@ pub fn section(contents: &ExportContents, tables: &[ExportTable]) -> String {
     for property in own_properties(contents, tables) {
         xml.text("property", &[("value", "0")], &property);
     }
-    for derivative in &contents.buildup.derivatives {
+    for derivative in &contents.aero_model.derivatives {
         if let Some(table) = tables.iter().find(|t| t.derivative == derivative.name) {
             function(contents, table, &mut xml);
         }

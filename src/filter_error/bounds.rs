@@ -62,8 +62,8 @@ pub fn bounds<const NX: usize, E: InGusts<NX>>(
             parameters,
         } => {
             let named = parameters.into_iter().map(|j| free[j]);
-            let own = named.filter(|j| *j < filter.first_noise());
-            return Err((condition_number, own.collect()));
+            let without_noise = named.filter(|j| *j < filter.first_noise());
+            return Err((condition_number, without_noise.collect()));
         }
     };
     let mut inverse = DMatrix::zeros(filter.parameters(), filter.parameters());
@@ -72,12 +72,12 @@ pub fn bounds<const NX: usize, E: InGusts<NX>>(
             inverse[(row, column)] = of_free[(i, j)];
         }
     }
-    let own = |matrix: &DMatrix<f64>| {
+    let without_noise = |matrix: &DMatrix<f64>| {
         let n = filter.first_noise();
         matrix.view((0, 0), (n, n)).into_owned()
     };
-    let covariance = own(&inverse);
-    let at_known_noise = symmetric::inverse(&own(&information));
+    let covariance = without_noise(&inverse);
+    let at_known_noise = symmetric::inverse(&without_noise(&information));
     let at_known_noise = at_known_noise.unwrap_or_else(|| covariance.clone());
     Ok(FilterBounds {
         covariance,
@@ -126,27 +126,27 @@ impl FilterBounds {
         let response = &scored.response;
         let aligned = AlignedMatrix::from_symmetric(&self.inverse);
         let n = self.inverse.nrows();
-        let own = filter.own();
+        let sharing = filter.own();
         let members = filter.filters().iter().zip(&response.members).enumerate();
         let series = members.flat_map(|(i, (filter, response))| {
-            let places = own.places(i);
+            let places = sharing.places(i);
             let series = filter.series(response).into_iter();
-            series.map(|series| series.widened(places, n))
+            series.map(|series| series.with_parameters(places, n))
         });
         let series: Vec<BlockSeries> = series.collect();
-        let innovations = coloured::covariance(&aligned, &series).widened();
+        let innovations = coloured::covariance(&aligned, &series).widened_by_student_t();
         let others = filter.other_information(response);
         let others = others.view((0, 0), (n, n));
         let corrected = innovations + &self.inverse * others * &self.inverse;
         symmetric::raise_variances(corrected, &self.covariance)
     }
 
-    /// Returns true if a change of the parameters is large beside their bounds.
+    /// `true` if a change of the parameters is large beside their bounds.
     #[must_use]
     pub fn are_exceeded_by(&self, change: &DVector<f64>, share: f64) -> bool {
         let variances = self.covariance.diagonal();
-        let mut both = change.iter().zip(variances.iter());
-        both.any(|(change, variance)| change.powi(2) > share * share * variance)
+        let mut changes = change.iter().zip(variances.iter());
+        changes.any(|(change, variance)| change.powi(2) > share * share * variance)
     }
 
     /// Changes of the filter's own parameters from changes of the gradient.
@@ -181,8 +181,8 @@ impl WidePass {
         values: &BTreeMap<&str, f64>,
     ) -> Option<Self> {
         let value = |name: &String| values.get(name.as_str()).copied().unwrap_or(0.0);
-        let own: Vec<f64> = wide.names().iter().map(value).collect();
-        let at = wide.with_noise(&own, &filter.noise(parameters));
+        let wide_parameters: Vec<f64> = wide.names().iter().map(value).collect();
+        let at = wide.with_noise(&wide_parameters, &filter.noise(parameters));
         let response = wide.respond(&at).ok()?;
         Some(WidePass {
             own: filter.names().to_vec(),
@@ -208,15 +208,15 @@ impl WidePass {
     /// Joins the passes of maneuvers; `own` places their own parameters in the joint fit. Held
     /// derivatives and slopes of one name are common to the maneuvers.
     #[must_use]
-    pub fn joined(members: &[WidePass], own: &SharedParameters) -> Self {
+    pub fn joined(members: &[WidePass], sharing: &SharedParameters) -> Self {
         let mut names: Vec<String> = vec![];
         let mut all_places = Vec::with_capacity(members.len());
         for (i, member) in members.iter().enumerate() {
             let mut places = Vec::with_capacity(member.names.len());
-            for name in member.joint_names(own, i) {
-                let known = names.iter().position(|n| n == name);
-                places.push(known.unwrap_or(names.len()));
-                if known.is_none() {
+            for name in member.joint_names(sharing, i) {
+                let position = names.iter().position(|n| n == name);
+                places.push(position.unwrap_or(names.len()));
+                if position.is_none() {
                     names.push(name.clone());
                 }
             }
@@ -229,7 +229,7 @@ impl WidePass {
             add_vector(places, &member.gradient, &mut gradient);
         }
         WidePass {
-            own: own.names().to_vec(),
+            own: sharing.names().to_vec(),
             names,
             information,
             gradient,
@@ -237,11 +237,11 @@ impl WidePass {
     }
 
     /// Names of the parameters of one maneuver in the joint fit.
-    fn joint_names<'n>(&'n self, own: &'n SharedParameters, member: usize) -> Vec<&'n String> {
-        let places = own.places(member);
+    fn joint_names<'n>(&'n self, sharing: &'n SharedParameters, member: usize) -> Vec<&'n String> {
+        let places = sharing.places(member);
         let joint = |name: &'n String| {
             let place = self.own.iter().position(|n| n == name);
-            place.map_or(name, |j| &own.names()[places[j]])
+            place.map_or(name, |j| &sharing.names()[places[j]])
         };
         self.names.iter().map(joint).collect()
     }

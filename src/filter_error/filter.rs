@@ -10,15 +10,15 @@ use std::marker::PhantomData;
 use nalgebra::SVector;
 use pulp::Arch;
 
+use super::gain_computation::GainComputation;
 use super::gains::{Pattern, PatternGain, patterns};
-use super::gains_at::GainsAt;
 use super::input_noise::InputNoise;
 use super::linearised::Linearised;
 use super::noise::{Noise, NoiseParameter, NoisePrior};
 use super::pass::{Corrections, FilterPass, LaneBlocks, LaneGain, PassOutputs, RowSink};
 use super::response::FilterResponse;
 use crate::aircraft::Aircraft;
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{InGusts, OUTPUTS};
 use crate::numerics::simd::AlignedBuffer;
 use crate::output_error::case::blocks::samples_per_block;
@@ -51,7 +51,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     #[must_use]
     pub fn new(
         aircraft: &Aircraft,
-        window: &Window,
+        window: &ManeuverSignals,
         measurements: Measurements,
         model: &Model,
         biases: &[Option<f64>],
@@ -65,7 +65,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     pub fn with_model(
         &self,
         aircraft: &Aircraft,
-        window: &Window,
+        window: &ManeuverSignals,
         model: &Model,
         biases: &[Option<f64>],
     ) -> Self {
@@ -76,10 +76,10 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     fn of_case(case: Case<NX, E>, model: &Model, biases: &[Option<f64>]) -> Self {
         let biased_outputs = model.biased_outputs::<NX, E>();
         let initial_states = match model.initial_state {
-            InitialState::Estimated => E::own_states(),
+            InitialState::Estimated => E::states_in_still_air(),
             InitialState::Measured => 0,
         };
-        let noise_parameters = NoiseParameter::all(E::FELT_RATES.len());
+        let noise_parameters = NoiseParameter::all(E::AIR_RELATIVE_RATES.len());
         let others = biased_outputs.len() + initial_states + noise_parameters.len();
         let layout = LaneLayout::dense(&case.terms, E::REGRESSOR_STATES, others);
         let (patterns, pattern_of) = patterns(&case.measurements.used);
@@ -94,7 +94,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
             patterns,
             pattern_of,
             priors: vec![],
-            names: model.parameter_names(&E::STATES[..E::own_states()]),
+            names: model.parameter_names(&E::STATES[..E::states_in_still_air()]),
         };
         filter.priors = filter.priors(biases);
         filter
@@ -154,13 +154,16 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     /// Noise of these parameters.
     #[must_use]
     pub fn noise(&self, parameters: &[f64]) -> Noise {
-        Noise::of_parameters(&parameters[self.first_noise()..], E::FELT_RATES.len())
+        Noise::of_parameters(
+            &parameters[self.first_noise()..],
+            E::AIR_RELATIVE_RATES.len(),
+        )
     }
 
     /// Joins the filter's own parameters with the parameters of a noise.
     #[must_use]
-    pub fn with_noise(&self, own: &[f64], noise: &Noise) -> Vec<f64> {
-        [own, &noise.parameters(E::FELT_RATES.len())].concat()
+    pub fn with_noise(&self, values: &[f64], noise: &Noise) -> Vec<f64> {
+        [values, &noise.parameters(E::AIR_RELATIVE_RATES.len())].concat()
     }
 
     /// Runs the filter over the maneuver: innovations, their sensitivities to all parameters, and the
@@ -169,7 +172,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     /// # Errors
     /// [`Diverged`] when the state leaves its bounds or the filter has no finite gain.
     pub fn respond(&self, parameters: &[f64]) -> Result<FilterResponse, Diverged> {
-        let gains = self.gains(parameters)?;
+        let gains = self.gains_with_slopes(parameters)?;
         let mut response = FilterResponse::empty(self.samples(), self.parameters());
         let mut sums = NormalSums::new(
             &self.layout,
@@ -190,7 +193,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     /// # Errors
     /// [`Diverged`] when the state leaves its bounds or the filter has no finite gain.
     pub fn innovations(&self, parameters: &[f64]) -> Result<FilterResponse, Diverged> {
-        let gains = self.gains_alone(parameters)?;
+        let gains = self.gains_without_slopes(parameters)?;
         let mut response = FilterResponse::empty(self.samples(), self.parameters());
         self.run(parameters, &gains, &mut response, None::<&mut NormalSums>)?;
         self.add_covariance_part(parameters, &gains, &mut response);
@@ -323,8 +326,8 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         for i in 0..self.initial_states {
             x[i] = parameters[first + i];
         }
-        for &(rate, felt) in E::FELT_RATES {
-            x[felt] = x[rate];
+        for &(rate, relative) in E::AIR_RELATIVE_RATES {
+            x[relative] = x[rate];
         }
         x
     }
@@ -335,32 +338,35 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         let first = self.first_noise() - self.initial_states;
         for i in 0..self.initial_states {
             let lane = self.lane(first + i);
-            let felt = E::FELT_RATES.iter().find(|(rate, _)| *rate == i);
+            let relative = E::AIR_RELATIVE_RATES.iter().find(|(rate, _)| *rate == i);
             rows.slice_mut()[i * width + lane] = 1.0;
-            if let Some((_, felt)) = felt {
-                rows.slice_mut()[felt * width + lane] = 1.0;
+            if let Some((_, relative)) = relative {
+                rows.slice_mut()[relative * width + lane] = 1.0;
             }
         }
         rows
     }
 
     /// Gains of all patterns with their slopes.
-    pub(super) fn gains(&self, parameters: &[f64]) -> Result<Vec<PatternGain<NX>>, Diverged> {
-        self.gains_at(parameters, true)
+    pub(super) fn gains_with_slopes(
+        &self,
+        parameters: &[f64],
+    ) -> Result<Vec<PatternGain<NX>>, Diverged> {
+        self.compute_gains(parameters, true)
     }
 
     /// Gains of all patterns without slopes.
-    fn gains_alone(&self, parameters: &[f64]) -> Result<Vec<PatternGain<NX>>, Diverged> {
-        self.gains_at(parameters, false)
+    fn gains_without_slopes(&self, parameters: &[f64]) -> Result<Vec<PatternGain<NX>>, Diverged> {
+        self.compute_gains(parameters, false)
     }
 
-    fn gains_at(
+    fn compute_gains(
         &self,
         parameters: &[f64],
         with_slopes: bool,
     ) -> Result<Vec<PatternGain<NX>>, Diverged> {
         let numbered = (self.first_noise()..).zip(self.noise_parameters.iter().copied());
-        let gains = Arch::new().dispatch(GainsAt::<NX, E> {
+        let gains = Arch::new().dispatch(GainComputation::<NX, E> {
             linearised: &self.linearised,
             input_noise: &self.input_noise,
             patterns: &self.patterns,
@@ -387,7 +393,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
             let place = self.noise_parameters.iter().position(|p| *p == kind);
             self.first_noise() + place.unwrap_or(0)
         };
-        for gust in 0..E::FELT_RATES.len() {
+        for gust in 0..E::AIR_RELATIVE_RATES.len() {
             let cost = self.noise(parameters).rotary_cost(gust, self.case.step_s);
             if let Some(cost) = cost {
                 response.add_rotary_cost(&cost, place);

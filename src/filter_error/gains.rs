@@ -4,12 +4,12 @@
 use nalgebra::{Cholesky, SMatrix};
 
 use super::noise::{Noise, NoiseParameter};
-use super::riccati::{OutputSlopes, States, SteadyFilter, SystemSlope};
+use super::riccati::{OutputSlopes, StateMatrix, SteadyFilter, SystemSlope};
 use crate::dynamics::OUTPUTS;
 use crate::numerics::small::{product, product_transposed, sandwich};
 
-/// Square matrix of the outputs.
-pub(super) type Outputs = SMatrix<f64, OUTPUTS, OUTPUTS>;
+/// Square matrix over the outputs, such as a covariance.
+pub(super) type OutputMatrix = SMatrix<f64, OUTPUTS, OUTPUTS>;
 /// Gain: states by outputs.
 pub(super) type Gain<const NX: usize> = SMatrix<f64, NX, OUTPUTS>;
 
@@ -24,8 +24,8 @@ pub(super) struct Pattern {
 pub(super) fn patterns(used: &[[bool; OUTPUTS]]) -> (Vec<Pattern>, Vec<u8>) {
     let (mut patterns, mut of_sample) = (Vec::<Pattern>::new(), Vec::with_capacity(used.len()));
     for used in used {
-        let known = patterns.iter().position(|p| p.used == *used);
-        let pattern = known.unwrap_or_else(|| {
+        let position = patterns.iter().position(|p| p.used == *used);
+        let pattern = position.unwrap_or_else(|| {
             patterns.push(Pattern {
                 used: *used,
                 samples: 0,
@@ -44,10 +44,10 @@ pub(super) fn patterns(used: &[[bool; OUTPUTS]]) -> (Vec<Pattern>, Vec<u8>) {
 pub(super) struct PatternGain<const NX: usize> {
     pub gain: Gain<NX>,
     /// Inverse S⁻¹ of the innovations' covariance; zero for outputs that do not count.
-    pub inverse: Outputs,
+    pub inverse: OutputMatrix,
     /// Matrix L⁻¹ with S = L Lᵀ, by which the innovations become white; zero for outputs that do
     /// not count.
-    pub whitening: Outputs,
+    pub whitening: OutputMatrix,
     pub log_determinant: f64,
     /// Slopes of gain and S along each parameter that has any.
     pub slopes: Vec<GainSlope<NX>>,
@@ -58,7 +58,7 @@ pub(super) struct PatternGain<const NX: usize> {
 pub(super) struct GainSlope<const NX: usize> {
     pub parameter: usize,
     pub gain: Gain<NX>,
-    pub innovations: Outputs,
+    pub innovations: OutputMatrix,
 }
 
 /// Change of the system along a parameter, numbered as in the filter.
@@ -82,21 +82,21 @@ pub(super) fn steady_variance_slopes(
 ) -> [f64; OUTPUTS] {
     let variances = steady_variances(noise, patterns);
     std::array::from_fn(|o| match parameter {
-        NoiseParameter::Output(own) if own == o => 2.0 * variances[o],
+        NoiseParameter::Output(output) if output == o => 2.0 * variances[o],
         _ => 0.0,
     })
 }
 
 /// Share of the samples in which an output counts.
 fn share(output: usize, patterns: &[Pattern], all: usize) -> f64 {
-    let own = patterns.iter().filter(|p| p.used[output]);
-    let own: usize = own.map(|p| p.samples).sum();
-    own.max(1) as f64 / all.max(1) as f64
+    let with_output = patterns.iter().filter(|p| p.used[output]);
+    let samples: usize = with_output.map(|p| p.samples).sum();
+    samples.max(1) as f64 / all.max(1) as f64
 }
 
 /// Gains of all patterns; `None` if the filter has no finite covariance.
 #[inline(always)]
-pub(super) fn gains<const NX: usize>(
+pub(super) fn gains_of_patterns<const NX: usize>(
     filter: &SteadyFilter<NX>,
     noise: &Noise,
     slopes: &[ParameterSlope<NX>],
@@ -110,10 +110,10 @@ pub(super) fn gains<const NX: usize>(
     }
     let mut gains = Vec::with_capacity(patterns.len());
     for pattern in patterns {
-        let mut own = PatternGain::for_pattern(&filter.prediction, c, noise, pattern)?;
-        own.slopes = own.slopes_along(&filter.prediction, c, &changes, pattern);
-        own.add_output_noise(noise, noise_parameters, pattern);
-        gains.push(own);
+        let mut pattern_gain = PatternGain::for_pattern(&filter.prediction, c, noise, pattern)?;
+        pattern_gain.slopes = pattern_gain.slopes_along(&filter.prediction, c, &changes, pattern);
+        pattern_gain.add_output_noise(noise, noise_parameters, pattern);
+        gains.push(pattern_gain);
     }
     Some(gains)
 }
@@ -123,8 +123,8 @@ impl<const NX: usize> PatternGain<NX> {
     pub fn none() -> Self {
         PatternGain {
             gain: Gain::zeros(),
-            inverse: Outputs::zeros(),
-            whitening: Outputs::zeros(),
+            inverse: OutputMatrix::zeros(),
+            whitening: OutputMatrix::zeros(),
             log_determinant: 0.0,
             slopes: vec![],
         }
@@ -132,7 +132,7 @@ impl<const NX: usize> PatternGain<NX> {
 
     #[inline(always)]
     fn for_pattern(
-        prediction: &States<NX>,
+        prediction: &StateMatrix<NX>,
         c: &OutputSlopes<NX>,
         noise: &Noise,
         pattern: &Pattern,
@@ -164,22 +164,22 @@ impl<const NX: usize> PatternGain<NX> {
 
     /// Slope of the gain K along a parameter.
     ///
-    /// P is the covariance of the prediction, C the slopes of the outputs along the states, S the
-    /// covariance of the innovations, and d a slope along the parameter: dK = (dP Cᵀ + P dCᵀ − K
-    /// dS) S⁻¹.
+    /// P is the covariance of the prediction, C the sensitivity of the outputs to the states, S the
+    /// covariance of the innovations. With d for a slope along the parameter, dK = (dP Cᵀ + P dCᵀ −
+    /// K dS) S⁻¹.
     #[inline(always)]
     fn slopes_along(
         &self,
-        prediction: &States<NX>,
+        prediction: &StateMatrix<NX>,
         c: &OutputSlopes<NX>,
-        changes: &[(usize, OutputSlopes<NX>, States<NX>)],
+        changes: &[(usize, OutputSlopes<NX>, StateMatrix<NX>)],
         pattern: &Pattern,
     ) -> Vec<GainSlope<NX>> {
-        let seen = product_transposed(prediction, c);
+        let state_output = product_transposed(prediction, c);
         let mut slopes = Vec::with_capacity(changes.len());
         for (parameter, c_slope, p_slope) in changes {
             let cross = product_transposed(p_slope, c) + product_transposed(prediction, c_slope);
-            let mut innovations = product(c, &cross) + product(c_slope, &seen);
+            let mut innovations = product(c, &cross) + product(c_slope, &state_output);
             clear_unused(&mut innovations, pattern);
             let gain = product(&(cross - product(&self.gain, &innovations)), &self.inverse);
             slopes.push(GainSlope {
@@ -214,7 +214,7 @@ impl<const NX: usize> PatternGain<NX> {
     }
 }
 
-fn clear_unused(matrix: &mut Outputs, pattern: &Pattern) {
+fn clear_unused(matrix: &mut OutputMatrix, pattern: &Pattern) {
     for o in (0..OUTPUTS).filter(|o| !pattern.used[*o]) {
         matrix.row_mut(o).fill(0.0);
         matrix.column_mut(o).fill(0.0);

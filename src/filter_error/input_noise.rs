@@ -1,6 +1,6 @@
 //! Noise of the measured inputs as noise of the states. The equations take surfaces and dynamic
-//! pressure as exact, so their white noise moves the computed aircraft; through a moment it is
-//! integrated to slow errors.
+//! pressure as exact. Their white noise therefore moves the computed aircraft; through a moment it
+//! is integrated to slow errors.
 //!
 //! Let n be the error of an input at one sample, and e the change of the coefficients c per unit of
 //! this input. The error changes the coefficients by e n, and the state x during a step Δt by Γ e
@@ -11,7 +11,7 @@
 
 use nalgebra::SVector;
 
-use super::riccati::States;
+use super::riccati::StateMatrix;
 use crate::dynamics::{COEFFICIENTS, Equations};
 use crate::output_error::Case;
 use crate::output_error::surface_noise::{DerivativeValue, NoisySurface};
@@ -54,14 +54,14 @@ impl<const NX: usize> InputNoise<NX> {
         InputNoise { effects }
     }
 
-    /// True if the inputs are exact.
+    /// `true` if the inputs are exact.
     pub fn is_zero(&self) -> bool {
         self.effects.is_empty()
     }
 
     /// Covariance of the states' noise in a step with these free derivatives.
-    pub fn covariance(&self, derivatives: &[f64]) -> States<NX> {
-        let mut covariance = States::zeros();
+    pub fn covariance(&self, derivatives: &[f64]) -> StateMatrix<NX> {
+        let mut covariance = StateMatrix::zeros();
         for effect in &self.effects {
             let sum = effect.sum(derivatives);
             covariance += sum * sum.transpose();
@@ -70,12 +70,12 @@ impl<const NX: usize> InputNoise<NX> {
     }
 
     /// Slopes of [`Self::covariance`] along the derivatives.
-    pub fn covariance_slopes(&self, derivatives: &[f64]) -> Vec<States<NX>> {
-        let mut slopes = vec![States::zeros(); derivatives.len()];
+    pub fn covariance_slopes(&self, derivatives: &[f64]) -> Vec<StateMatrix<NX>> {
+        let mut slopes = vec![StateMatrix::zeros(); derivatives.len()];
         for effect in &self.effects {
             let sum = effect.sum(derivatives);
-            for (j, own) in &effect.free {
-                let half = own * sum.transpose();
+            for (j, by_derivative) in &effect.free {
+                let half = by_derivative * sum.transpose();
                 slopes[*j] += half + half.transpose();
             }
         }
@@ -151,6 +151,8 @@ impl<const NX: usize> StateEffect<NX> {
     /// Effect with these free derivatives.
     fn sum(&self, derivatives: &[f64]) -> SVector<f64, NX> {
         let free = self.free.iter();
-        free.fold(self.held, |sum, (j, own)| sum + own * derivatives[*j])
+        free.fold(self.held, |sum, (j, by_derivative)| {
+            sum + by_derivative * derivatives[*j]
+        })
     }
 }

@@ -97,8 +97,8 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
 
     /// Place of each parameter of a maneuver, its noise included.
     fn places(&self, member: usize) -> Vec<usize> {
-        let own = self.own.places(member).iter().copied();
-        own.chain(self.noise_places(member)).collect()
+        let places = self.own.places(member).iter().copied();
+        places.chain(self.noise_places(member)).collect()
     }
 
     /// Filters with the places of their parameters.
@@ -125,7 +125,7 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
     /// Derivatives, biases and initial states with the noise of each maneuver.
     #[must_use]
     pub fn with_noise(&self, own: &[f64], noise: &[Noise]) -> Vec<f64> {
-        let gusts = E::FELT_RATES.len();
+        let gusts = E::AIR_RELATIVE_RATES.len();
         let noise = noise.iter().flat_map(|noise| noise.parameters(gusts));
         own.iter().copied().chain(noise).collect()
     }
@@ -188,21 +188,23 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
         sum
     }
 
-    /// Least value of each parameter; `resolutions` are the least standard deviations of each
-    /// maneuver's outputs.
+    /// Lower limits of the parameters during the iteration: none for derivatives, biases and
+    /// initial states. The limits of the noise parameters follow from `resolutions`, the smallest
+    /// standard deviation of each output of each maneuver.
     #[must_use]
     pub fn floors(&self, resolutions: &[[f64; OUTPUTS]]) -> Vec<f64> {
-        let own = vec![f64::NEG_INFINITY; self.first_noise()];
+        let unlimited = vec![f64::NEG_INFINITY; self.first_noise()];
         let members = self.filters.iter().zip(resolutions);
         let noise = members.flat_map(|(filter, resolution)| {
             let parameters = filter.noise_parameters().iter();
             parameters.map(|parameter| parameter.floor(resolution))
         });
-        own.into_iter().chain(noise).collect()
+        unlimited.into_iter().chain(noise).collect()
     }
 
-    /// Marks parameters as fixed: all noise if it is known; else the noise of outputs that never count,
-    /// and corner and correlations of those rotary gusts whose size is fixed.
+    /// Fixes noise parameters that the data do not determine: all of them if the noise is known.
+    /// Otherwise the noise of outputs that never count, and corner and correlations of rotary gusts
+    /// of fixed size.
     pub(super) fn fix_noise(&self, free: &mut [bool]) {
         if self.noise_is_known {
             free[self.first_noise()..].fill(false);
@@ -210,7 +212,11 @@ impl<'f, const NX: usize, E: InGusts<NX>> JointFilter<'f, NX, E> {
         for (member, filter) in self.filters.iter().enumerate() {
             let noise = &mut free[self.noise_places(member)];
             fix_unmeasured(filter, noise);
-            fix_without_effect(filter.noise_parameters(), E::FELT_RATES.len(), noise);
+            fix_without_effect(
+                filter.noise_parameters(),
+                E::AIR_RELATIVE_RATES.len(),
+                noise,
+            );
         }
     }
 }

@@ -2,8 +2,8 @@
 //! 5).
 //!
 //! Output error attributes the effects of gusts to the derivatives. Filter error adds noise of the
-//! air to the states between samples, and a filter of steady gain K corrects the predicted state x̂
-//! to x̃ by the measurements z:
+//! air to the states between samples. A filter of steady gain K corrects the predicted state x̂ to
+//! x̃ by the measurements z:
 //!
 //! ```text
 //! prediction   x̂(k+1) = f(T x̃(k))
@@ -24,24 +24,24 @@
 //! | [`input_noise`] | noise of surfaces and dynamic pressure as noise of the states |
 //! | `riccati` | covariance of the prediction, and its slopes |
 //! | `gains` | gain and covariance of the innovations for each pattern of missing outputs |
-//! | `gains_at` | gains for given parameters, with their slopes along all of them |
+//! | `gain_computation` | gains for given parameters, with their slopes along all of them |
 //! | `pass` | one pass: innovations and their sensitivities, in the kernel of output error |
 //! | [`response`] | result of a pass: cost, gradient and information |
 //! | [`filter`] | a maneuver prepared |
 //! | [`joint_filter`] | several maneuvers that share derivatives, or one |
 //! | [`scoring`] | the iteration |
-//! | [`misread`] | effects of the instruments' errors on the gradient |
+//! | [`calibration_gradients`] | effects of the instruments' errors on the gradient |
 //! | [`bounds`] | covariance of the estimates, and the effects of held values and calibration |
 //! | [`slopes`] | slopes of the derivatives over α, and their effect on the estimates |
 
 pub mod bounds;
+pub mod calibration_gradients;
 pub mod filter;
+mod gain_computation;
 mod gains;
-mod gains_at;
 mod input_noise;
 pub mod joint_filter;
 mod linearised;
-pub mod misread;
 pub mod noise;
 mod pass;
 pub mod response;

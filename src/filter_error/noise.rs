@@ -155,7 +155,7 @@ impl Noise {
 
     /// Noise of still air, with these standard deviations of the outputs.
     #[must_use]
-    pub fn still(outputs: [f64; OUTPUTS]) -> Noise {
+    pub fn without_gusts(outputs: [f64; OUTPUTS]) -> Noise {
         Noise {
             angle: LEAST_ANGLE,
             gusts: [LEAST_GUST; MOST_GUSTS],
@@ -165,7 +165,7 @@ impl Noise {
 
     /// Noise of almost still air, from which the iteration can grow gusts if there are any.
     #[must_use]
-    pub fn slight(outputs: [f64; OUTPUTS]) -> Noise {
+    pub fn with_small_gusts(outputs: [f64; OUTPUTS]) -> Noise {
         Noise {
             angle: 10.0 * LEAST_ANGLE,
             gusts: [10.0 * LEAST_GUST; MOST_GUSTS],
@@ -177,7 +177,7 @@ impl Noise {
     #[must_use]
     pub fn of_parameters(parameters: &[f64], gusts: usize) -> Noise {
         // Gusts that the axis does not have are still.
-        let mut noise = Noise::still([1.0; OUTPUTS]);
+        let mut noise = Noise::without_gusts([1.0; OUTPUTS]);
         for (parameter, value) in NoiseParameter::all(gusts).into_iter().zip(parameters) {
             match parameter {
                 NoiseParameter::Angle => noise.angle = value.exp(),
@@ -203,20 +203,20 @@ impl Noise {
         NoiseParameter::all(gusts).into_iter().map(value).collect()
     }
 
-    /// Returns true if all noise of the process is at its floor.
+    /// `true` if all noise of the process is at its floor.
     #[must_use]
-    pub fn is_still(&self) -> bool {
+    pub fn has_no_gusts(&self) -> bool {
         // Parameters are logarithms, whose rounding the factor covers.
         const AT: f64 = 1.0 + 1e-9;
         self.angle <= AT * LEAST_ANGLE && self.gusts.iter().all(|g| *g <= AT * LEAST_GUST)
     }
 
-    /// True for moving air whose rotary gusts are consistent with the random walk of the angle.
+    /// `true` for moving air whose rotary gusts are consistent with the random walk of the angle.
     /// Rotary gusts without gusts of the angle are a misfit of the rates instead.
     #[must_use]
     pub fn is_of_air(&self, gusts: usize, step_s: f64) -> bool {
         let belongs = |gust| self.rotary_excess(gust, step_s) < MOST_EXCESS.ln();
-        !self.is_still() && (0..gusts).all(belongs)
+        !self.has_no_gusts() && (0..gusts).all(belongs)
     }
 
     /// Steady gain of a filter for the angle of the air alone, measured by the output `vane`; zero
@@ -227,7 +227,7 @@ impl Noise {
     /// gain p / (p + r).
     #[must_use]
     pub fn angle_gain(&self, vane: usize) -> f64 {
-        if self.is_still() {
+        if self.has_no_gusts() {
             return 0.0;
         }
         let (q, r) = (self.angle.powi(2), (self.outputs[vane] * RAD).powi(2));
@@ -290,14 +290,14 @@ impl Noise {
     pub fn covariance<const NX: usize, E: InGusts<NX>>(&self, step_s: f64) -> SMatrix<f64, NX, NX> {
         let mut q = SMatrix::zeros();
         q[(E::ANGLE, E::ANGLE)] = self.angle.powi(2);
-        for (g, &(_, felt)) in E::FELT_RATES.iter().enumerate() {
+        for (g, &(_, relative)) in E::AIR_RELATIVE_RATES.iter().enumerate() {
             let variance = self.gust_variance(g, step_s);
             // With a share for each gust the matrix stays positive for any correlations.
-            let share = self.correlations[g] / (E::FELT_RATES.len() as f64).sqrt();
+            let share = self.correlations[g] / (E::AIR_RELATIVE_RATES.len() as f64).sqrt();
             let cross = share * self.angle * variance.sqrt();
-            q[(felt, felt)] = variance;
-            q[(E::ANGLE, felt)] = cross;
-            q[(felt, E::ANGLE)] = cross;
+            q[(relative, relative)] = variance;
+            q[(E::ANGLE, relative)] = cross;
+            q[(relative, E::ANGLE)] = cross;
         }
         q
     }
@@ -315,7 +315,7 @@ impl Noise {
             slope[(E::ANGLE, E::ANGLE)] = 2.0 * q[(E::ANGLE, E::ANGLE)];
         }
         let decay = self.decay(step_s);
-        for (g, &(_, felt)) in E::FELT_RATES.iter().enumerate() {
+        for (g, &(_, relative)) in E::AIR_RELATIVE_RATES.iter().enumerate() {
             // Relative slopes of the gust's standard deviation and of the correlation.
             let (of_gust, of_angle) = match parameter {
                 NoiseParameter::Gust(other) if other == g => (1.0, 0.0),
@@ -326,15 +326,15 @@ impl Noise {
                 NoiseParameter::Angle => (0.0, 1.0),
                 _ => (0.0, 0.0),
             };
-            let mut cross = (of_gust + of_angle) * q[(E::ANGLE, felt)];
+            let mut cross = (of_gust + of_angle) * q[(E::ANGLE, relative)];
             if parameter == NoiseParameter::Correlation(g) {
                 let unit = self.angle * self.gust_variance(g, step_s).sqrt();
-                let share = 1.0 / (E::FELT_RATES.len() as f64).sqrt();
+                let share = 1.0 / (E::AIR_RELATIVE_RATES.len() as f64).sqrt();
                 cross = (1.0 - self.correlations[g].powi(2)) * share * unit;
             }
-            slope[(felt, felt)] = 2.0 * of_gust * q[(felt, felt)];
-            slope[(E::ANGLE, felt)] = cross;
-            slope[(felt, E::ANGLE)] = cross;
+            slope[(relative, relative)] = 2.0 * of_gust * q[(relative, relative)];
+            slope[(E::ANGLE, relative)] = cross;
+            slope[(relative, E::ANGLE)] = cross;
         }
         slope
     }

@@ -1,11 +1,11 @@
-//! One pass of the filter over a maneuver, in the kernel of output error: the same steps, with a
-//! correction of states and sensitivities between them.
+//! One pass of the filter over a maneuver, in the kernel of output error. The steps are the same,
+//! with a correction of states and sensitivities between them.
 //!
-//! Let s and y be the sensitivities of the predicted state and outputs to one parameter, v the
-//! innovations, and d a slope along the parameter. The corrected state x̃ then has, after the decay
-//! T of the rotary gusts, the sensitivity T (s − K y + dK v) + dT x̃. K y has a minus sign because
-//! an innovation falls as its prediction rises.  The sums receive L⁻¹ y and L⁻¹ v. With S = L Lᵀ
-//! the covariance of the innovations, L⁻¹ v is white with unit variance.
+//! Let s and y be the sensitivities of the predicted state and outputs to one parameter. Let v be
+//! the innovations, and d a slope along the parameter. The corrected state x̃ then has, after the
+//! decay T of the rotary gusts, the sensitivity T (s − K y + dK v) + dT x̃. K y has a minus sign
+//! because an innovation falls as its prediction rises. The sums receive L⁻¹ y and L⁻¹ v. With S =
+//! L Lᵀ the covariance of the innovations, L⁻¹ v is white with unit variance.
 #![expect(
     clippy::inline_always,
     reason = "compiled into one loop for the processor at hand"
@@ -18,7 +18,7 @@
 use nalgebra::{SMatrix, SVector};
 use pulp::{Simd, WithSimd};
 
-use super::gains::{Gain, Outputs, Pattern, PatternGain};
+use super::gains::{Gain, OutputMatrix, Pattern, PatternGain};
 use crate::dynamics::{InGusts, OUTPUTS};
 use crate::numerics::matrix::AlignedMatrix;
 use crate::numerics::row_products::Idle;
@@ -38,7 +38,7 @@ pub(super) struct LaneGain<const NX: usize> {
     gain: Gain<NX>,
     /// Matrix −K: change of the state's sensitivities with the outputs' sensitivities.
     reaction: Gain<NX>,
-    whitening: Outputs,
+    whitening: OutputMatrix,
     /// Slopes of the gain: state by state, output by output.
     slopes: LaneBlocks,
 }
@@ -302,11 +302,11 @@ impl<const NX: usize, E: InGusts<NX>> Correction<NX> for &ChunkCorrections<'_, N
         let decay = simd.splat_f64s(corrections.decay);
         for n in 0..N {
             let decay_slope = load::<S>(corrections.decay_row.slice(), lanes[n]);
-            for &(rate, felt) in E::FELT_RATES {
-                let gust = simd.sub_f64s(s[n][felt], s[n][rate]);
-                s[n][felt] = simd.mul_add_f64s(decay, gust, s[n][rate]);
-                let gust = simd.splat_f64s(self.gusts[k][felt]);
-                s[n][felt] = simd.mul_add_f64s(decay_slope, gust, s[n][felt]);
+            for &(rate, relative) in E::AIR_RELATIVE_RATES {
+                let gust = simd.sub_f64s(s[n][relative], s[n][rate]);
+                s[n][relative] = simd.mul_add_f64s(decay, gust, s[n][rate]);
+                let gust = simd.splat_f64s(self.gusts[k][relative]);
+                s[n][relative] = simd.mul_add_f64s(decay_slope, gust, s[n][relative]);
             }
         }
         // From the last output on, as the first ones are read till the end.
@@ -370,8 +370,8 @@ impl<'a, const NX: usize, E: InGusts<NX>> ChunkCorrections<'a, NX, E> {
             }
         }
         self.patterns[k] = pattern;
-        for &(rate, felt) in E::FELT_RATES {
-            self.gusts[k][felt] = corrected[felt] - corrected[rate];
+        for &(rate, relative) in E::AIR_RELATIVE_RATES {
+            self.gusts[k][relative] = corrected[relative] - corrected[rate];
         }
         (E::decayed(corrected, self.corrections.decay), white)
     }

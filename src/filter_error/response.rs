@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::gains::{Outputs, Pattern, PatternGain};
+use super::gains::{OutputMatrix, Pattern, PatternGain};
 use super::noise::{NoiseParameter, RotaryCost};
 use crate::dynamics::OUTPUTS;
 use crate::numerics::matrix::AlignedMatrix;
@@ -58,8 +58,9 @@ impl FilterResponse {
         }
     }
 
-    /// Sets the cost to ½ Σ (v' S⁻¹ v + log|S|), and adds the parts of gradient and information that come
-    /// from the slopes of S, where the gains have any. `pattern_of` has the pattern of each sample.
+    /// Sets the cost to ½ Σ (v' S⁻¹ v + log|S|). Adds the parts of gradient and information that
+    /// come from the slopes of S, if the gains have slopes. `pattern_of` has the pattern of each
+    /// sample.
     pub(super) fn add_covariance<const NX: usize>(
         &mut self,
         gains: &[PatternGain<NX>],
@@ -75,13 +76,13 @@ impl FilterResponse {
                 continue;
             }
             let products = innovation_products(number, &self.innovations, pattern_of);
-            let excess = Outputs::identity() * samples - gain.inverse * products;
+            let excess = OutputMatrix::identity() * samples - gain.inverse * products;
             let traces = covariance_traces(gain, &excess);
             let mut rows = traces.rows();
-            for (own, row) in gain.slopes.iter().zip(&mut rows) {
+            for (slope, row) in gain.slopes.iter().zip(&mut rows) {
                 for (other, trace) in gain.slopes.iter().zip(row) {
                     let information = &mut self.other_information;
-                    information[(own.parameter, other.parameter)] += 0.5 * samples * trace;
+                    information[(slope.parameter, other.parameter)] += 0.5 * samples * trace;
                 }
             }
             for (slope, trace) in gain.slopes.iter().zip(rows.flatten()) {
@@ -119,10 +120,10 @@ fn innovation_products(
     pattern: usize,
     innovations: &[[f64; OUTPUTS]],
     pattern_of: &[u8],
-) -> Outputs {
-    let mut sum = Outputs::zeros();
-    for (v, own) in innovations.iter().zip(pattern_of) {
-        if usize::from(*own) == pattern {
+) -> OutputMatrix {
+    let mut sum = OutputMatrix::zeros();
+    for (v, pattern_of_sample) in innovations.iter().zip(pattern_of) {
+        if usize::from(*pattern_of_sample) == pattern {
             let v = nalgebra::SVector::from(*v);
             sum += v * v.transpose();
         }
@@ -130,12 +131,15 @@ fn innovation_products(
     sum
 }
 
-/// Traces of the slopes S_i of the innovations' covariance S along the parameters i: tr(S⁻¹ S_i S⁻¹
-/// S_j), row by row, and tr(E S⁻¹ S_j) in a last row, with E the matrix `excess`.
-fn covariance_traces<const NX: usize>(gain: &PatternGain<NX>, excess: &Outputs) -> AlignedMatrix {
+/// Traces of the slopes S_i of the innovations' covariance S along the parameters i. The rows have
+/// tr(S⁻¹ S_i S⁻¹ S_j); a last row has tr(E S⁻¹ S_j), with E the matrix `excess`.
+fn covariance_traces<const NX: usize>(
+    gain: &PatternGain<NX>,
+    excess: &OutputMatrix,
+) -> AlignedMatrix {
     const ENTRIES: usize = OUTPUTS * OUTPUTS;
     let count = gain.slopes.len();
-    let mut relative: Vec<Outputs> = Vec::with_capacity(count + 1);
+    let mut relative: Vec<OutputMatrix> = Vec::with_capacity(count + 1);
     relative.extend(gain.slopes.iter().map(|s| gain.inverse * s.innovations));
     let mut right = AlignedMatrix::zeros(ENTRIES, count);
     for (entry, row) in right.rows_mut().enumerate() {
@@ -162,7 +166,7 @@ mod tests {
     fn traces_of_the_covariance_s_slopes_are_those_of_the_matrices() {
         let wave = |n: usize, i: usize, j: usize| (0.3 + (n + 2 * i + 3 * j) as f64).sin();
         let innovations = |n: usize| {
-            let half = Outputs::from_fn(|i, j| wave(n, i, j));
+            let half = OutputMatrix::from_fn(|i, j| wave(n, i, j));
             half + half.transpose()
         };
         let slope = |n: usize| GainSlope {
@@ -170,13 +174,13 @@ mod tests {
             gain: Gain::<4>::zeros(),
             innovations: innovations(n),
         };
-        let inverse = Outputs::from_fn(|i, j| if i == j { 2.0 } else { 0.3 });
+        let inverse = OutputMatrix::from_fn(|i, j| if i == j { 2.0 } else { 0.3 });
         let gain = PatternGain {
             inverse,
             slopes: (0..3).map(slope).collect(),
             ..PatternGain::none()
         };
-        let excess = Outputs::from_fn(|i, j| wave(7, j, i));
+        let excess = OutputMatrix::from_fn(|i, j| wave(7, j, i));
         let traces = covariance_traces(&gain, &excess).to_dense();
         for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
             let exact = (inverse * innovations(i) * inverse * innovations(j)).trace();

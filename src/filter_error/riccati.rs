@@ -27,17 +27,17 @@ const ROUNDS: usize = 24;
 /// Relative change below which a solution has settled.
 const SETTLED: f64 = 1e-13;
 
-/// Square matrix of the states.
-pub(super) type States<const NX: usize> = SMatrix<f64, NX, NX>;
+/// Square matrix over the states, such as a covariance.
+pub(super) type StateMatrix<const NX: usize> = SMatrix<f64, NX, NX>;
 /// Slopes of the outputs along the states (C).
 pub(super) type OutputSlopes<const NX: usize> = SMatrix<f64, OUTPUTS, NX>;
 
 /// Linear system with noise: the matrices A, C and Q, and the diagonal of R.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NoisySystem<const NX: usize> {
-    pub a: States<NX>,
+    pub a: StateMatrix<NX>,
     pub c: OutputSlopes<NX>,
-    pub q: States<NX>,
+    pub q: StateMatrix<NX>,
     /// Variances of the outputs' noise, the diagonal of R.
     pub r: [f64; OUTPUTS],
 }
@@ -49,13 +49,15 @@ pub(super) type SystemSlope<const NX: usize> = NoisySystem<NX>;
 #[derive(Clone, Debug)]
 pub(super) struct SteadyFilter<const NX: usize> {
     /// Covariance P of the predicted state.
-    pub prediction: States<NX>,
+    pub prediction: StateMatrix<NX>,
     /// Covariance P⁺ of the corrected state.
-    corrected: States<NX>,
+    corrected: StateMatrix<NX>,
+    /// Gain K for the mean output noise. Only the slopes of P use it; the gains applied to samples are
+    /// in `gains`.
     gain: SMatrix<f64, NX, OUTPUTS>,
     pub system: NoisySystem<NX>,
     /// Closed loop Ā, and its powers 2, 4, 8, ….
-    powers: Vec<States<NX>>,
+    powers: Vec<StateMatrix<NX>>,
 }
 
 impl<const NX: usize> SteadyFilter<NX> {
@@ -71,7 +73,7 @@ impl<const NX: usize> SteadyFilter<NX> {
             &product_transposed(&prediction, &system.c),
             &s.try_inverse()?,
         );
-        let open = States::identity() - product(&gain, &system.c);
+        let open = StateMatrix::identity() - product(&gain, &system.c);
         let corrected = symmetric(product(&open, &prediction));
         let mut filter = SteadyFilter {
             prediction,
@@ -85,10 +87,10 @@ impl<const NX: usize> SteadyFilter<NX> {
     }
 
     /// Filter without process noise: its gain is zero, whether or not the airframe is stable.
-    pub fn still(system: NoisySystem<NX>) -> Self {
+    pub fn without_process_noise(system: NoisySystem<NX>) -> Self {
         SteadyFilter {
-            prediction: States::zeros(),
-            corrected: States::zeros(),
+            prediction: StateMatrix::zeros(),
+            corrected: StateMatrix::zeros(),
             gain: SMatrix::zeros(),
             system,
             powers: vec![],
@@ -114,12 +116,12 @@ impl<const NX: usize> SteadyFilter<NX> {
     ///
     /// The slope of the gain does not enter, because the gain minimises P⁺.
     #[inline(always)]
-    pub fn slope(&self, change: &SystemSlope<NX>) -> States<NX> {
+    pub fn slope(&self, change: &SystemSlope<NX>) -> StateMatrix<NX> {
         if self.powers.is_empty() {
-            return States::zeros();
+            return StateMatrix::zeros();
         }
         let a = &self.system.a;
-        let mut inner = States::zeros();
+        let mut inner = StateMatrix::zeros();
         for (o, r) in change.r.iter().enumerate().filter(|(_, r)| **r != 0.0) {
             let column = self.gain.column(o);
             inner += column * column.transpose() * *r;
@@ -139,7 +141,7 @@ impl<const NX: usize> SteadyFilter<NX> {
 /// Solves for P by doubling the Riccati recursion until it settles; `None` if it does not stay
 /// finite.
 #[inline(always)]
-fn solve<const NX: usize>(system: &NoisySystem<NX>) -> Option<States<NX>> {
+fn solve<const NX: usize>(system: &NoisySystem<NX>) -> Option<StateMatrix<NX>> {
     let mut information = OutputSlopes::<NX>::zeros();
     for o in 0..OUTPUTS {
         information.set_row(o, &(system.c.row(o) / system.r[o]));
@@ -150,7 +152,7 @@ fn solve<const NX: usize>(system: &NoisySystem<NX>) -> Option<States<NX>> {
         system.q,
     );
     for _ in 0..ROUNDS {
-        let w = (States::identity() + product(&g, &h)).try_inverse()?;
+        let w = (StateMatrix::identity() + product(&g, &h)).try_inverse()?;
         let step = product(&product(&product(&a.transpose(), &h), &w), &a);
         let aw = product(&a, &w);
         g = symmetric(g + product_transposed(&product(&aw, &g), &a));

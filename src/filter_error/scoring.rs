@@ -167,9 +167,9 @@ impl Scored {
 
 /// Half the squared length of the step of the filter's own parameters, in units of their bounds at
 /// known noise.
-fn own_gain(step: &DVector<f64>, information: &DMatrix<f64>, own: usize) -> f64 {
-    let step = step.rows(0, own);
-    0.5 * (information.view((0, 0), (own, own)) * step).dot(&step)
+fn own_gain(step: &DVector<f64>, information: &DMatrix<f64>, parameters: usize) -> f64 {
+    let step = step.rows(0, parameters);
+    0.5 * (information.view((0, 0), (parameters, parameters)) * step).dot(&step)
 }
 
 /// Parameters after a step; noise changes by a factor at most, and stays above its floor.

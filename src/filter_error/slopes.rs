@@ -14,8 +14,8 @@
 //! | V = H_ss − H_sf H_ff⁻¹ H_fs | information on the slopes with f eliminated |
 //! | G = H_ff⁻¹ H_fs | change of the estimates with the slopes, with reversed sign |
 //!
-//! For one share λ the slopes have the mean ŝ and the covariance P, the estimates of f change by −G
-//! (ŝ − s₀) with the covariance G P G', and the data have the likelihood p:
+//! For a given λ the slopes have the mean ŝ and the covariance P. The estimates of f change by −G
+//! (ŝ − s₀), with the covariance G P G'. The data have the likelihood p:
 //!
 //! ```text
 //! P = D (1 + D V D)⁻¹ D        ŝ = m + P (g_s − V m)
@@ -43,7 +43,7 @@ pub struct SlopeEffect {
 
 impl SlopeEffect {
     /// Adds the square of the change to the covariance, and leaves the estimates unchanged.
-    pub fn become_uncertainty(&mut self) {
+    pub fn replace_change_by_variance(&mut self) {
         self.covariance += &self.change * self.change.transpose();
         self.change.fill(0.0);
     }
@@ -140,7 +140,7 @@ impl SlopeInformation {
 
 /// Mean over the shares, weighted by their likelihoods. The covariance includes the scatter between
 /// the shares.
-fn mean(estimates: &[ShareEstimate], own: usize) -> SlopeEffect {
+fn mean(estimates: &[ShareEstimate], parameters: usize) -> SlopeEffect {
     let largest = estimates
         .iter()
         .map(|e| e.log_likelihood)
@@ -153,8 +153,8 @@ fn mean(estimates: &[ShareEstimate], own: usize) -> SlopeEffect {
     let slopes = estimates.first().map_or(0, |e| e.slopes.len());
     let mut effect = SlopeEffect {
         slopes: DVector::zeros(slopes),
-        change: DVector::zeros(own),
-        covariance: DMatrix::zeros(own, own),
+        change: DVector::zeros(parameters),
+        covariance: DMatrix::zeros(parameters, parameters),
     };
     for (estimate, weight) in estimates.iter().zip(&weights) {
         effect.slopes += &estimate.slopes * (weight / total);

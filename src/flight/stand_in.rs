@@ -106,8 +106,8 @@ impl StandIn {
         }
     }
 
-    /// Value at a sample from those of the sources, in air of a temperature (K), or of that of the
-    /// standard atmosphere if it is not finite.
+    /// Value at a sample from the values of the sources, at the air's temperature (K). The standard
+    /// atmosphere gives the temperature if it is not finite.
     fn value(self, sources: &[f64], kelvin: f64) -> f64 {
         let [a, b] = [0, 1].map(|i| sources.get(i).copied().unwrap_or(f64::NAN));
         let air = |altitude_ft: f64| air(altitude_ft).at_temperature(kelvin);
@@ -227,8 +227,8 @@ const ALTITUDES_FT: (f64, f64) = (-2_000.0, 100_000.0);
 /// Halvings of that range: to less than a thousandth of a foot.
 const HALVINGS: usize = 28;
 
-/// Altitude with a density, ft, in air of a temperature (K), or of that of the standard atmosphere if
-/// it is not finite; NaN for a density of no altitude.
+/// Altitude at which the air has a density, ft, at the air's temperature (K). The standard
+/// atmosphere gives the temperature if it is not finite. NaN for a density of no altitude.
 fn altitude_ft(density_slug_ft3: f64, kelvin: f64) -> f64 {
     let (low, high) = ALTITUDES_FT;
     let density = |altitude_ft: f64| air(altitude_ft).at_temperature(kelvin).density_slug_ft3;
@@ -257,13 +257,13 @@ const WITH_FILLED_GAPS: [&str; 7] = [
     s::IXZ,
 ];
 
-/// Signals of [`WITH_FILLED_GAPS`] that change little within a flight, so that their mean is closer to them
-/// than the stand-in of a signal that is never recorded.
+/// Signals of [`WITH_FILLED_GAPS`] that change little within a flight. In a gap their mean is
+/// closer than the stand-in for a signal that is never recorded.
 const NEARLY_CONSTANT: [&str; 3] = [s::RPM_LEFT, s::RPM_RIGHT, s::IXZ];
 
-/// Stand-ins in the gaps of recorded signals, in the order in which they are computed. `is_complete` is
-/// `true` for a signal that is given as a constant or recorded without a gap; `mean` is that of the samples
-/// with a value.
+/// Stand-ins in the gaps of recorded signals, in the order in which they are computed.
+/// `is_complete` is `true` for a signal that is given as a constant or recorded without a gap;
+/// `mean` returns the mean of a signal's finite samples.
 #[must_use]
 pub fn gap_stand_ins(
     with_gaps: &[&str],
@@ -297,10 +297,10 @@ pub fn stand_ins(has: impl Fn(&str) -> bool) -> Result<Vec<(String, StandIn)>, &
     lacking.map(of_signal).collect()
 }
 
-/// Cost of the absence of a signal, in words. `has` is `true` for a signal that is recorded or given
-/// as a constant.
+/// Consequence of a missing signal for the results, as text for the user. `has` is `true` for a
+/// signal that is recorded or given as a constant.
 #[must_use]
-pub fn cost(signal: &str, has: impl Fn(&str) -> bool) -> &'static str {
+pub fn consequence_of_absence(signal: &str, has: impl Fn(&str) -> bool) -> &'static str {
     let has_all = |signals: &[&str]| signals.iter().all(|signal| has(signal));
     match signal {
         s::RPM_LEFT | s::RPM_RIGHT => {
@@ -391,11 +391,11 @@ mod tests {
         let all = [s::AN, s::AX, s::AY];
         for (absent, coefficient) in all.into_iter().zip(["CN", "CA", "CY"]) {
             assert!(StandIn::of(absent, all_but(&all)).is_some(), "{absent}");
-            let alone = cost(absent, all_but(&[absent]));
+            let alone = consequence_of_absence(absent, all_but(&[absent]));
             assert!(alone.contains(coefficient), "{alone}");
         }
-        let with_axis = cost(s::AY, all_but(&[s::AY, s::BETA_VANE]));
-        assert_eq!(with_axis, cost(s::P, all_but(&[s::P])));
+        let with_axis = consequence_of_absence(s::AY, all_but(&[s::AY, s::BETA_VANE]));
+        assert_eq!(with_axis, consequence_of_absence(s::P, all_but(&[s::P])));
     }
 
     #[test]

@@ -11,7 +11,7 @@ const FLIGHT: &str = "next";
 
 /// A card that the next flight may fly.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Candidate {
+pub struct CandidateCard {
     pub card: Card,
     /// Scale of the inputs of the class's program.
     pub scale: f64,
@@ -21,8 +21,8 @@ pub struct Candidate {
 
 /// Candidates of a file of cards: each class, angle of attack and scale once.
 #[must_use]
-pub fn candidates(cards: &Cards, config: &Config) -> Vec<Candidate> {
-    let mut found: Vec<Candidate> = vec![];
+pub fn candidates(cards: &Cards, config: &Config) -> Vec<CandidateCard> {
+    let mut found: Vec<CandidateCard> = vec![];
     for (flight, point) in test_points(cards) {
         for &alpha_deg in &point.alpha_deg {
             let is_known = found.iter().any(|c| {
@@ -38,7 +38,7 @@ pub fn candidates(cards: &Cards, config: &Config) -> Vec<Candidate> {
 }
 
 /// Lowest and highest angle of attack of candidates.
-pub fn reach_deg<'a>(candidates: impl Iterator<Item = &'a Candidate>) -> (f64, f64) {
+pub fn reach_deg<'a>(candidates: impl Iterator<Item = &'a CandidateCard>) -> (f64, f64) {
     let alphas = candidates.map(|candidate| candidate.card.alpha_deg);
     alphas.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), alpha| {
         (low.min(alpha), high.max(alpha))
@@ -65,7 +65,7 @@ fn candidate(
     flight: &FlightCard,
     point: &TestPoint,
     alpha_deg: f64,
-) -> Option<Candidate> {
+) -> Option<CandidateCard> {
     let next = &cards.next;
     let program = cards.programs.get(&point.class)?.scaled(point.scale);
     let name = format!("{} {alpha_deg} {}", point.class, point.scale);
@@ -83,7 +83,7 @@ fn candidate(
         seed: derived_seed(cards.seed, &name),
         program,
     };
-    Some(Candidate {
+    Some(CandidateCard {
         card,
         scale: point.scale,
         minutes,

@@ -11,8 +11,8 @@
 //!
 //! in nats, summed over the aims. A reduction below the wanted deviation is worth nothing.
 //!
-//! Two greedy sets, by worth and by worth per minute, are each improved by exchange: a card is
-//! taken out and the minutes are filled again, as long as this raises the worth of the set. A
+//! The search builds two greedy sets: by worth, and by worth per minute. It improves each by
+//! exchange: it removes a card, fills the minutes again, and keeps the change if the worth rises. A
 //! greedy set alone is worse than the best one if cards complement each other, or if the minutes do
 //! not divide evenly.
 

@@ -1,5 +1,5 @@
-//! Probability that the next flight decides between which limits a quantity lies: the level of a
-//! flying quality, or the tolerances of a proof of match.
+//! Probability that the next flight decides the limits between which a quantity lies: the level of
+//! a flying quality, or the tolerances of a proof of match.
 //!
 //! # Symbols
 //!
@@ -21,8 +21,8 @@
 //! # Decision
 //!
 //! x is *decided* if it lies between two neighbouring limits with the probability p or more. After
-//! the flight x is normal with the mean m′ and the variance s² = σ′² + ν², so the interval from l
-//! to u is decided if
+//! the flight x is normal with the mean m′ and the variance s² = σ′² + ν². The interval from l to u
+//! is decided if
 //!
 //! Φ((u − m′)/s) − Φ((l − m′)/s) ≥ p.
 //!

@@ -1,5 +1,5 @@
 //! Experience with each class in the campaign: the share of usable maneuvers, their weight in the
-//! posterior, and how much noisier they are than simulated maneuvers.
+//! posterior, and their noise relative to simulated maneuvers.
 
 use std::collections::BTreeMap;
 

@@ -5,9 +5,9 @@
 //! derivatives of the posterior and records it with the campaign's noise. It is then estimated like
 //! a flown maneuver. Its covariance is the card's evidence in the campaign's model
 //! ([`crate::model::Outlook`]), so its effect on each bound follows without flying it. A goal is a
-//! linear combination of the derivatives ([`goal_points`]): a single derivative, or the quantity
-//! that decides a level or a proof of match ([`decision`]). [`choice`] finds the set that is worth
-//! most in the minutes, [`plan`] writes the tables, and [`kneeboard`] the pilot's page.
+//! linear combination of the derivatives ([`goal_points`]). It is a single derivative, or the
+//! quantity that decides a level or a proof of match ([`decision`]). [`choice`] finds the set that
+//! is worth most in the minutes, [`plan`] writes the tables, and [`kneeboard`] the pilot's page.
 
 mod candidate;
 mod goals;

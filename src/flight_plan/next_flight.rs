@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use rayon::prelude::*;
 
-use super::candidate::{Candidate, candidates, reach_deg};
+use super::candidate::{CandidateCard, candidates, reach_deg};
 use super::choice::Budget;
 use super::experience::CampaignHistory;
 use super::goal_file;
@@ -23,7 +23,7 @@ use crate::pdf;
 use crate::pipeline::{Campaign, Conductor, Progress, decisive_differences, evidence, flown_means};
 use crate::proof_of_match::of_posterior;
 use crate::qualities::{self, FlownConditions};
-use crate::store::table::Shelf;
+use crate::store::table::TableFolder;
 use crate::store::{atomic, files, table};
 
 /// Published files of the page.
@@ -71,7 +71,7 @@ pub fn plan_next_flight(
     let qualities = specification.map(|specification| qualities::JudgedAircraft {
         model: &campaign.model,
         aircraft: &config.aircraft,
-        buildup: &config.buildup,
+        aero_model: &config.aero_model,
         tunnel: &config.tunnel,
         specification,
     });
@@ -96,7 +96,7 @@ pub fn plan_next_flight(
             covariances: &campaign.covariances,
             contributions: &campaign.model.rows.contributions,
         },
-        buildup: &config.buildup,
+        aero_model: &config.aero_model,
         tunnel: &config.tunnel,
         settings: &config.model,
         qualities,
@@ -116,7 +116,7 @@ pub fn plan_next_flight(
 }
 
 /// Writes the tables and the page of a plan, and names their files.
-fn place_plan(plan: &Plan, page: &str, folder: &Path, shelf: &Shelf) -> Result<Vec<PathBuf>> {
+fn place_plan(plan: &Plan, page: &str, folder: &Path, shelf: &TableFolder) -> Result<Vec<PathBuf>> {
     table::publish(shelf, &plan.cards)?;
     table::publish(shelf, &plan.goals)?;
     files::place_text(&folder.join(PAGE), page)?;
@@ -184,7 +184,7 @@ fn rehearse(
     };
     let all = candidates(&cards.cards, config);
     progress.begin("rehearse", all.len());
-    let rehearse = |candidate: Candidate| {
+    let rehearse = |candidate: CandidateCard| {
         let result = basis.rehearse(&candidate);
         progress.advance(&candidate.card.class);
         Rehearsal { candidate, result }

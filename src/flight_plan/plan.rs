@@ -1,6 +1,6 @@
 //! Plan of the next flight: candidates and goals to a choice, and the choice to the rows of the tables.
 
-use super::candidate::{Candidate, reach_deg};
+use super::candidate::{CandidateCard, reach_deg};
 use super::choice::{
     Aim, AimPart, Budget, CardChoice, CardSet, CoefficientCovariance, Price, variance,
 };
@@ -8,9 +8,9 @@ use super::experience::{CampaignHistory, noise_factors, with_noise};
 use super::goal_points::{GoalBasis, GoalPoint, Matches, Target};
 use super::goals::Goal;
 use super::rehearsal::Rehearsed;
-use crate::aero::{Buildup, Condition, WindTunnel};
+use crate::aero::{AeroModel, Condition, WindTunnel};
 use crate::estimate::Covariance;
-use crate::model::{self, Evidence, Model, Outlook, OutlookPoint};
+use crate::model::{self, ManeuverResults, Model, Outlook, OutlookPoint};
 use crate::qualities::{self, FlownConditions};
 use crate::tables::{NextCardRow, NextGoalRow};
 
@@ -21,9 +21,9 @@ const NAMED_GOALS: usize = 3;
 #[derive(Clone, Copy, Debug)]
 pub struct CampaignState<'a> {
     pub model: &'a Model,
-    pub evidence: &'a [Evidence<'a>],
+    pub evidence: &'a [ManeuverResults<'a>],
     pub history: CampaignHistory<'a>,
-    pub buildup: &'a Buildup,
+    pub aero_model: &'a AeroModel,
     pub tunnel: &'a WindTunnel,
     pub settings: &'a model::Settings,
     /// Flying qualities whose levels may be goals, with the flown conditions.
@@ -34,14 +34,14 @@ pub struct CampaignState<'a> {
 /// A candidate with its rehearsal, or the reason why it is refused.
 #[derive(Debug)]
 pub struct Rehearsal {
-    pub candidate: Candidate,
+    pub candidate: CandidateCard,
     pub result: Result<Rehearsed, String>,
 }
 
 /// A candidate that is not refused, with its index.
 #[derive(Clone, Copy)]
 struct KeptCard<'a> {
-    candidate: &'a Candidate,
+    candidate: &'a CandidateCard,
     rehearsed: &'a Rehearsed,
 }
 
@@ -112,7 +112,7 @@ pub fn plan(
     }
 }
 
-fn price(candidate: &Candidate) -> Price {
+fn price(candidate: &CandidateCard) -> Price {
     Price {
         minutes: candidate.minutes,
         alpha_deg: candidate.card.alpha_deg,
@@ -148,9 +148,9 @@ fn condition(state: &CampaignState, kept: &[KeptCard], alpha_deg: f64) -> Option
 fn outlooks(state: &CampaignState, kept: &[KeptCard], points: &[GoalPoint]) -> Vec<Outlook> {
     let covariances = covariances(state, kept);
     let planned = kept.iter().zip(&covariances);
-    let planned: Vec<Evidence> = planned
+    let planned: Vec<ManeuverResults> = planned
         .filter_map(|(KeptCard { rehearsed, .. }, covariance)| {
-            Some(Evidence {
+            Some(ManeuverResults {
                 maneuver: &rehearsed.maneuver,
                 estimates: &rehearsed.estimated.estimates,
                 combined: &rehearsed.estimated.combined,
@@ -162,7 +162,7 @@ fn outlooks(state: &CampaignState, kept: &[KeptCard], points: &[GoalPoint]) -> V
     state.model.outlook(
         (state.evidence, &planned),
         &asked,
-        (state.buildup, state.tunnel),
+        (state.aero_model, state.tunnel),
         state.settings,
     )
 }
@@ -290,7 +290,7 @@ impl PlanRows<'_> {
     }
 
     /// Row of a card before it is rehearsed.
-    fn of_candidate(&self, candidate: &Candidate) -> NextCardRow {
+    fn of_candidate(&self, candidate: &CandidateCard) -> NextCardRow {
         let card = &candidate.card;
         NextCardRow {
             place: None,

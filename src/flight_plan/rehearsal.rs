@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use super::candidate::Candidate;
+use super::candidate::CandidateCard;
 use super::limits::{self, Extremes};
 use crate::aero::WindTunnel;
 use crate::aero::wind_tunnel::TunnelPoint;
@@ -41,7 +41,7 @@ impl RehearsalBasis<'_> {
     ///
     /// # Errors
     /// The reason why the card is refused: it cannot be flown, breaks a limit, or cannot be estimated.
-    pub fn rehearse(&self, candidate: &Candidate) -> Result<Rehearsed, String> {
+    pub fn rehearse(&self, candidate: &CandidateCard) -> Result<Rehearsed, String> {
         let card = &candidate.card;
         let flown = self.simulator.fly(card).map_err(|problem| problem.reason)?;
         let extremes = Extremes::of(&flown.record);
@@ -114,7 +114,7 @@ pub fn derivatives(
     mut posterior: WindTunnel,
     estimates: &[EstimateRow],
 ) -> WindTunnel {
-    for derivative in &config.buildup.derivatives {
+    for derivative in &config.aero_model.derivatives {
         let name = derivative.name.as_str();
         if posterior.has(name) {
             continue;

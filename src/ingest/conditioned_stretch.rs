@@ -42,30 +42,18 @@ impl<'a> ConditionedStretch<'a> {
         context: &Context,
         read: &RecordReader,
     ) -> Result<ConditionedStretch<'a>, Problem> {
-        let (flight_id, clock) = (stretch.flight_id.as_str(), &stretch.clock);
-        let (mut channels, mut problems, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
-        let mut block_means = BTreeMap::new();
-        let mut signature_samples = Vec::new();
-        let unread = unread_channels(&conditioned, clock, context);
-        for (one, unread) in conditioned.into_iter().zip(unread) {
-            let (name, channel, statistics) = (one.name, one.channel, one.statistics);
-            if let Some(unread) = unread {
-                left_out.push(unread);
-            } else {
-                let repairs = reported_repairs(name, channel, &statistics, clock);
-                problems.extend(repairs.map(|refusal| refusal.into_problem(flight_id)));
-                block_means.extend(one.block_means.map(|means| (channel.signal.clone(), means)));
-                // The turns of an unwrapped angle depend on where the record begins.
-                if statistics.wraps == 0 && channel.wraps_at.is_none() {
-                    signature_samples.push(one.signature_samples);
-                }
-            }
-            channels.push((name, channel, statistics));
-        }
+        let flight_id = stretch.flight_id.as_str();
+        let SortedChannels {
+            channels,
+            left_out,
+            block_means,
+            signature,
+            mut problems,
+        } = SortedChannels::sort(stretch, conditioned, context);
         let recorded: Vec<String> = channels
             .iter()
             .map(|(_, channel, _)| channel.signal.clone())
-            .filter(|signal| !left_out.iter().any(|one| one.signal == signal))
+            .filter(|signal| !left_out.iter().any(|unread| unread.signal == signal))
             .collect();
         let is_recorded = |signal: &str| recorded.iter().any(|s| s == signal);
         let stand_ins = match context.stand_ins(is_recorded) {
@@ -76,18 +64,70 @@ impl<'a> ConditionedStretch<'a> {
             }
         };
         let left_out = left_out.into_iter();
-        problems.extend(left_out.map(|one| one.into_problem(&stand_ins, flight_id)));
-        let (gaps, filled) = fill_gaps(&channels, &recorded, clock, (context, read));
-        let filled = filled.into_iter();
-        problems.extend(filled.map(|one| one.into_problem(&gaps, flight_id)));
+        problems.extend(left_out.map(|unread| unread.into_problem(&stand_ins, flight_id)));
+        let (gaps, reports) = fill_gaps(&channels, &recorded, &stretch.clock, context, read);
+        let reports = reports.into_iter();
+        problems.extend(reports.map(|report| report.into_problem(&gaps, flight_id)));
         Ok(ConditionedStretch {
             channels,
             block_means,
             recorded,
             problems,
             completion: Completion { stand_ins, gaps },
-            signature: Signature::of(signature_samples.into_iter()),
+            signature,
         })
+    }
+}
+
+/// Conditioned channels, those that are left out, and what the others give.
+struct SortedChannels<'a, 'u> {
+    channels: Vec<ReadChannel<'a>>,
+    left_out: Vec<UnreadChannel<'u>>,
+    block_means: BTreeMap<String, BlockAverager>,
+    signature: Signature,
+    /// Reports of repaired samples.
+    problems: Vec<Problem>,
+}
+
+impl<'a> SortedChannels<'a, 'a> {
+    fn sort(
+        stretch: &Stretch,
+        conditioned: Vec<ConditionedChannel<'a>>,
+        context: &Context,
+    ) -> SortedChannels<'a, 'a> {
+        let (flight_id, clock) = (stretch.flight_id.as_str(), &stretch.clock);
+        let (mut channels, mut problems, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
+        let mut block_means = BTreeMap::new();
+        let mut signature_samples = Vec::new();
+        let unread = unread_channels(&conditioned, clock, context);
+        for (conditioned_channel, unread) in conditioned.into_iter().zip(unread) {
+            let ConditionedChannel {
+                name,
+                channel,
+                statistics,
+                ..
+            } = conditioned_channel;
+            if let Some(unread) = unread {
+                left_out.push(unread);
+            } else {
+                let repairs = reported_repairs(name, channel, &statistics, clock);
+                problems.extend(repairs.map(|refusal| refusal.into_problem(flight_id)));
+                let means = conditioned_channel.block_means;
+                block_means.extend(means.map(|means| (channel.signal.clone(), means)));
+                // The turns of an unwrapped angle depend on where the record begins.
+                if statistics.wraps == 0 && channel.wraps_at.is_none() {
+                    signature_samples.push(conditioned_channel.signature_samples);
+                }
+            }
+            channels.push((name, channel, statistics));
+        }
+        SortedChannels {
+            channels,
+            left_out,
+            block_means,
+            signature: Signature::of(signature_samples.into_iter()),
+            problems,
+        }
     }
 }
 
@@ -103,8 +143,8 @@ fn reported_repairs(
     stuck.into_iter().chain(beyond)
 }
 
-/// For each channel, the reason to leave it out before any check, if there is one: it has no value, or
-/// a stand-in replaces it and most of its values are missing.
+/// Reason to leave out a channel before any check, for each channel: it has no value, or most of
+/// its values are missing and a stand-in replaces it.
 fn unread_channels<'a>(
     conditioned: &[ConditionedChannel<'a>],
     clock: &Clock,
@@ -112,22 +152,22 @@ fn unread_channels<'a>(
 ) -> Vec<Option<UnreadChannel<'a>>> {
     let is_replaceable = |signal: &str| {
         let is_other = |name: &str| {
-            let mut signals = conditioned.iter().map(|one| one.channel.signal.as_str());
+            let mut signals = conditioned.iter().map(|c| c.channel.signal.as_str());
             name != signal && signals.any(|other| other == name)
         };
         signal::REQUIRED.contains(&signal) && context.can_do_without(signal, is_other)
     };
     // The clock also runs while the recorder is off.
-    let written = conditioned.iter().map(|one| with_value(&one.statistics));
-    let written = written.max().unwrap_or(0);
-    let unread = |one: &ConditionedChannel<'a>| {
-        let (name, channel) = (one.name, one.channel);
-        let is_absent = one.statistics.count(Mark::Missing) == clock.samples;
-        let values = with_value(&one.statistics);
+    let written = conditioned.iter().map(|c| with_value(&c.statistics));
+    let most_written = written.max().unwrap_or(0);
+    let unread = |conditioned: &ConditionedChannel<'a>| {
+        let (name, channel) = (conditioned.name, conditioned.channel);
+        let is_absent = conditioned.statistics.count(Mark::Missing) == clock.samples;
+        let values = with_value(&conditioned.statistics);
         let refusal = if is_absent {
             empty_channel(name, channel, clock.rows)
-        } else if is_replaceable(&channel.signal) && 2 * values < written {
-            sparse_channel(name, channel, values as f64 / written as f64)
+        } else if is_replaceable(&channel.signal) && 2 * values < most_written {
+            sparse_channel(name, channel, values as f64 / most_written as f64)
         } else {
             return None;
         };
@@ -151,7 +191,8 @@ fn fill_gaps<'r>(
     channels: &'r [ReadChannel],
     recorded: &[String],
     clock: &Clock,
-    (context, read): (&Context, &RecordReader),
+    context: &Context,
+    read: &RecordReader,
 ) -> (Vec<(String, StandIn)>, Vec<UnreadChannel<'r>>) {
     let is_recorded = |signal: &str| recorded.iter().any(|name| name == signal);
     let with_gaps: Vec<UnreadChannel> = channels
@@ -164,15 +205,15 @@ fn fill_gaps<'r>(
             is_absent: true,
         })
         .collect();
-    let signals: Vec<&str> = with_gaps.iter().map(|one| one.signal).collect();
+    let signals: Vec<&str> = with_gaps.iter().map(|channel| channel.signal).collect();
     let is_complete = |signal: &str| {
         is_recorded(signal) && !signals.contains(&signal) || context.constants.contains_key(signal)
     };
     let mean = |signal: &str| mean_value(signal, clock.samples, read);
     let gaps = gap_stand_ins(&signals, is_complete, mean);
-    let mut filled = with_gaps;
-    filled.retain(|one| gaps.iter().any(|(signal, _)| signal == one.signal));
-    (gaps, filled)
+    let mut reports = with_gaps;
+    reports.retain(|channel| gaps.iter().any(|(signal, _)| signal == channel.signal));
+    (gaps, reports)
 }
 
 /// Mean of the samples of a signal with a value; `None` without any.

@@ -6,9 +6,10 @@ use std::ops::Range;
 
 use super::checks::{
     BlockAverager, BlockMeans, Check, ENGINE_SIGNALS, FaultReport, FaultyChannel, Gusts,
-    ImpossibleSignal, check_relations, confirmed_signals, find_faulty_channels, impossible_centre,
-    impossible_gyration, impossible_mass, impossible_signals, impossible_temperature,
-    impossible_velocity, report, unusable_engine_signal, unusable_temperature, wrong_time,
+    ImpossibleSignal, check_relations, confirmed_signals, find_faulty_channels,
+    find_time_scale_fault, impossible_centre, impossible_gyration, impossible_mass,
+    impossible_signals, impossible_temperature, impossible_velocity, report,
+    unusable_engine_signal, unusable_temperature,
 };
 use super::clock::Clock;
 use super::compatibility::{self, Findings};
@@ -18,8 +19,8 @@ use crate::flight::stand_in::GapExtent;
 use crate::flight::{Completion, Record, StandIn, signal};
 use crate::tables::{ChannelVerdict, CheckRow};
 
-/// Samples of a long record that are read at once: under an hour of a usual recorder, so
-/// that memory does not grow with the record.
+/// Samples of a long record that are read at once, so that memory does not grow with the record:
+/// under an hour of a usual recorder.
 pub const PART_SAMPLES: usize = 1 << 17;
 
 /// Reads signals of a record over a range of its samples; `None` if they cannot be read.
@@ -41,7 +42,7 @@ pub struct Outcome {
     pub relations: RelationResult,
     pub findings: Findings,
     /// Channels that the stretch does without.
-    pub left_out: Vec<LeftOut>,
+    pub left_out: Vec<ExcludedChannel>,
     /// Stand-ins of the signals that the stretch lacks, with those of the channels that are left out, and
     /// in gaps of others.
     pub completion: Completion,
@@ -63,7 +64,7 @@ impl Outcome {
 
 /// A channel that is wrong, and that the stretch does without.
 #[derive(Clone)]
-pub struct LeftOut {
+pub struct ExcludedChannel {
     signal: String,
     /// Verdict for the table `channels`.
     verdict: String,
@@ -167,7 +168,7 @@ impl Examination<'_> {
     /// Examines the stretch without some channels. `checks` are those with these channels.
     fn examine_without(
         &self,
-        left_out: Vec<LeftOut>,
+        left_out: Vec<ExcludedChannel>,
         blocks: &BlockMeans,
         checks: Vec<Check>,
     ) -> Outcome {
@@ -205,7 +206,7 @@ impl Examination<'_> {
     }
 
     /// Channels in no relation whose values cannot be used, to be left out.
-    fn unusable_outside_relations(&self, blocks: &BlockMeans) -> Vec<LeftOut> {
+    fn unusable_outside_relations(&self, blocks: &BlockMeans) -> Vec<ExcludedChannel> {
         let temperature =
             unusable_temperature(blocks).map(|reason| (signal::AIR_TEMPERATURE, reason));
         let engines = ENGINE_SIGNALS.iter();
@@ -234,8 +235,10 @@ impl Examination<'_> {
         !faulty.is_empty() && faulty.iter().all(|fault| self.is_dispensable(fault))
     }
 
-    /// `true` if no sign or unit of a suspect explains the failed relations, and without the suspects that
-    /// the stretch can do without all others hold and confirm the remaining suspects.
+    /// `true` if three conditions hold:
+    /// 1. no sign or unit of a suspect explains the failed relations;
+    /// 2. without the suspects that the stretch can do without, all other relations hold;
+    /// 3. these relations confirm the remaining suspects.
     fn holds_without_dispensable(&self, relations: &RelationResult, blocks: &BlockMeans) -> bool {
         let faulty = &relations.faulty;
         let dispensable: Vec<&FaultyChannel> =
@@ -253,7 +256,7 @@ impl Examination<'_> {
     }
 
     /// Faulty channels that the stretch can do without, to be left out.
-    fn dispensable_faults(&self, relations: &RelationResult) -> Vec<LeftOut> {
+    fn dispensable_faults(&self, relations: &RelationResult) -> Vec<ExcludedChannel> {
         let report = relations.report.as_ref();
         let reason = report.map_or_else(String::new, |report| report.reason.clone());
         let leave_out = |fault: &FaultyChannel| {
@@ -265,7 +268,7 @@ impl Examination<'_> {
     }
 
     /// Channels whose values no error of an instrument explains and that the stretch can do without.
-    fn inexplicable(&self, findings: &Findings) -> Vec<LeftOut> {
+    fn inexplicable(&self, findings: &Findings) -> Vec<ExcludedChannel> {
         let inexplicable = findings.inexplicable();
         let dispensable = inexplicable.filter(|(name, _)| self.can_do_without(name));
         let left_out = dispensable.map(|(name, fault)| self.leave_out_for(name, fault));
@@ -273,19 +276,19 @@ impl Examination<'_> {
     }
 
     /// A channel that is left out for a reason that is also its verdict.
-    fn leave_out_for(&self, name: &str, reason: String) -> LeftOut {
+    fn leave_out_for(&self, name: &str, reason: String) -> ExcludedChannel {
         let verdict = reason.clone();
         self.leave_out(name, verdict, self.context.refusal(name, reason))
     }
 
     /// A channel that is left out, with its stand-in and the cost.
-    fn leave_out(&self, name: &str, verdict: String, refusal: Refusal) -> LeftOut {
+    fn leave_out(&self, name: &str, verdict: String, refusal: Refusal) -> ExcludedChannel {
         let stand_ins = self.without(&|other| other == name).completion.stand_ins;
         let refusal = Refusal {
             reason: format!("{}. The channel is left out", refusal.reason),
             ..refusal
         };
-        LeftOut {
+        ExcludedChannel {
             signal: name.to_owned(),
             verdict,
             refusal: refusal.with_stand_in(name, &stand_ins),
@@ -299,9 +302,9 @@ impl Examination<'_> {
     /// Reconciles the relations between channels with the errors of the instruments.
     ///
     /// If a channel has a wrong sign or unit, the errors of the other instruments are estimated
-    /// with the channel corrected; the record is left as it is. If no sign and no unit explains a
-    /// failed relation, a delay may: if the relation holds once the delays are removed, the delay
-    /// is the fault.
+    /// with the channel corrected. The record keeps the channel as recorded. If no sign and no unit
+    /// explains a failed relation, a delay may. If the relation holds with the delays removed, the
+    /// delay is the fault.
     fn reconcile(
         &self,
         blocks: &BlockMeans,
@@ -375,7 +378,7 @@ impl Examination<'_> {
             ..
         } = *self.context;
         let (checks, gusts) = check_relations(blocks, aircraft, &settings.checks);
-        if let Some(time) = wrong_time(&checks) {
+        if let Some(time) = find_time_scale_fault(&checks) {
             return RelationResult {
                 confirmed: Vec::new(),
                 report: None,

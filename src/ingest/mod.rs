@@ -4,7 +4,7 @@
 //!
 //! A flight is read twice. The first pass reads the time channels alone ([`survey`]) and returns
 //! the flight's stretches with their clocks. The second pass reads each channel by itself, piece by
-//! piece ([`ChannelReader`]). Memory does not grow with the length of a flight, except for the
+//! piece ([`ChannelReader`]). Memory does not grow with the length of a flight. Exceptions are the
 //! clock's list of runs and the block means that the kinematic relations compare ([`assess`]).
 
 // Inputs: configuration, columns of the files, reasons for a refusal.

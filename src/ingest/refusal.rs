@@ -2,7 +2,7 @@
 
 use crate::error::{Problem, ProblemStage};
 use crate::flight::absence::remedies;
-use crate::flight::stand_in::cost;
+use crate::flight::stand_in::consequence_of_absence;
 use crate::flight::{StandIn, signal};
 
 /// A place in the recording and the reason for which it cannot be used; a [`Problem`] without its
@@ -30,7 +30,7 @@ impl Refusal {
             let mut present = stand_ins.iter().filter(|(_, s)| *s != StandIn::Absent);
             present.find(|(name, _)| name == signal)
         };
-        let cost = cost(signal, |other| stand_in_of(other).is_none());
+        let consequence = consequence_of_absence(signal, |other| stand_in_of(other).is_none());
         let consequence = match stand_in_of(signal) {
             Some((name, stand_in @ StandIn::Mean(_))) => {
                 format!(
@@ -38,8 +38,8 @@ impl Refusal {
                     stand_in.in_words()
                 )
             }
-            Some((name, stand_in)) => format!("; `{name}` {}: {cost}", stand_in.in_words()),
-            None if signal::OPTIONAL.contains(&signal) => format!("; {cost}"),
+            Some((name, stand_in)) => format!("; `{name}` {}: {consequence}", stand_in.in_words()),
+            None if signal::OPTIONAL.contains(&signal) => format!("; {consequence}"),
             None => String::new(),
         };
         Refusal {

@@ -125,9 +125,9 @@ settings! {
         /// Least correlation that counts as agreement between attitudes and rates, which only noise
         /// disturbs.
         pub least_attitude_correlation: f64 = 0.9,
-        /// Largest share of a relation's windows that may be left out as jumps of the record, far
-        /// from all others: joined parts of a flight, lost frames. A faulty channel is wrong in all
-        /// windows. Larger: faults that come and go pass as jumps.
+        /// Largest share of a relation's windows that may be left out as jumps of the record. Such
+        /// windows are far from all others: joined parts of a flight, lost frames. A faulty channel
+        /// is wrong in all windows. Larger: faults that come and go pass as jumps.
         pub jumps_share: f64 = 0.4,
         /// Velocity below which the aircraft does not fly and the vanes have no meaning, ft/s.
         pub least_velocity_ft_s: f64 = 50.0,

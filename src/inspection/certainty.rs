@@ -16,9 +16,9 @@ const CONTRADICTS: f64 = 0.3;
 /// misfits' common growth.
 const LEAST_MARGIN: f64 = 0.4;
 
-/// Least growth of the cost in other units of several linked quantities together. Kinematics of small angles
-/// exclude them by little, and the terms of a channel that is not recorded weigh as much: without q, wrong
-/// units of five lateral channels have fitted better by 0.9.
+/// Smallest rise of the cost when several linked quantities change unit together. Small-angle
+/// kinematics separate such cases weakly, and a missing channel's terms are of the same size.
+/// Without q, wrong units of five lateral channels have fitted better by 0.9.
 const LEAST_JOINT_MARGIN: f64 = 1.5;
 /// Excess of usual over reversed signs that is required among the lateral quantities, since no
 /// equation determines their common sign.

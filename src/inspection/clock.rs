@@ -12,8 +12,8 @@ use crate::units::{Quantity, Unit};
 const FORWARDS: f64 = 0.99;
 /// Share of its mean by which the median step of a clock differs at most.
 const UNEVEN: f64 = 0.5;
-/// Share of the steps, the longest, that are not in the mean: a recorder may be off between test points, of which
-/// each has hundreds of rows.
+/// Fraction of the steps that the mean leaves out: the longest ones. A recorder may be off between
+/// test points, and each test point has hundreds of rows.
 const OFF: f64 = 0.01;
 /// Steps between samples that recorders have, s: 1 kHz to 2 Hz.
 const STEPS_S: (f64, f64) = (0.000_9, 0.55);

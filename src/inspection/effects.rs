@@ -1,5 +1,8 @@
 //! Effects of inputs on the angular accelerations, by least squares. They determine the signs of
 //! surfaces and pilot controls, and the axis on which a surface acts.
+//!
+//! A draft has no mass or inertia yet, so the response is an acceleration and not a coefficient as
+//! in `output_error::likelihood::equation_error`.
 
 use nalgebra::{DMatrix, DVector};
 

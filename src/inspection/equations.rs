@@ -227,8 +227,8 @@ const LEAST_RATIO: f64 = 1e-4;
 /// Least number of intervals that decide.
 const FEWEST_INTERVALS: usize = 5;
 
-/// Misfit of an equation over all stretches of a uniform step; `None` if a needed quantity is
-/// missing or too few intervals have all of them.
+/// Misfit of an equation over all stretches of a uniform step. `None` if a needed quantity is
+/// missing or too few intervals have all quantities.
 pub fn misfit<'a>(
     equation: Equation,
     stretches: &[std::ops::Range<usize>],

@@ -16,7 +16,7 @@ const CONTROL_STEPS: usize = 3;
 
 /// Axis on which an input acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Acts {
+pub enum ControlAxis {
     Pitch,
     Roll,
     Yaw,
@@ -27,7 +27,7 @@ pub enum Acts {
 pub struct InputColumn {
     pub column: String,
     pub kind: Input,
-    pub acts: Acts,
+    pub axis: ControlAxis,
     pub sign: f64,
     /// `true` if the motion determines the sign.
     pub is_sure: bool,
@@ -70,42 +70,56 @@ fn unnamed(
     facts: &[ColumnFacts],
     found: &[InputColumn],
 ) -> Vec<InputColumn> {
-    let is_free = |c: &&ColumnFacts| {
-        let is_motion = assignment.values().any(|choice| choice.column == c.name);
-        let is_angle = c
-            .unit
-            .is_some_and(|unit| unit.quantity == units::Quantity::Angle);
-        let has_meaning = kind_of(c).is_some() || !meanings(&c.spelling).is_empty();
-        is_angle && !is_motion && !has_meaning && !is_derived(&c.spelling)
-    };
+    let is_motion = |c: &ColumnFacts| assignment.values().any(|choice| choice.column == c.name);
+    let is_free = |c: &&ColumnFacts| is_nameless_angle(c) && !is_motion(c);
     let free: Vec<&ColumnFacts> = facts.iter().filter(is_free).collect();
-    let lacks = |kind: &Input| {
-        let is_main = |input: &&InputColumn| input.kind != Input::OtherSurface;
-        let surfaces = found
-            .iter()
-            .filter(|input| input.kind.is_surface())
-            .filter(is_main);
-        usual_axis(*kind).is_some_and(|acts| surfaces.clone().all(|input| input.acts != acts))
-    };
-    let of_kind = |kind: Input| {
-        let judged = free.iter().filter_map(|facts| {
-            let single = [(*facts, kind)];
-            let responses = Responses::of(grid, assignment, &single, 1);
-            let input = responses.inputs().pop().filter(|input| input.is_sure)?;
-            Some((responses.significance(0, input.acts).abs(), input))
-        });
-        let (_, input) = judged.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some(InputColumn {
-            is_sure: false,
-            evidence: format!(
-                "its name is not in harvest's vocabulary; {}",
-                input.evidence
-            ),
-            ..input
-        })
-    };
+    let clearest = |kind: Input| clearest_unnamed(grid, assignment, &free, kind);
     let main = [Input::Elevator, Input::Aileron, Input::Rudder].into_iter();
-    main.filter(lacks).filter_map(of_kind).collect()
+    main.filter(|kind| lacks_main_surface(found, *kind))
+        .filter_map(clearest)
+        .collect()
+}
+
+/// `true` for an angle whose name means nothing.
+fn is_nameless_angle(column: &ColumnFacts) -> bool {
+    let is_angle = column
+        .unit
+        .is_some_and(|unit| unit.quantity == units::Quantity::Angle);
+    let has_meaning = kind_of(column).is_some() || !meanings(&column.spelling).is_empty();
+    is_angle && !has_meaning && !is_derived(&column.spelling)
+}
+
+/// `true` if no main surface acts on the usual axis of this kind.
+fn lacks_main_surface(inputs: &[InputColumn], kind: Input) -> bool {
+    let is_main =
+        |input: &&InputColumn| input.kind.is_surface() && input.kind != Input::OtherSurface;
+    let mut axes = inputs.iter().filter(is_main).map(|input| input.axis);
+    usual_axis(kind).is_some_and(|usual| axes.all(|axis| axis != usual))
+}
+
+/// Column that the angular acceleration follows most clearly as an input of this kind, if any is
+/// sure.
+fn clearest_unnamed(
+    grid: &Grid,
+    assignment: &Assignment,
+    columns: &[&ColumnFacts],
+    kind: Input,
+) -> Option<InputColumn> {
+    let judged = columns.iter().filter_map(|facts| {
+        let single = [(*facts, kind)];
+        let responses = Responses::of(grid, assignment, &single, 1);
+        let input = responses.inputs().pop().filter(|input| input.is_sure)?;
+        Some((responses.significance(0, input.axis).abs(), input))
+    });
+    let (_, input) = judged.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(InputColumn {
+        is_sure: false,
+        evidence: format!(
+            "its name is not in harvest's vocabulary; {}",
+            input.evidence
+        ),
+        ..input
+    })
 }
 
 /// Kind of an input by its name; an angle whose name is a `d` and a few letters is a surface.
@@ -189,23 +203,23 @@ impl<'a> Responses<'a> {
     }
 
     /// Effect of an input on an axis in standard errors.
-    fn significance(&self, n: usize, acts: Acts) -> f64 {
-        self.effects[acts as usize]
+    fn significance(&self, n: usize, axis: ControlAxis) -> f64 {
+        self.effects[axis as usize]
             .get(n)
             .map_or(0.0, |e| e.significance)
     }
 
     /// Axis on which an input acts more clearly than on its own. Roll and yaw count as one: rudders roll an aircraft.
-    fn clearer_axis(&self, n: usize, acts: Acts) -> Option<Acts> {
-        let size = |acts: &Acts| self.significance(n, *acts).abs();
-        let lateral = [Acts::Roll, Acts::Yaw];
-        let others: &[Acts] = if acts == Acts::Pitch {
+    fn clearer_axis(&self, n: usize, axis: ControlAxis) -> Option<ControlAxis> {
+        let size = |axis: &ControlAxis| self.significance(n, *axis).abs();
+        let lateral = [ControlAxis::Roll, ControlAxis::Yaw];
+        let others: &[ControlAxis] = if axis == ControlAxis::Pitch {
             &lateral
         } else {
-            &[Acts::Pitch]
+            &[ControlAxis::Pitch]
         };
-        let own: &[Acts] = if acts == Acts::Pitch {
-            &[Acts::Pitch]
+        let own: &[ControlAxis] = if axis == ControlAxis::Pitch {
+            &[ControlAxis::Pitch]
         } else {
             &lateral
         };
@@ -215,41 +229,45 @@ impl<'a> Responses<'a> {
 
     fn input(&self, n: usize) -> InputColumn {
         let (facts, kind) = self.inputs[n];
-        let acts = usual_axis(kind).unwrap_or_else(|| self.clearest_axis(n));
-        let found = self.significance(n, acts);
+        let axis = usual_axis(kind).unwrap_or_else(|| self.clearest_axis(n));
+        let found = self.significance(n, axis);
         let usual = usual_effect(kind);
         let is_significant = found.abs() >= SIGN_SIGNIFICANCE;
-        let other = self.clearer_axis(n, acts);
+        let other = self.clearer_axis(n, axis);
         InputColumn {
             column: facts.name.clone(),
             kind,
-            acts,
+            axis,
             sign: if found * usual < 0.0 && is_significant {
                 -1.0
             } else {
                 1.0
             },
             is_sure: usual != 0.0 && is_significant && other.is_none(),
-            evidence: evidence_in_words((found, usual), acts, other),
+            evidence: evidence_in_words((found, usual), axis, other),
         }
     }
 
     /// Axis on which an input acts most clearly.
-    fn clearest_axis(&self, n: usize) -> Acts {
-        let [pitch, roll, yaw] =
-            [Acts::Pitch, Acts::Roll, Acts::Yaw].map(|acts| self.significance(n, acts).abs());
+    fn clearest_axis(&self, n: usize) -> ControlAxis {
+        let [pitch, roll, yaw] = [ControlAxis::Pitch, ControlAxis::Roll, ControlAxis::Yaw]
+            .map(|axis| self.significance(n, axis).abs());
         match (pitch >= roll.max(yaw), roll >= yaw) {
-            (true, _) => Acts::Pitch,
-            (_, true) => Acts::Roll,
-            _ => Acts::Yaw,
+            (true, _) => ControlAxis::Pitch,
+            (_, true) => ControlAxis::Roll,
+            _ => ControlAxis::Yaw,
         }
     }
 }
 
-/// Evidence for an input with an effect in standard errors and the sign of the usual one, which acts
-/// more clearly on the axis `other`, if there is one.
-fn evidence_in_words((found, usual): (f64, f64), acts: Acts, other: Option<Acts>) -> String {
-    let (acceleration_of, size) = (acceleration(acts), found.abs());
+/// Text of the evidence for an input. `found` is its effect in standard errors, `usual` the usual
+/// sign. `other` is the axis on which it acts more clearly, if any.
+fn evidence_in_words(
+    (found, usual): (f64, f64),
+    axis: ControlAxis,
+    other: Option<ControlAxis>,
+) -> String {
+    let (acceleration_of, size) = (acceleration(axis), found.abs());
     let is_significant = size >= SIGN_SIGNIFICANCE;
     if usual == 0.0 {
         return "no motion determines its sign".to_owned();
@@ -270,28 +288,28 @@ fn evidence_in_words((found, usual): (f64, f64), acts: Acts, other: Option<Acts>
 
 /// Rate about the axis on which an input acts.
 #[must_use]
-pub fn rate(acts: Acts) -> Quantity {
-    match acts {
-        Acts::Pitch => Quantity::Q,
-        Acts::Roll => Quantity::P,
-        Acts::Yaw => Quantity::R,
+pub fn rate(axis: ControlAxis) -> Quantity {
+    match axis {
+        ControlAxis::Pitch => Quantity::Q,
+        ControlAxis::Roll => Quantity::P,
+        ControlAxis::Yaw => Quantity::R,
     }
 }
 
-fn acceleration(acts: Acts) -> &'static str {
-    match acts {
-        Acts::Pitch => "pitch acceleration",
-        Acts::Roll => "roll acceleration",
-        Acts::Yaw => "yaw acceleration",
+fn acceleration(axis: ControlAxis) -> &'static str {
+    match axis {
+        ControlAxis::Pitch => "pitch acceleration",
+        ControlAxis::Roll => "roll acceleration",
+        ControlAxis::Yaw => "yaw acceleration",
     }
 }
 
 /// Axis on which a kind of input acts on every aircraft.
-fn usual_axis(kind: Input) -> Option<Acts> {
+fn usual_axis(kind: Input) -> Option<ControlAxis> {
     match kind {
-        Input::Elevator | Input::PitchStick => Some(Acts::Pitch),
-        Input::Aileron | Input::RollStick => Some(Acts::Roll),
-        Input::Rudder | Input::Pedals => Some(Acts::Yaw),
+        Input::Elevator | Input::PitchStick => Some(ControlAxis::Pitch),
+        Input::Aileron | Input::RollStick => Some(ControlAxis::Roll),
+        Input::Rudder | Input::Pedals => Some(ControlAxis::Yaw),
         Input::OtherSurface => None,
     }
 }
@@ -402,11 +420,11 @@ mod tests {
             (quantity, choice)
         };
         let assignment = [choice(Quantity::P, "p"), choice(Quantity::Q, "q")].into();
-        let acts = |all: &Grid| {
+        let axis = |all: &Grid| {
             let found = inputs((&liveliest, all), &assignment, std::slice::from_ref(&facts));
-            found.first().map(|input| input.acts)
+            found.first().map(|input| input.axis)
         };
-        assert_eq!(acts(&liveliest), Some(Acts::Roll));
-        assert_eq!(acts(&all), Some(Acts::Pitch));
+        assert_eq!(axis(&liveliest), Some(ControlAxis::Roll));
+        assert_eq!(axis(&all), Some(ControlAxis::Pitch));
     }
 }

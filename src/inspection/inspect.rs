@@ -17,7 +17,7 @@ use super::mirror_images::MirrorImages;
 use super::plausible::{ColumnFacts, candidates, facts};
 use super::quantity::Quantity;
 use super::recording::Recording;
-use super::steps::{Excursions, Step, steps};
+use super::steps::{Excursions, InputActivity, steps};
 use super::vocabulary::meanings;
 use crate::flight::signal;
 use crate::units::{self, Unit};
@@ -150,7 +150,7 @@ impl FoundChannels<'_> {
         &self,
         input: &InputColumn,
         facts: &ColumnFacts,
-        (moves, step): (bool, &Step),
+        (moves, step): (bool, &InputActivity),
     ) -> Channel {
         let (unit, stated) = input_unit(facts, input);
         let kept = if unit.quantity == units::Quantity::Number {
@@ -164,13 +164,13 @@ impl FoundChannels<'_> {
         if !stated {
             evidence += "; its unit follows from its range alone";
         }
-        let rate = rate(input.acts).signal();
+        let rate = rate(input.axis).signal();
         let own_rate = self.channels.iter().find(|c| c.signal == rate);
         let rate_is_sure = own_rate.is_some_and(|c| c.is_sure);
         if input.is_sure && !rate_is_sure {
             evidence = format!("{evidence}; but {rate} is not sure");
         }
-        if let Some(why) = step.why_it_rests().filter(|_| moves) {
+        if let Some(why) = step.reason_without_step().filter(|_| moves) {
             evidence = format!("{evidence}; {why}");
         }
         let is_sure = input.is_sure && stated && rate_is_sure;
@@ -234,8 +234,8 @@ impl FoundChannels<'_> {
         }
     }
 
-    /// Marks the moments of inertia as unsure unless that about z is the largest, as in every
-    /// aircraft: recorders differ in the order of the axes.
+    /// Marks the moments of inertia as unsure unless the moment about z is the largest, as in every
+    /// aircraft. Recorders differ in the order of the axes.
     fn mark_unsure_inertias(&mut self) {
         let largest = |signal: &str| {
             let own = self.channels.iter().find(|c| c.signal == signal)?;

@@ -1,10 +1,11 @@
 //! Inspection of a recording without a description: the signal, unit and sign of each column, and a
 //! draft of the pipeline.
 //!
-//! Names and stated units propose, the equations of motion decide: attitudes must follow from
-//! rates, speeds from accelerations and gravity, climb from the flight path, dynamic pressure and
-//! Mach number from speed and altitude. Angular accelerations determine the signs of surfaces and
-//! controls. A finding that no equation confirms is marked as unsure.
+//! Names and stated units propose an assignment; the equations of motion confirm it. Attitudes must
+//! follow from rates, speeds from accelerations and gravity, and climb from the flight path.
+//! Dynamic pressure and Mach number must follow from speed and altitude. Angular accelerations
+//! determine the signs of surfaces and controls. A finding that no equation confirms is marked as
+//! unsure.
 //!
 //! In the order of use:
 //!

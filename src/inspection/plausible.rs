@@ -95,35 +95,49 @@ fn spelled_unit(spelling: &Spelling) -> Option<Unit> {
 /// Candidates of all quantities.
 #[must_use]
 pub fn candidates(facts: &[ColumnFacts], clock: &ClockColumn) -> Candidates {
-    let columns = || {
-        facts
-            .iter()
-            .filter(|c| c.name != clock.name && !c.is_constant() && !c.is_switch)
-    };
-    let of = |quantity: Quantity| {
-        let mut of_name: Vec<Candidate> = columns().filter_map(|c| named(quantity, c)).collect();
-        if !of_name.is_empty() {
-            // Recorders differ in the order of the axes: the rate about z may be that of pitch.
-            let is_own = |c: &&ColumnFacts| of_name.iter().any(|own| own.column == c.name);
-            let others = columns().filter(|c| !is_own(c));
-            let akin = others.filter(|c| quantity.akin().iter().any(|q| named(*q, c).is_some()));
-            let akin: Vec<Candidate> = akin.filter_map(|c| candidate(quantity, c, 0.0)).collect();
-            of_name.extend(akin);
-            return of_name;
+    let is_usable = |c: &&ColumnFacts| c.name != clock.name && !c.is_constant() && !c.is_switch;
+    let columns: Vec<&ColumnFacts> = facts.iter().filter(is_usable).collect();
+    let candidates_of = |quantity: Quantity| {
+        let by_name = candidates_by_name(quantity, &columns);
+        if by_name.is_empty() {
+            candidates_without_name(quantity, &columns)
+        } else {
+            by_name
         }
-        let nameless = |c: &&ColumnFacts| {
-            meanings(&c.spelling).is_empty()
-                && input(&c.spelling).is_none()
-                && !is_one_side(&c.spelling)
-        };
-        columns()
-            .filter(nameless)
-            .filter_map(|c| candidate(quantity, c, 0.0))
-            .collect()
     };
     Quantity::ALL
         .into_iter()
-        .map(|quantity| (quantity, of(quantity)))
+        .map(|quantity| (quantity, candidates_of(quantity)))
+        .collect()
+}
+
+/// Columns whose name is that of a quantity, then those with the name of the same kind of quantity
+/// on another axis; empty without the former. Recorders differ in the order of the axes: the rate
+/// about z may be that of pitch.
+fn candidates_by_name(quantity: Quantity, columns: &[&ColumnFacts]) -> Vec<Candidate> {
+    let mut candidates: Vec<Candidate> =
+        columns.iter().filter_map(|c| named(quantity, c)).collect();
+    if candidates.is_empty() {
+        return candidates;
+    }
+    let is_other = |c: &&&ColumnFacts| candidates.iter().all(|other| other.column != c.name);
+    let is_akin = |c: &&&ColumnFacts| quantity.akin().iter().any(|akin| named(*akin, c).is_some());
+    let akin = columns.iter().filter(is_other).filter(is_akin);
+    let akin: Vec<Candidate> = akin.filter_map(|c| candidate(quantity, c, 0.0)).collect();
+    candidates.extend(akin);
+    candidates
+}
+
+/// Columns whose name means nothing, and whose unit and range allow a quantity.
+fn candidates_without_name(quantity: Quantity, columns: &[&ColumnFacts]) -> Vec<Candidate> {
+    let is_nameless = |c: &&&ColumnFacts| {
+        meanings(&c.spelling).is_empty()
+            && input(&c.spelling).is_none()
+            && !is_one_side(&c.spelling)
+    };
+    let nameless = columns.iter().filter(is_nameless);
+    nameless
+        .filter_map(|c| candidate(quantity, c, 0.0))
         .collect()
 }
 

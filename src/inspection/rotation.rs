@@ -21,9 +21,9 @@ const AXES: [(Quantity, Quantity); 3] = [
 ];
 
 impl Search<'_> {
-    /// Adds attitudes and rates with names outside the vocabulary: pairs in which one column is the integral
-    /// of the other, in the order in which the equations of all three attitudes hold best. Returns them if
-    /// another order or other columns fit nearly as well.
+    /// Adds attitudes and rates whose names are not in the vocabulary. It pairs columns of which
+    /// one is the integral of the other, in the order in which all three attitude equations fit
+    /// best. Returns them if another order or other columns fit nearly as well.
     pub fn seed_rotation(&self, assignment: &mut Assignment) -> BTreeSet<Quantity> {
         let rotation: Vec<Quantity> = AXES.iter().flat_map(|(a, b)| [*a, *b]).collect();
         if rotation.iter().any(|q| assignment.contains_key(q)) {

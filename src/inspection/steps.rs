@@ -45,9 +45,9 @@ pub struct Excursions<'a> {
     noise: f64,
 }
 
-/// Step of an input.
+/// Activity of an input: the size of its steps, or why it has none.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Step {
+pub enum InputActivity {
     /// Size in the unit recorded.
     Size(f64),
     /// Nothing but the feedback that follows the motion, beside the input that is named.
@@ -56,24 +56,24 @@ pub enum Step {
     Noise,
 }
 
-impl Step {
+impl InputActivity {
     #[must_use]
     pub fn size(&self) -> Option<f64> {
         match self {
-            Step::Size(size) => Some(*size),
-            Step::Feedback(_) | Step::Noise => None,
+            InputActivity::Size(size) => Some(*size),
+            InputActivity::Feedback(_) | InputActivity::Noise => None,
         }
     }
 
     /// Reason for which an input has no step, in words.
     #[must_use]
-    pub fn why_it_rests(&self) -> Option<String> {
+    pub fn reason_without_step(&self) -> Option<String> {
         match self {
-            Step::Size(_) => None,
-            Step::Feedback(liveliest) => Some(format!(
+            InputActivity::Size(_) => None,
+            InputActivity::Feedback(liveliest) => Some(format!(
                 "it changes by less than {FEEDBACK_SHARE} of what {liveliest} does, as feedback does: no step and no class"
             )),
-            Step::Noise => {
+            InputActivity::Noise => {
                 Some("no change stands out of its noise: no step and no class".to_owned())
             }
         }
@@ -81,7 +81,8 @@ impl Step {
 }
 
 impl<'a> Excursions<'a> {
-    /// Size of the motion of a column in its unit.
+    /// Measures the motion of a column, in the column's unit: range and largest change within a
+    /// step's time (both without rare extremes), and noise.
     #[must_use]
     pub fn of(grid: &Grid, column: &'a str, kind: Input, unit: Unit) -> Excursions<'a> {
         let values = grid.columns.get(column).map_or(&[][..], Vec::as_slice);
@@ -119,7 +120,7 @@ impl<'a> Excursions<'a> {
         (other.is_surface == self.is_surface).then_some(other.change * factor)
     }
 
-    fn step(&self, all: &[Excursions]) -> Step {
+    fn step(&self, all: &[Excursions]) -> InputActivity {
         let beside = all
             .iter()
             .filter_map(|other| Some((self.beside(other)?, other)));
@@ -127,18 +128,18 @@ impl<'a> Excursions<'a> {
         let size = STEP_SHARE * self.change;
         match liveliest {
             Some((change, other)) if self.change < FEEDBACK_SHARE * change => {
-                Step::Feedback(other.column.to_owned())
+                InputActivity::Feedback(other.column.to_owned())
             }
-            _ if size <= STEP_SIGMAS * self.noise => Step::Noise,
-            _ => Step::Size(size),
+            _ if size <= STEP_SIGMAS * self.noise => InputActivity::Noise,
+            _ => InputActivity::Size(size),
         }
     }
 }
 
-/// Step of each of the inputs of a recording. Surfaces are compared with surfaces and controls with
+/// Activity of each of the inputs of a recording. Surfaces are compared with surfaces and controls with
 /// controls, where their units are of one quantity.
 #[must_use]
-pub fn steps(inputs: &[Excursions]) -> Vec<Step> {
+pub fn steps(inputs: &[Excursions]) -> Vec<InputActivity> {
     inputs.iter().map(|input| input.step(inputs)).collect()
 }
 
@@ -239,8 +240,8 @@ mod tests {
             of("stick", Input::PitchStick, "in"),
         ]);
         assert!(found[0].size().is_some());
-        assert_eq!(found[1], Step::Feedback("de".to_owned()));
+        assert_eq!(found[1], InputActivity::Feedback("de".to_owned()));
         assert!(found[2].size().is_some());
-        assert_eq!(found[3], Step::Noise);
+        assert_eq!(found[3], InputActivity::Noise);
     }
 }

@@ -20,7 +20,8 @@ words! {
 }
 
 /// Number of fast steps of one signal in a maneuver of the class. A signal that may step as often as
-/// a doublet but need not is an input of those maneuvers in which it does.
+/// a doublet, without a smallest number of steps, is an input only of the maneuvers in which it is
+/// excited.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StepCount {

@@ -99,9 +99,10 @@ table! {
     /// Columns of `maneuvers` about the recognition.
     #[derive(Default)]
     pub struct Recognised {
-        /// Confidence from 0 to 1, a product: 0.8 for a flag that contradicts (it may be stuck),
-        /// 0.95 for one that is not recorded, 0.9 for vanes without evidence, 0.5 to 1 for the fit
-        /// of the pulses' lengths.
+        /// Confidence from 0 to 1, a product of factors: 0.8 for each flag that contradicts the
+        /// class (it may be stuck); 0.95 for each flag that is not recorded; 0.9 for each signal of
+        /// `moves` whose motion is unclear; 0.5 to 1 for the fit of the pulses' lengths; 0.9 for a
+        /// record without pilot controls.
         pub confidence: Option<f64> ["1"],
         /// Time of the first step of the inputs.
         pub first_input_s: Option<f64> ["s"],
@@ -148,13 +149,14 @@ table! {
         pub verdict: Acceptance,
         /// Limits that the maneuver exceeds, in words.
         pub reason: String,
-        /// Angular rates of its axis before the first input over those in the whole maneuver, root
-        /// mean squares: large where it is not trimmed at the start.
+        /// Angular rates of the maneuver's axis before the first input over those in the whole
+        /// maneuver, root mean squares; large if the maneuver does not start trimmed.
         pub lead_in_motion: Option<f64> ["1"],
         /// Root mean square of the angle of attack about its mean.
         pub alpha_rms_deg: Option<f64> ["deg"],
-        /// Angular accelerations that the motion of the other axis makes, by the products of rates of
-        /// Euler's equations, over all those of its axis; root mean squares about their means.
+        /// Angular accelerations due to the motion of the other axis, by the products of rates in
+        /// Euler's equations, over all angular accelerations of the maneuver's axis; root mean
+        /// squares about their means.
         pub other_axis: Option<f64> ["1"],
         /// Root mean square of the axis's angular rate over its noise from sample to sample; the
         /// better one of roll and yaw.
@@ -173,7 +175,7 @@ table! {
 
 table! {
     /// Excitation that fits no class.
-    pub struct Unknown in "unknown" per "excitation that fits no class" {
+    pub struct UnclassifiedExcitation in "unknown" per "excitation that fits no class" {
         /// Flight, or stretch of a flight.
         pub flight_id: String,
         /// Time of the first step.

@@ -6,5 +6,7 @@ pub mod found;
 mod means;
 
 pub use class::{Class, ClassOverrides, Pulses, Recognition, Status, StepCount, Sweep};
-pub use found::{Acceptance, Event, Maneuver, ManeuverOrigin, Quality, Recognised, Unknown};
+pub use found::{
+    Acceptance, Event, Maneuver, ManeuverOrigin, Quality, Recognised, UnclassifiedExcitation,
+};
 pub use means::Means;

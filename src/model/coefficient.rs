@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::evidence::Evidence;
+use super::evidence::ManeuverResults;
 use super::flight_data::{FlightData, Observed};
 use super::held_values::{HeldDifferences, TermsPosterior};
 use super::observation::Observation;
@@ -39,8 +39,8 @@ pub struct CoefficientPosterior {
     pub weights: BTreeMap<usize, f64>,
     /// Terms that each maneuver estimates, by its index in the evidence.
     pub estimated: BTreeMap<usize, Vec<usize>>,
-    /// Differences from the tunnel of the values that a maneuver holds, by the posterior of the
-    /// other flights. The key is the maneuver's id.
+    /// Posterior of the held derivatives' differences from the tunnel, computed from the other
+    /// flights only. Keyed by maneuver id.
     pub held: BTreeMap<String, HeldDifferences>,
     /// Agreement of each flight with the others.
     pub flights: BTreeMap<String, Agreement>,
@@ -53,26 +53,26 @@ impl CoefficientPosterior {
     #[must_use]
     pub fn from_terms(
         terms: Vec<PosteriorTerm>,
-        evidence: &[Evidence],
+        evidence: &[ManeuverResults],
         basis: &TermSources,
     ) -> Option<CoefficientPosterior> {
         let mut data = Data::new(&terms, evidence, basis);
         let mut weights = vec![1.0; evidence.len()];
         let mut noise_scales = centres(&terms);
-        let (mut observed, mut scales, mut found) = data.fit(&terms, &weights, &noise_scales)?;
+        let (mut observed, mut scales, mut gaussian) = data.fit(&terms, &weights, &noise_scales)?;
         for _ in 0..REWEIGHTINGS {
             let freedom = basis.settings.degrees_of_freedom;
-            weights = reweighted(&data.flights, &weights, &found, freedom);
+            weights = reweighted(&data.flights, &weights, &gaussian, freedom);
             noise_scales = scales;
-            (observed, scales, found) = data.fit(&terms, &weights, &noise_scales)?;
+            (observed, scales, gaussian) = data.fit(&terms, &weights, &noise_scales)?;
         }
-        let posterior = TermsPosterior {
+        let terms_posterior = TermsPosterior {
             terms: &terms,
             scales: &scales,
-            gaussian: &found,
+            gaussian: &gaussian,
         };
-        let held = data.held(&posterior, &weights, evidence, basis.tunnel);
-        let mut posterior = data.posterior(terms, scales, &weights, found, evidence);
+        let held = data.held(&terms_posterior, &weights, evidence, basis.tunnel);
+        let mut posterior = data.posterior(terms, scales, &weights, gaussian, evidence);
         add_open_scales(&observed, &posterior.scales, &mut posterior.gaussian);
         Some(CoefficientPosterior {
             noise_scales,
@@ -88,7 +88,8 @@ pub struct Data {
     /// Flights in the order of their ids.
     pub flights: Vec<FlightData>,
     flight_ids: Vec<String>,
-    /// Class and observation of each maneuver that takes part.
+    /// Index of the class, and observation, of each maneuver that estimates a term of this
+    /// coefficient.
     observations: Vec<(usize, Observation)>,
     /// Maneuvers of each flight: index in the evidence, and index among the observations.
     places: Vec<Vec<(usize, usize)>>,
@@ -98,7 +99,7 @@ pub struct Data {
 impl Data {
     /// Collects the evidence about a coefficient's terms.
     #[must_use]
-    pub fn new(terms: &[PosteriorTerm], evidence: &[Evidence], basis: &TermSources) -> Data {
+    pub fn new(terms: &[PosteriorTerm], evidence: &[ManeuverResults], basis: &TermSources) -> Data {
         Data::with_planned(terms, evidence, &[], basis).0
     }
 
@@ -108,25 +109,27 @@ impl Data {
     #[must_use]
     pub fn with_planned(
         terms: &[PosteriorTerm],
-        evidence: &[Evidence],
-        planned: &[Evidence],
+        evidence: &[ManeuverResults],
+        planned: &[ManeuverResults],
         basis: &TermSources,
     ) -> (Data, Vec<Option<(usize, Observation)>>) {
         let mut classes: BTreeMap<String, usize> = BTreeMap::new();
-        let mut observe = |own: &Evidence| {
-            let observation = own.about(terms, basis.tunnel)?;
+        let mut observe = |results: &ManeuverResults| {
+            let observation = results.about(terms, basis.tunnel)?;
             let next = classes.len();
-            let class = classes.entry(own.maneuver.class.clone()).or_insert(next);
+            let class = classes
+                .entry(results.maneuver.class.clone())
+                .or_insert(next);
             Some((*class, observation))
         };
         let mut observations: Vec<(usize, Observation)> = vec![];
         let mut places: BTreeMap<&str, Vec<(usize, usize)>> = BTreeMap::new();
         let mut estimated = BTreeMap::new();
-        for (place, own) in evidence.iter().enumerate() {
-            let Some((class, observation)) = observe(own) else {
+        for (place, results) in evidence.iter().enumerate() {
+            let Some((class, observation)) = observe(results) else {
                 continue;
             };
-            let of_flight = places.entry(&own.maneuver.flight_id).or_default();
+            let of_flight = places.entry(&results.maneuver.flight_id).or_default();
             of_flight.push((place, observations.len()));
             estimated.insert(place, observation.terms.clone());
             observations.push((class, observation));
@@ -142,10 +145,9 @@ impl Data {
             places: places.into_values().collect(),
             estimated,
         };
-        let flights = data
-            .places
-            .iter()
-            .map(|own| FlightData::new(&observed(own, &data.observations), terms, &data.unknowns));
+        let flights = data.places.iter().map(|places| {
+            FlightData::new(&observed(places, &data.observations), terms, &data.unknowns)
+        });
         data.flights = flights.collect();
         (data, planned)
     }
@@ -153,8 +155,8 @@ impl Data {
     /// Adds the noise between the points of the grids to each maneuver's own noise, for these
     /// scales.
     pub fn add_grid_noise(&mut self, terms: &[PosteriorTerm], scales: &[Scale]) {
-        for (flight, own) in self.flights.iter_mut().zip(&self.places) {
-            flight.add_grid_noise(&observed(own, &self.observations), terms, scales);
+        for (flight, places) in self.flights.iter_mut().zip(&self.places) {
+            flight.add_grid_noise(&observed(places, &self.observations), terms, scales);
         }
     }
 
@@ -168,8 +170,8 @@ impl Data {
     ) -> Option<(ObservedDifferences, Vec<Scale>, Gaussian)> {
         self.add_grid_noise(terms, start);
         let sums = information(&self.flights, weights, self.unknowns.count);
-        let own = of_differences(&sums, &self.unknowns)?;
-        let observed = ObservedDifferences::new(terms, &self.unknowns, &own);
+        let information_on_differences = of_differences(&sums, &self.unknowns)?;
+        let observed = ObservedDifferences::new(terms, &self.unknowns, &information_on_differences);
         let scales = most_probable(&observed, start);
         let gaussian = gaussian(&self.unknowns.root(terms, &scales, EXACT), &sums)?;
         Some((observed, scales, gaussian))
@@ -181,17 +183,19 @@ impl Data {
         &self,
         posterior: &TermsPosterior,
         weights: &[f64],
-        evidence: &[Evidence],
+        evidence: &[ManeuverResults],
         tunnel: &WindTunnel,
     ) -> BTreeMap<String, HeldDifferences> {
         let mut held = BTreeMap::new();
-        for own in evidence.chunk_by(|a, b| a.maneuver.flight_id == b.maneuver.flight_id) {
-            let place = self.flight_ids.binary_search(&own[0].maneuver.flight_id);
+        for of_flight in evidence.chunk_by(|a, b| a.maneuver.flight_id == b.maneuver.flight_id) {
+            let place = self
+                .flight_ids
+                .binary_search(&of_flight[0].maneuver.flight_id);
             let flight = place.ok().map(|i| &self.flights[i]);
             let Some(others) = OtherFlights::new(posterior.gaussian, flight, weights) else {
                 continue;
             };
-            held.extend(own.iter().filter_map(|e| {
+            held.extend(of_flight.iter().filter_map(|e| {
                 let differences = e.held_differences(posterior, &self.unknowns, &others, tunnel)?;
                 Some((e.maneuver.maneuver_id.clone(), differences))
             }));
@@ -205,7 +209,7 @@ impl Data {
         scales: Vec<Scale>,
         weights: &[f64],
         gaussian: Gaussian,
-        evidence: &[Evidence],
+        evidence: &[ManeuverResults],
     ) -> CoefficientPosterior {
         let root = self.unknowns.root(&terms, &scales, CHECKED_VARIANCE);
         let checked = self.flight_ids.iter().zip(&self.flights);
@@ -215,9 +219,10 @@ impl Data {
         let class = |place: &usize| evidence[*place].maneuver.class.as_str();
         let names: BTreeSet<&str> = self.estimated.keys().map(class).collect();
         let classes = names.into_iter().filter_map(|name| {
-            let is_own = |m: usize| evidence[m].maneuver.class == name;
+            let is_of_class = |m: usize| evidence[m].maneuver.class == name;
             let count = self.unknowns.count;
-            let agreement = self_check::maneuvers(&self.flights, weights, &root, count, is_own)?;
+            let agreement =
+                self_check::maneuvers(&self.flights, weights, &root, count, is_of_class)?;
             Some((name.to_owned(), agreement))
         });
         let classes: BTreeMap<String, Agreement> = classes.collect();
@@ -241,9 +246,9 @@ fn observed<'o>(
     places: &[(usize, usize)],
     observations: &'o [(usize, Observation)],
 ) -> Vec<Observed<'o>> {
-    let own = places.iter().map(|&(place, i)| {
+    let maneuvers = places.iter().map(|&(place, i)| {
         let (class, observation) = &observations[i];
         (place, *class, observation)
     });
-    own.collect()
+    maneuvers.collect()
 }

@@ -41,9 +41,9 @@ impl Sampler<'_> {
     #[must_use]
     pub fn draw(&self, stream: &mut RandomStream) -> Vec<PosteriorRow> {
         let mut values = Vec::with_capacity(self.rows.len());
-        for own in &self.coefficients {
-            let differences = &own.mean + stream.deviations(&own.root);
-            for quantity in &own.quantities {
+        for sampler in &self.coefficients {
+            let differences = &sampler.mean + stream.deviations(&sampler.root);
+            for quantity in &sampler.quantities {
                 values.extend(quantity.values(&differences));
             }
         }
@@ -63,7 +63,7 @@ impl Model {
         let all = self.coefficients.iter();
         Sampler {
             rows: &self.rows.posterior,
-            coefficients: all.map(|(_, own)| own.sampler()).collect(),
+            coefficients: all.map(|(_, posterior)| posterior.sampler()).collect(),
         }
     }
 

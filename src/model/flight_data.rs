@@ -73,8 +73,8 @@ impl FlightData {
             let first = data.rows.len();
             data.rows.extend(unknowns.rows(terms, class, observation));
             let range = first..data.rows.len();
-            let own = data.differences.rows_range_mut(range.clone());
-            { own }.copy_from(&observation.differences);
+            let differences = data.differences.rows_range_mut(range.clone());
+            { differences }.copy_from(&observation.differences);
             let of_flight = observation.calibration.iter();
             for (error, change) in of_flight.filter(|(e, _)| !is_of_campaign(e)) {
                 let effect = effects
@@ -147,8 +147,8 @@ impl FlightData {
     pub fn covariance(&self, weights: &[f64]) -> DMatrix<f64> {
         let mut covariance = self.calibration.clone();
         for ((place, rows), noise) in self.maneuvers.iter().zip(&self.noise) {
-            let mut own = covariance.view_mut((rows.start, rows.start), noise.shape());
-            own += noise / weights[*place];
+            let mut of_maneuver = covariance.view_mut((rows.start, rows.start), noise.shape());
+            of_maneuver += noise / weights[*place];
         }
         covariance
     }
@@ -165,12 +165,12 @@ impl FlightData {
         lower.solve_lower_triangular_mut(&mut rows);
         let mut differences = self.differences.clone();
         lower.solve_lower_triangular_mut(&mut differences);
-        let own = rows.tr_mul(&rows);
+        let matrix = rows.tr_mul(&rows);
         let vector = rows.tr_mul(&differences);
         for (i, &row) in active.iter().enumerate() {
             sums.vector[row] += vector[i];
             for (j, &column) in active.iter().enumerate() {
-                sums.matrix[(row, column)] += own[(i, j)];
+                sums.matrix[(row, column)] += matrix[(i, j)];
             }
         }
     }
@@ -219,10 +219,10 @@ impl FlightData {
     ) -> (DVector<f64>, DMatrix<f64>) {
         let active = self.active();
         let dense = self.dense(&active);
-        let own = covariance.select_rows(&active).select_columns(&active);
+        let of_active = covariance.select_rows(&active).select_columns(&active);
         (
             &dense * mean.select_rows(&active),
-            &dense * own * dense.transpose(),
+            &dense * of_active * dense.transpose(),
         )
     }
 }

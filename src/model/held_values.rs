@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::evidence::Evidence;
+use super::evidence::ManeuverResults;
 use super::other_flights::OtherFlights;
 use super::posterior::Gaussian;
 use super::scale_prior::Scale;
@@ -29,7 +29,7 @@ pub struct TermsPosterior<'a> {
     pub gaussian: &'a Gaussian,
 }
 
-impl Evidence<'_> {
+impl ManeuverResults<'_> {
     /// Effects of the derivatives that the maneuver holds, by name.
     pub fn held_effects(&self) -> impl Iterator<Item = (&str, &ErrorEffect)> {
         let effects = self.covariance.shared_errors.iter();

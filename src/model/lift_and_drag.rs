@@ -21,8 +21,8 @@
 use nalgebra::{DMatrix, DVector, Matrix2, RowDVector};
 
 use super::campaign_model::Model;
-use super::evidence::Evidence;
-use crate::aero::{Axis, Buildup, Coefficient, Derivative, DerivativeUnit, Regressor};
+use super::evidence::ManeuverResults;
+use crate::aero::{AeroModel, Axis, Coefficient, Derivative, DerivativeUnit, Regressor};
 use crate::aircraft::Aircraft;
 use crate::maneuver::{Maneuver, Means, Status};
 use crate::tables::{EstimateRow, LiftAndDragRow};
@@ -34,12 +34,12 @@ const TOTAL: &str = "total";
 /// Maneuver as it was flown, with its build-up.
 #[derive(Clone, Copy, Debug)]
 pub struct PublishedManeuver<'a> {
-    pub evidence: &'a Evidence<'a>,
+    pub evidence: &'a ManeuverResults<'a>,
     /// Rows of the estimates as they are published.
     pub estimates: &'a [EstimateRow],
     pub means: &'a Means,
     pub aircraft: &'a Aircraft,
-    pub buildup: &'a Buildup,
+    pub aero_model: &'a AeroModel,
 }
 
 /// Weights of all normal and axial derivatives in lift and drag.
@@ -61,9 +61,9 @@ struct HeldErrors {
 }
 
 impl Model {
-    /// Lift and drag of a longitudinal maneuver whose normal and axial force are estimated, and
-    /// their slopes along the regressors; empty for others. Held derivatives have the values of the
-    /// posterior of the other flights, or of the tunnel.
+    /// Rows of one longitudinal maneuver: total C_L and C_D, then their slopes along each
+    /// regressor. Empty unless the constants of CN and CA are estimated. Held derivatives have the
+    /// posterior values of the other flights, or the tunnel's.
     #[must_use]
     pub fn lift_and_drag(
         &self,
@@ -72,8 +72,8 @@ impl Model {
     ) -> Vec<LiftAndDragRow> {
         let derivatives = flown.derivatives();
         let is_estimated = |c: Coefficient| {
-            let mut own = derivatives.iter().filter(|d| d.coefficient == c);
-            own.any(|d| d.regressor == Regressor::Constant && flown.is_estimated(d))
+            let mut of_coefficient = derivatives.iter().filter(|d| d.coefficient == c);
+            of_coefficient.any(|d| d.regressor == Regressor::Constant && flown.is_estimated(d))
         };
         if !is_estimated(Coefficient::CN) || !is_estimated(Coefficient::CA) {
             return vec![];
@@ -101,7 +101,7 @@ impl Model {
 
 impl PublishedManeuver<'_> {
     fn derivatives(&self) -> Vec<&Derivative> {
-        let longitudinal = self.buildup.derivatives_of(Axis::Longitudinal);
+        let longitudinal = self.aero_model.derivatives_of(Axis::Longitudinal);
         longitudinal
             .filter(|d| !d.coefficient.is_moment())
             .collect()
@@ -144,7 +144,7 @@ impl PublishedManeuver<'_> {
     fn weights_from_regressors(
         &self,
         derivatives: &[&Derivative],
-        own: impl Fn(&Derivative) -> f64,
+        regressor: impl Fn(&Derivative) -> f64,
     ) -> Weights {
         let Maneuver {
             alpha_deg,
@@ -152,11 +152,11 @@ impl PublishedManeuver<'_> {
             ..
         } = *self.evidence.maneuver;
         let (sin, cos) = (RAD * alpha_deg).sin_cos();
-        let own = |d: &Derivative| own(d) * d.coefficient_factor(self.aircraft, qbar_psf);
+        let factor = |d: &Derivative| regressor(d) * d.coefficient_factor(self.aircraft, qbar_psf);
         let weight = |by_normal: f64, by_axial: f64| {
             let weights = derivatives.iter().map(|d| match d.coefficient {
-                Coefficient::CN => by_normal * own(d),
-                _ => by_axial * own(d),
+                Coefficient::CN => by_normal * factor(d),
+                _ => by_axial * factor(d),
             });
             RowDVector::from_iterator(derivatives.len(), weights)
         };
@@ -218,28 +218,28 @@ impl PublishedManeuver<'_> {
         held: &HeldErrors,
     ) -> Matrix2<f64> {
         let place = |name: &String| derivatives.iter().position(|d| d.name == *name);
-        let of = |names: &[String]| {
+        let weights_of = |names: &[String]| {
             DMatrix::from_fn(2, names.len(), |i, j| {
                 let row = if i == 0 { &weights.lift } else { &weights.drag };
                 place(&names[j]).map_or(0.0, |d| row[d])
             })
         };
         let covariance = self.evidence.covariance;
-        let (estimated, held_weights) = (of(&covariance.names), of(&held.names));
+        let (estimated, held_weights) = (weights_of(&covariance.names), weights_of(&held.names));
         let n = covariance.names.len();
         let corrected = DMatrix::from_row_slice(n, n, &covariance.corrected);
         let change = &held.gains * (&held.covariance - &held.assumed) * held.gains.transpose();
-        let own = &estimated * (corrected + change) * estimated.transpose();
+        let from_estimates = &estimated * (corrected + change) * estimated.transpose();
         let cross = &estimated * &held.gains * &held.covariance * held_weights.transpose();
-        let alone = &held_weights * &held.covariance * held_weights.transpose();
-        let sum = own - &cross - cross.transpose() + alone;
+        let from_held = &held_weights * &held.covariance * held_weights.transpose();
+        let sum = from_estimates - &cross - cross.transpose() + from_held;
         sum.fixed_view::<2, 2>(0, 0).into_owned()
     }
 }
 
 impl HeldErrors {
     /// Errors of the held values with the tunnel's uncertainty.
-    fn with_tunnel_uncertainty(evidence: &Evidence) -> HeldErrors {
+    fn with_tunnel_uncertainty(evidence: &ManeuverResults) -> HeldErrors {
         let effects: Vec<_> = evidence.held_effects().collect();
         let deviations = effects.iter().map(|(_, effect)| effect.deviation.powi(2));
         let variances = DVector::from_iterator(effects.len(), deviations);
@@ -257,15 +257,15 @@ impl HeldErrors {
     /// Replaces the tunnel's covariance by that of the other flights.
     fn take_posterior(&mut self, model: &Model, maneuver_id: &str) {
         for (_, coefficient) in &model.coefficients {
-            let Some(known) = coefficient.held.get(maneuver_id) else {
+            let Some(differences) = coefficient.held.get(maneuver_id) else {
                 continue;
             };
             let place = |name: &String| self.names.iter().position(|n| n == name);
-            let places: Vec<Option<usize>> = known.derivatives.iter().map(place).collect();
+            let places: Vec<Option<usize>> = differences.derivatives.iter().map(place).collect();
             for (i, row) in places.iter().enumerate() {
                 for (j, column) in places.iter().enumerate() {
                     if let (Some(row), Some(column)) = (row, column) {
-                        self.covariance[(*row, *column)] = known.covariance[(i, j)];
+                        self.covariance[(*row, *column)] = differences.covariance[(i, j)];
                     }
                 }
             }

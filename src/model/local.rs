@@ -115,8 +115,8 @@ impl CoefficientPosterior {
     }
 }
 
-/// Weights of the grid's points in the value of a term, or in its slope along Mach number; `None`
-/// for the slope of a table without Mach.
+/// Weights of the grid's points in the value of a term, or in its slope along Mach number. `None`
+/// for the slope of a table without Mach number.
 pub fn local_shares(
     term: &PosteriorTerm,
     condition: &Condition,

@@ -14,7 +14,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::evidence::Evidence;
+use super::evidence::ManeuverResults;
 use super::term::PosteriorTerm;
 use crate::aero::{Condition, WindTunnel};
 use crate::maneuver::Status;
@@ -49,7 +49,7 @@ struct ObservationRow {
     difference: f64,
 }
 
-impl Evidence<'_> {
+impl ManeuverResults<'_> {
     /// Evidence about a coefficient's terms; `None` if the maneuver estimates none of them.
     #[must_use]
     pub fn about(&self, terms: &[PosteriorTerm], tunnel: &WindTunnel) -> Option<Observation> {
@@ -96,8 +96,8 @@ impl Evidence<'_> {
         at: &Condition,
     ) -> Option<ObservationRow> {
         let term = &terms[i];
-        let (own, mut value) = self.estimated(&term.derivative)?;
-        let mut of_parameters = vec![(own, 1.0)];
+        let (place, mut value) = self.estimated(&term.derivative)?;
+        let mut of_parameters = vec![(place, 1.0)];
         if let Some(slope) = &term.slope {
             match self.estimated(slope) {
                 Some((place, slope)) => {
@@ -107,11 +107,11 @@ impl Evidence<'_> {
                 None => value += at.alpha_deg * self.held(slope)?,
             }
         }
-        let known = tunnel.at(&term.prior.name, at).map_or(0.0, |t| t.value);
+        let tunnel_value = tunnel.at(&term.prior.name, at).map_or(0.0, |t| t.value);
         Some(ObservationRow {
             term: i,
             of_parameters,
-            difference: value - known,
+            difference: value - tunnel_value,
         })
     }
 
@@ -196,14 +196,17 @@ impl Evidence<'_> {
         shared: impl Iterator<Item = &'e ErrorEffect>,
     ) -> Option<DMatrix<f64>> {
         let n = self.covariance.names.len();
-        let mut own = DMatrix::from_row_slice(n, n, &self.covariance.corrected);
+        let corrected = DMatrix::from_row_slice(n, n, &self.covariance.corrected);
+        let mut unshared = corrected.clone();
         for effect in shared {
             let change = DVector::from_column_slice(&effect.change);
-            own -= &change * change.transpose();
+            unshared -= &change * change.transpose();
         }
-        let corrected = DMatrix::from_row_slice(n, n, &self.covariance.corrected);
-        let corrected = of_rows * corrected * of_rows.transpose();
-        floored(&(of_rows * own * of_rows.transpose()), &corrected)
+        let corrected_of_rows = of_rows * corrected * of_rows.transpose();
+        floored(
+            &(of_rows * unshared * of_rows.transpose()),
+            &corrected_of_rows,
+        )
     }
 }
 

@@ -56,13 +56,16 @@ impl ObservedDifferences {
             let points = 0..term.prior.grid.len();
             let (start, every): (usize, Vec<usize>) = (places.len(), points.clone().collect());
             let is_observed = |point: &usize| matrix[(first + point, first + point)] != 0.0;
-            let own: Vec<usize> = points.filter(is_observed).collect();
-            places.extend(own.iter().map(|point| first + point));
+            let observed_points: Vec<usize> = points.filter(is_observed).collect();
+            places.extend(observed_points.iter().map(|point| first + point));
             observed.push(ObservedTerm {
                 start,
-                covariance: term.prior.covariance.select(&own, &own),
-                with_all: term.prior.covariance.select(&every, &own),
-                points: own,
+                covariance: term
+                    .prior
+                    .covariance
+                    .select(&observed_points, &observed_points),
+                with_all: term.prior.covariance.select(&every, &observed_points),
+                points: observed_points,
                 scale: term.prior.scale,
             });
         }
@@ -104,9 +107,9 @@ impl ObservedDifferences {
         mean.iter().all(|v| v.is_finite()).then_some(mean)
     }
 
-    /// Fit of the differences for some scales, from which the likelihood of the scales follows.
+    /// Marginal likelihood of some scales.
     #[must_use]
-    pub fn fit(&self, scales: &[Scale], least: f64) -> Option<Fit> {
+    pub fn marginal_likelihood(&self, scales: &[Scale], least: f64) -> Option<MarginalLikelihood> {
         let Information { matrix, vector } = &self.information;
         let root = self.root(scales, least);
         let mut halves = root.left(matrix);
@@ -115,7 +118,7 @@ impl ObservedDifferences {
         let mut seen = root.left_of(vector);
         lower.solve_lower_triangular_mut(&mut seen);
         let log_determinant: f64 = lower.diagonal().iter().map(|d| d.ln()).sum();
-        Some(Fit {
+        Some(MarginalLikelihood {
             value: log_determinant - 0.5 * seen.norm_squared(),
             innovation: vector - halves.tr_mul(&seen),
             information: matrix - square(&halves),
@@ -123,9 +126,9 @@ impl ObservedDifferences {
     }
 }
 
-/// Likelihood of scales, and the vectors and matrices from which its derivatives follow.
+/// Marginal likelihood of scales, and the vectors and matrices from which its derivatives follow.
 #[derive(Clone, Debug)]
-pub struct Fit {
+pub struct MarginalLikelihood {
     /// Minus the log of the marginal likelihood, without constants.
     pub value: f64,
     /// Innovation a = η − Λ P η, in the symbols of [`scales`](super::scales).

@@ -23,9 +23,9 @@ use super::posterior::Gaussian;
 use super::scale_prior::{DEVIATION_OF_LOG_SIZE, Scale};
 use super::scales::{LEAST_VARIANCE, logarithms_of, negative_log_posterior, scales_of};
 
-/// Least eigenvalue of H that is used, so that points stay where the prior allows scales. The widest
-/// prior of a scale alone gives 1/`DEVIATION_OF_LOG_SIZE`² = 1.56; the limit is 4 % below it, so it acts only
-/// where the data make H less curved than the prior.
+/// Least eigenvalue of H that is used, so that points stay where the prior allows scales. A scale's
+/// widest prior alone has the curvature 1/`DEVIATION_OF_LOG_SIZE`² = 1.56. The limit is 4 % lower.
+/// It therefore acts only where the data flatten H below the prior's curvature.
 const LEAST_CURVATURE: f64 = 1.5;
 const _: () = assert!(LEAST_CURVATURE < 1.0 / (DEVIATION_OF_LOG_SIZE * DEVIATION_OF_LOG_SIZE));
 
@@ -50,7 +50,7 @@ pub fn add_open_scales(observed: &ObservedDifferences, scales: &[Scale], posteri
         };
         let (above, below) = (above - &centre, below - &centre);
         let squares = &above * above.transpose() + &below * below.transpose();
-        let mut own = posterior.covariance.view_mut((0, 0), (n, n));
-        own += squares * OUTER;
+        let mut of_differences = posterior.covariance.view_mut((0, 0), (n, n));
+        of_differences += squares * OUTER;
     }
 }

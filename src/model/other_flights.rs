@@ -1,6 +1,6 @@
 //! Posterior of all flights but one.
 //!
-//! Let (m, P) be mean and covariance of the posterior from all flights, and y, A and Σ the
+//! Let (m, P) be mean and covariance of the posterior from all flights. Let y, A and Σ be the
 //! differences, rows and error covariance of the flight to be left out ([`FlightData`]). With K = Σ
 //! − A P Aᵀ, the posterior of the other flights has
 //!

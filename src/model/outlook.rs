@@ -17,14 +17,14 @@ use nalgebra::{DMatrix, DVector};
 
 use super::campaign_model::Model;
 use super::coefficient::{CoefficientPosterior, Data};
-use super::evidence::{Evidence, in_order};
+use super::evidence::{ManeuverResults, in_order};
 use super::local::{LocalValue, local_shares};
 use super::observation::Observation;
 use super::posterior::{gaussian, information};
 use super::settings::Settings;
 use super::term::{PosteriorTerm, TermSources, between_points};
 use super::unknowns::{SparseRow, Unknowns, covariance_between, is_of_campaign};
-use crate::aero::{Buildup, Condition, WindTunnel};
+use crate::aero::{AeroModel, Condition, WindTunnel};
 use crate::numerics::root::EXACT;
 use crate::output_error::error_effect::SharedError;
 
@@ -67,20 +67,20 @@ pub struct Outlook {
 
 impl Model {
     /// Outlook of each coefficient on planned maneuvers of one flight and on points. `evidence`,
-    /// `buildup`, `tunnel` and `settings` must be the ones from which the posterior was made. A
+    /// `aero_model`, `tunnel` and `settings` must be the ones from which the posterior was made. A
     /// coefficient whose covariance is not finite is left out.
     #[must_use]
     pub fn outlook(
         &self,
-        (evidence, planned): (&[Evidence], &[Evidence]),
+        (evidence, planned): (&[ManeuverResults], &[ManeuverResults]),
         points: &[OutlookPoint],
-        (buildup, tunnel): (&Buildup, &WindTunnel),
+        (aero_model, tunnel): (&AeroModel, &WindTunnel),
         settings: &Settings,
     ) -> Vec<Outlook> {
         let evidence = in_order(evidence);
         let tunnel = tunnel.clamped();
         let basis = TermSources {
-            buildup,
+            aero_model,
             tunnel: &tunnel,
             settings,
         };
@@ -96,8 +96,9 @@ impl Model {
     pub fn breakpoints_deg(&self, derivative: &str) -> Option<(&'static str, &[f64])> {
         let all = self.coefficients.iter();
         let mut terms = all.flat_map(|(_, posterior)| &posterior.terms);
-        let own = |t: &&PosteriorTerm| t.prior.name == derivative || t.derivative == derivative;
-        let term = terms.find(own)?;
+        let is_derivative =
+            |t: &&PosteriorTerm| t.prior.name == derivative || t.derivative == derivative;
+        let term = terms.find(is_derivative)?;
         Some((term.unit, &term.breakpoints_deg))
     }
 
@@ -112,7 +113,7 @@ impl Model {
 impl CoefficientPosterior {
     fn outlook(
         &self,
-        (evidence, planned): (&[Evidence], &[Evidence]),
+        (evidence, planned): (&[ManeuverResults], &[ManeuverResults]),
         points: &[OutlookPoint],
         basis: &TermSources,
     ) -> Option<Outlook> {
@@ -169,8 +170,8 @@ impl CoefficientPosterior {
         }
         let differences = (unknowns.differences, unknowns.differences);
         let published = self.gaussian.covariance.view((0, 0), differences);
-        let mut own = covariance.view_mut((0, 0), differences);
-        own += positive(&(published - &own));
+        let mut of_differences = covariance.view_mut((0, 0), differences);
+        of_differences += positive(&(published - &of_differences));
         Some(covariance)
     }
 
@@ -226,8 +227,10 @@ impl CoefficientPosterior {
         let mut row = SparseRow::new();
         for (value, weight) in values {
             let mut terms = self.terms.iter().zip(&unknowns.starts);
-            let own = terms.find(|(term, _)| term.derivative == value.derivative);
-            let Some((term, start)) = own else { continue };
+            let term_and_start = terms.find(|(term, _)| term.derivative == value.derivative);
+            let Some((term, start)) = term_and_start else {
+                continue;
+            };
             let shares = local_shares(term, condition, value.is_mach_slope).unwrap_or_default();
             let shares = shares.into_iter();
             row.extend(shares.map(|(node, share)| (start + node, weight * share)));

@@ -35,8 +35,8 @@ pub fn information(flights: &[FlightData], weights: &[f64], unknowns: usize) -> 
 
 /// Posterior of the unknowns for a prior covariance given by its root R.
 ///
-/// With the information matrix Λ and vector η of the data ([`Information`]), the prior covariance R
-/// Rᵀ gives the posterior covariance P = R (I + Rᵀ Λ R)⁻¹ Rᵀ and the mean P η.
+/// Let Λ and η be the information matrix and vector of the data ([`Information`]). With the prior
+/// covariance R Rᵀ, the posterior covariance is P = R (I + Rᵀ Λ R)⁻¹ Rᵀ and the mean P η.
 pub struct SolvedPosterior<'a> {
     root: &'a BlockRoot,
     /// Cholesky factor L of I + Rᵀ Λ R = L Lᵀ.
@@ -102,11 +102,11 @@ pub fn gaussian(root: &BlockRoot, information: &Information) -> Option<Gaussian>
 pub fn of_differences(information: &Information, unknowns: &Unknowns) -> Option<Information> {
     let (n, all) = (unknowns.differences, unknowns.count);
     let (matrix, vector) = (&information.matrix, &information.vector);
-    let own = Information {
+    let of_others = Information {
         matrix: matrix.view((n, n), (all - n, all - n)).into_owned(),
         vector: vector.rows(n, all - n).into_owned(),
     };
-    let others = gaussian(&unknowns.root_of_others(EXACT), &own)?;
+    let others = gaussian(&unknowns.root_of_others(EXACT), &of_others)?;
     let cross = matrix.view((0, n), (n, all - n));
     Some(Information {
         matrix: matrix.view((0, 0), (n, n)) - cross * &others.covariance * cross.transpose(),
@@ -117,7 +117,7 @@ pub fn of_differences(information: &Information, unknowns: &Unknowns) -> Option<
 /// Differences of rows that were left out from their prediction by the other rows, with the
 /// covariance of these differences.
 #[derive(Clone, Debug)]
-pub struct LeftOut {
+pub struct LeaveOneOutDifference {
     pub differences: DVector<f64>,
     pub covariance: DMatrix<f64>,
 }
@@ -133,25 +133,29 @@ pub struct LeftOut {
 /// | F = A P Aᵀ | covariance of the fitted values A m |
 /// | V | covariance of y less its prediction from the other data |
 ///
-/// If the flight is left out, y less its prediction has the precision V⁻¹ = Σ⁻¹ − Σ⁻¹ F Σ⁻¹ and the
-/// value V Σ⁻¹ r. If only some of its rows are left out, their blocks of V⁻¹ and Σ⁻¹ r replace the
-/// whole ones.
+/// With the flight left out, the difference between y and its prediction has the precision V⁻¹ =
+/// Σ⁻¹ − Σ⁻¹ F Σ⁻¹ and the value V Σ⁻¹ r. If only some of its rows are left out, their blocks of
+/// V⁻¹ and Σ⁻¹ r replace the whole ones.
 #[derive(Clone, Debug)]
-pub struct LeavingOut {
+pub struct LeaveOneOut {
     /// Precision V⁻¹.
     precision: DMatrix<f64>,
     /// Weighted residual Σ⁻¹ r.
     weighted: DVector<f64>,
 }
 
-impl LeavingOut {
+impl LeaveOneOut {
     /// Prepares the predictions for a flight; `None` unless its covariances are positive definite.
     #[must_use]
-    pub fn new(flight: &FlightData, weights: &[f64], all_flights: &Gaussian) -> Option<LeavingOut> {
+    pub fn new(
+        flight: &FlightData,
+        weights: &[f64],
+        all_flights: &Gaussian,
+    ) -> Option<LeaveOneOut> {
         let (predicted, predicted_covariance) =
             flight.image(&all_flights.mean, &all_flights.covariance);
         let inverse = flight.cholesky(weights)?.inverse();
-        Some(LeavingOut {
+        Some(LeaveOneOut {
             precision: &inverse - &inverse * predicted_covariance * &inverse,
             weighted: inverse * (&flight.differences - predicted),
         })
@@ -159,17 +163,17 @@ impl LeavingOut {
 
     /// Difference of all rows of the flight from their prediction by the other flights.
     #[must_use]
-    pub fn flight(&self) -> Option<LeftOut> {
+    pub fn flight(&self) -> Option<LeaveOneOutDifference> {
         self.rows(&(0..self.weighted.len()))
     }
 
     /// Difference of some rows from their prediction by all other rows.
     #[must_use]
-    pub fn rows(&self, rows: &Range<usize>) -> Option<LeftOut> {
-        let own = (rows.start, rows.start);
-        let own = self.precision.view(own, (rows.len(), rows.len()));
-        let covariance = Cholesky::new(own.into_owned())?.inverse();
-        Some(LeftOut {
+    pub fn rows(&self, rows: &Range<usize>) -> Option<LeaveOneOutDifference> {
+        let start = (rows.start, rows.start);
+        let precision = self.precision.view(start, (rows.len(), rows.len()));
+        let covariance = Cholesky::new(precision.into_owned())?.inverse();
+        Some(LeaveOneOutDifference {
             differences: &covariance * self.weighted.rows_range(rows.clone()),
             covariance,
         })
@@ -191,7 +195,7 @@ pub fn reweighted(
 ) -> Vec<f64> {
     let mut next = weights.to_vec();
     for flight in flights {
-        let Some(leaving_out) = LeavingOut::new(flight, weights, all_flights) else {
+        let Some(leaving_out) = LeaveOneOut::new(flight, weights, all_flights) else {
             continue;
         };
         for (i, (place, rows)) in flight.maneuvers.iter().enumerate() {
@@ -209,13 +213,18 @@ pub fn reweighted(
     next
 }
 
-/// Prior covariance of the differences.
+/// Prior covariance of the differences of all terms.
 #[must_use]
-pub fn prior(unknowns: &Unknowns, terms: &[PosteriorTerm], scales: &[Scale]) -> DMatrix<f64> {
-    let mut joined = DMatrix::zeros(unknowns.differences, unknowns.differences);
+pub fn prior_covariance_of_terms(
+    unknowns: &Unknowns,
+    terms: &[PosteriorTerm],
+    scales: &[Scale],
+) -> DMatrix<f64> {
+    let mut all = DMatrix::zeros(unknowns.differences, unknowns.differences);
     for ((term, scale), &start) in terms.iter().zip(scales).zip(&unknowns.starts) {
-        let own = term.prior.covariance.for_scale(scale);
-        joined.view_mut((start, start), own.shape()).copy_from(&own);
+        let covariance = term.prior.covariance.for_scale(scale);
+        all.view_mut((start, start), covariance.shape())
+            .copy_from(&covariance);
     }
-    joined
+    all
 }

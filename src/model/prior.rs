@@ -21,7 +21,7 @@
 use nalgebra::DMatrix;
 
 use super::grid::{Grid, Node};
-use super::prior_covariance::{PriorCovariance, fading, variance_factor};
+use super::prior_covariance::{PriorCovariance, matern_3_2, variance_factor};
 use super::scale_prior::{Scale, ScalePrior};
 use crate::aero::Condition;
 use crate::tables::PriorSource;
@@ -64,8 +64,8 @@ impl DerivativePrior {
             PriorSource::Magnitude => table.size * table.size,
         };
         let across = |a: &Node, b: &Node| {
-            fading_between(a.mach, b.mach, &grid.machs)
-                * fading_between(a.third, b.third, &grid.thirds)
+            matern_3_2_between(a.mach, b.mach, &grid.machs)
+                * matern_3_2_between(a.third, b.third, &grid.thirds)
         };
         let covariance = PriorCovariance {
             shape: DMatrix::from_fn(n, n, shape),
@@ -96,14 +96,14 @@ impl DerivativePrior {
             ..
         } = &self.covariance;
         let correlation = |alpha_deg: f64, i: usize| {
-            fading((alpha_deg - nodes[i].alpha_deg).abs() / scale.length_deg)
+            matern_3_2((alpha_deg - nodes[i].alpha_deg).abs() / scale.length_deg)
         };
         let (mut line, mut cross, mut shape) = (0.0, 0.0, 0.0);
         for &(i, share) in &shares {
             cross += share * correlation(at.alpha_deg, i);
             for &(j, other) in &shares {
-                let fading = correlation(nodes[j].alpha_deg, i) * across[(i, j)];
-                line += share * other * fading;
+                let between = correlation(nodes[j].alpha_deg, i) * across[(i, j)];
+                line += share * other * between;
                 shape += share * other * shapes[(i, j)];
             }
         }
@@ -111,13 +111,13 @@ impl DerivativePrior {
     }
 }
 
-fn fading_between(a: Option<f64>, b: Option<f64>, points: &[f64]) -> f64 {
+fn matern_3_2_between(a: Option<f64>, b: Option<f64>, points: &[f64]) -> f64 {
     let range = points
         .last()
         .zip(points.first())
         .map(|(high, low)| high - low);
     match (a, b, range) {
-        (Some(a), Some(b), Some(range)) if range > 0.0 => fading((a - b).abs() / range),
+        (Some(a), Some(b), Some(range)) if range > 0.0 => matern_3_2((a - b).abs() / range),
         _ => 1.0,
     }
 }

@@ -49,8 +49,8 @@ impl PriorCovariance {
     pub fn for_scale(&self, scale: &Scale) -> DMatrix<f64> {
         let factor = variance_factor(scale);
         self.for_each_pair(|at| {
-            let fading = fading(self.distance[at] / scale.length_deg) * self.across[at];
-            factor * self.shape[at] * (fading + OFFSET)
+            let correlation = matern_3_2(self.distance[at] / scale.length_deg) * self.across[at];
+            factor * self.shape[at] * (correlation + OFFSET)
         })
     }
 
@@ -61,12 +61,13 @@ impl PriorCovariance {
         let factor = variance_factor(scale);
         let r = self.distance.map(|d| 3f64.sqrt() * d / scale.length_deg);
         let faded = r.map(|r| (-r).exp());
-        let fading = |at| factor * self.shape[at] * self.across[at] * faded[at];
+        let covariance = |at| factor * self.shape[at] * self.across[at] * faded[at];
         let offset = |at| factor * self.shape[at] * OFFSET;
         CovarianceSlopes {
-            value: self.for_each_pair(|at| fading(at) * (1.0 + r[at]) + offset(at)),
-            by_length: self.for_each_pair(|at| fading(at) * r[at] * r[at]),
-            by_length_twice: self.for_each_pair(|at| fading(at) * r[at] * r[at] * (r[at] - 2.0)),
+            value: self.for_each_pair(|at| covariance(at) * (1.0 + r[at]) + offset(at)),
+            by_length: self.for_each_pair(|at| covariance(at) * r[at] * r[at]),
+            by_length_twice: self
+                .for_each_pair(|at| covariance(at) * r[at] * r[at] * (r[at] - 2.0)),
         }
     }
 
@@ -76,8 +77,8 @@ impl PriorCovariance {
     }
 }
 
-/// Factor of `shape` for a size s: s² over the correlation 1 + `OFFSET` at distance zero, so that
-/// the variance at a point is s² times its shape.
+/// Factor of `shape` for a size s: s² over the correlation 1 + `OFFSET` at distance zero. The
+/// variance at a point is thus s² times its shape.
 #[must_use]
 pub fn variance_factor(scale: &Scale) -> f64 {
     scale.size * scale.size / (1.0 + OFFSET)
@@ -85,7 +86,7 @@ pub fn variance_factor(scale: &Scale) -> f64 {
 
 /// Matérn correlation of order 3/2 at a distance over its length.
 #[must_use]
-pub fn fading(distance: f64) -> f64 {
+pub fn matern_3_2(distance: f64) -> f64 {
     let r = 3f64.sqrt() * distance;
     (1.0 + r) * (-r).exp()
 }

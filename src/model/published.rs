@@ -91,8 +91,8 @@ impl CoefficientPosterior {
                 0.0
             }
         };
-        let both = first.rows.iter().zip(&second.rows);
-        both.map(correlation).sum::<f64>() / first.rows.len().max(1) as f64
+        let pairs = first.rows.iter().zip(&second.rows);
+        pairs.map(correlation).sum::<f64>() / first.rows.len().max(1) as f64
     }
 
     /// Number of maneuvers that estimate a term within its length of an angle of attack.

@@ -3,8 +3,8 @@
 use nalgebra::DMatrix;
 
 use super::coefficient::CoefficientPosterior;
-use super::evidence::Evidence;
-use super::posterior::prior;
+use super::evidence::ManeuverResults;
+use super::posterior::prior_covariance_of_terms;
 use super::published::PublishedDerivative;
 use super::self_check::Agreement;
 use super::unknowns::covariance_between;
@@ -38,10 +38,14 @@ impl CoefficientTables {
 impl CoefficientPosterior {
     /// Rows of all tables.
     #[must_use]
-    pub fn rows(&self, coefficient: Coefficient, evidence: &[Evidence]) -> CoefficientTables {
+    pub fn rows(
+        &self,
+        coefficient: Coefficient,
+        evidence: &[ManeuverResults],
+    ) -> CoefficientTables {
         let alphas: Vec<f64> = evidence.iter().map(|e| e.maneuver.alpha_deg).collect();
         let quantities = self.quantities();
-        let before = prior(&self.unknowns, &self.terms, &self.scales);
+        let before = prior_covariance_of_terms(&self.unknowns, &self.terms, &self.scales);
         let posterior = quantities
             .iter()
             .flat_map(|q| self.posterior(q, &before, &alphas));
@@ -62,10 +66,11 @@ impl CoefficientPosterior {
     ) -> Vec<PosteriorRow> {
         let values = self.values(quantity);
         let row = |i: usize| {
-            let (node, own) = (&quantity.nodes[i], &quantity.rows[i]);
-            let variance = covariance_between(own, own, &self.gaussian.covariance).max(0.0);
+            let (node, row_of_node) = (&quantity.nodes[i], &quantity.rows[i]);
+            let variance =
+                covariance_between(row_of_node, row_of_node, &self.gaussian.covariance).max(0.0);
             let deviation = variance.sqrt();
-            let known = covariance_between(own, own, before);
+            let prior_variance = covariance_between(row_of_node, row_of_node, before);
             PosteriorRow {
                 derivative: quantity.name.clone(),
                 unit: quantity.unit.to_owned(),
@@ -77,8 +82,9 @@ impl CoefficientPosterior {
                 lower_95: values[i] - NORMAL_95 * deviation,
                 upper_95: values[i] + NORMAL_95 * deviation,
                 wind_tunnel: quantity.has_tunnel.then_some(quantity.tunnel[i]),
-                prior_deviation: known.sqrt(),
-                flight_share_pct: (known > 0.0).then(|| 100.0 * (1.0 - variance / known).max(0.0)),
+                prior_deviation: prior_variance.sqrt(),
+                flight_share_pct: (prior_variance > 0.0)
+                    .then(|| 100.0 * (1.0 - variance / prior_variance).max(0.0)),
                 maneuvers: self.maneuvers_near(quantity.term, alphas_deg, node.alpha_deg),
             }
         };
@@ -114,20 +120,21 @@ impl CoefficientPosterior {
     }
 
     fn scale_rows(&self) -> Vec<ScaleRow> {
-        let both = self.terms.iter().zip(&self.scales);
-        both.map(|(term, scale)| ScaleRow {
-            derivative: term.prior.name.clone(),
-            knowledge: term.prior.source,
-            size: scale.size,
-            length_deg: scale.length_deg,
-        })
-        .collect()
+        let pairs = self.terms.iter().zip(&self.scales);
+        pairs
+            .map(|(term, scale)| ScaleRow {
+                derivative: term.prior.name.clone(),
+                knowledge: term.prior.source,
+                size: scale.size,
+                length_deg: scale.length_deg,
+            })
+            .collect()
     }
 
     fn contributions(
         &self,
         coefficient: Coefficient,
-        evidence: &[Evidence],
+        evidence: &[ManeuverResults],
     ) -> Vec<ContributionRow> {
         let row = |(place, weight): (&usize, &f64)| {
             let maneuver = evidence[*place].maneuver;

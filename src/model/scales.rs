@@ -33,7 +33,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::observed_differences::{Fit, ObservedDifferences, ObservedTerm};
+use super::observed_differences::{MarginalLikelihood, ObservedDifferences, ObservedTerm};
 use super::scale_prior::Scale;
 use super::term::PosteriorTerm;
 use crate::numerics::minimise::{LocalExpansion, minimum};
@@ -91,23 +91,23 @@ pub fn negative_log_posterior(
     scales: &[Scale],
     least: f64,
 ) -> Option<LocalExpansion> {
-    let fit = observed.fit(scales, least)?;
-    let both = observed.terms.iter().zip(scales);
-    let changes: Vec<TermDerivatives> = both
-        .map(|(t, s)| TermDerivatives::new(t, s, &fit))
+    let likelihood = observed.marginal_likelihood(scales, least)?;
+    let pairs = observed.terms.iter().zip(scales);
+    let changes: Vec<TermDerivatives> = pairs
+        .map(|(t, s)| TermDerivatives::new(t, s, &likelihood))
         .collect();
     let n = 2 * changes.len();
     let mut local = LocalExpansion {
-        value: fit.value,
+        value: likelihood.value,
         gradient: DVector::zeros(n),
         curvature: DMatrix::zeros(n, n),
         expected: DMatrix::zeros(n, n),
     };
-    for (i, (own, scale)) in changes.iter().zip(scales).enumerate() {
+    for (i, (term, scale)) in changes.iter().zip(scales).enumerate() {
         for (j, other) in changes[..=i].iter().enumerate() {
-            own.add_pair(other, &fit, (2 * i, 2 * j), &mut local);
+            term.add_pair(other, &likelihood, (2 * i, 2 * j), &mut local);
         }
-        own.add_single(scale, 2 * i, &mut local);
+        term.add_single(scale, 2 * i, &mut local);
     }
     let LocalExpansion {
         value, curvature, ..
@@ -128,13 +128,17 @@ struct TermDerivatives<'a> {
 }
 
 impl<'a> TermDerivatives<'a> {
-    fn new(term: &'a ObservedTerm, scale: &Scale, fit: &Fit) -> TermDerivatives<'a> {
+    fn new(
+        term: &'a ObservedTerm,
+        scale: &Scale,
+        likelihood: &MarginalLikelihood,
+    ) -> TermDerivatives<'a> {
         let slopes = term.covariance.slopes(scale);
         let (start, n) = (term.start, term.len());
-        let columns = fit.information.columns(start, n);
-        let own = columns.rows(start, n);
-        let a = fit.innovation.rows(start, n);
-        let half = |c: &DMatrix<f64>| 0.5 * own.dot(c) - 0.5 * a.dot(&(c * a));
+        let columns = likelihood.information.columns(start, n);
+        let of_term = columns.rows(start, n);
+        let a = likelihood.innovation.rows(start, n);
+        let half = |c: &DMatrix<f64>| 0.5 * of_term.dot(c) - 0.5 * a.dot(&(c * a));
         let halves = [&slopes.value, &slopes.by_length, &slopes.by_length_twice].map(half);
         TermDerivatives {
             information_changes: [2.0 * columns * &slopes.value, columns * &slopes.by_length],
@@ -149,16 +153,16 @@ impl<'a> TermDerivatives<'a> {
     fn add_pair(
         &self,
         other: &TermDerivatives,
-        fit: &Fit,
+        likelihood: &MarginalLikelihood,
         (i, j): (usize, usize),
         local: &mut LocalExpansion,
     ) {
-        let (own, before) = (self.term, other.term);
-        let at = (own.start, before.start);
-        let between = fit.information.view(at, (own.len(), before.len()));
+        let (term, earlier) = (self.term, other.term);
+        let at = (term.start, earlier.start);
+        let between = likelihood.information.view(at, (term.len(), earlier.len()));
         for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            let image = other.information_changes[b].rows(own.start, own.len());
-            let back = self.information_changes[a].rows(before.start, before.len());
+            let image = other.information_changes[b].rows(term.start, term.len());
+            let back = self.information_changes[a].rows(earlier.start, earlier.len());
             let trace = 0.5 * image.dot(&back.transpose());
             let square = self.innovation_changes[a].dot(&(between * &other.innovation_changes[b]));
             for place in [(i + a, j + b), (j + b, i + a)] {

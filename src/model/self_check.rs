@@ -4,7 +4,9 @@
 use nalgebra::{Cholesky, DVector};
 
 use super::flight_data::FlightData;
-use super::posterior::{Gaussian, LeavingOut, LeftOut, SolvedPosterior, information};
+use super::posterior::{
+    Gaussian, LeaveOneOut, LeaveOneOutDifference, SolvedPosterior, information,
+};
 use crate::numerics::normal::NORMAL_95;
 use crate::numerics::root::BlockRoot;
 
@@ -27,13 +29,13 @@ impl std::ops::AddAssign for Agreement {
     }
 }
 
-impl LeftOut {
+impl LeaveOneOutDifference {
     /// Agreement of the rows with their joint prediction.
     #[must_use]
     pub fn agreement(&self) -> Agreement {
         let variances = self.covariance.diagonal();
-        let both = self.differences.iter().zip(variances.iter());
-        let inside = both.filter(|(d, variance)| d.abs() <= NORMAL_95 * variance.sqrt());
+        let pairs = self.differences.iter().zip(variances.iter());
+        let inside = pairs.filter(|(d, variance)| d.abs() <= NORMAL_95 * variance.sqrt());
         let log_density = Cholesky::new(self.covariance.clone()).map_or(f64::NEG_INFINITY, |c| {
             let square = self.differences.dot(&c.solve(&self.differences));
             let roots: f64 = c.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
@@ -51,7 +53,7 @@ impl LeftOut {
 /// Agreement of a flight with the other flights.
 #[must_use]
 pub fn flight(data: &FlightData, weights: &[f64], all_flights: &Gaussian) -> Option<Agreement> {
-    let left_out = LeavingOut::new(data, weights, all_flights)?.flight()?;
+    let left_out = LeaveOneOut::new(data, weights, all_flights)?.flight()?;
     Some(left_out.agreement())
 }
 
@@ -71,14 +73,14 @@ pub fn maneuvers(
     let rest = SolvedPosterior::new(root, &sums)?;
     let mut sum = Agreement::default();
     for flight in flights {
-        let own = flight.of_maneuvers(&is_left_out);
-        if own.rows.is_empty() {
+        let left_out = flight.of_maneuvers(&is_left_out);
+        if left_out.rows.is_empty() {
             continue;
         }
-        let (predicted, predicted_covariance) = rest.image(&own, &sums);
-        let differences: DVector<f64> = &own.differences - predicted;
-        let covariance = predicted_covariance + own.covariance(weights);
-        let prediction = LeftOut {
+        let (predicted, predicted_covariance) = rest.image(&left_out, &sums);
+        let differences: DVector<f64> = &left_out.differences - predicted;
+        let covariance = predicted_covariance + left_out.covariance(weights);
+        let prediction = LeaveOneOutDifference {
             differences,
             covariance,
         };

@@ -6,12 +6,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::evidence::Evidence;
+use super::evidence::ManeuverResults;
 use super::grid::{Grid, refined};
 use super::prior::{DerivativePrior, TableOnGrid};
 use super::scale_prior::Scale;
 use super::settings::Settings;
-use crate::aero::{Buildup, Coefficient, Condition, Derivative, Regressor, WindTunnel};
+use crate::aero::{AeroModel, Coefficient, Condition, Derivative, Regressor, WindTunnel};
 use crate::maneuver::Status;
 use crate::numerics::order_statistics::median;
 use crate::tables::PriorSource;
@@ -38,8 +38,8 @@ pub fn between_points(
     design: &DMatrix<f64>,
     condition: &Condition,
 ) -> DMatrix<f64> {
-    let both = terms.iter().zip(scales);
-    let variances = both.map(|(t, s)| t.prior.variance_between_points(s, condition));
+    let pairs = terms.iter().zip(scales);
+    let variances = pairs.map(|(t, s)| t.prior.variance_between_points(s, condition));
     let variances = DVector::from_iterator(terms.len(), variances);
     design * DMatrix::from_diagonal(&variances) * design.transpose()
 }
@@ -47,7 +47,7 @@ pub fn between_points(
 /// Data from which the terms follow.
 #[derive(Clone, Copy, Debug)]
 pub struct TermSources<'a> {
-    pub buildup: &'a Buildup,
+    pub aero_model: &'a AeroModel,
     /// Tunnel, constant beyond its ends.
     pub tunnel: &'a WindTunnel,
     pub settings: &'a Settings,
@@ -56,9 +56,13 @@ pub struct TermSources<'a> {
 impl TermSources<'_> {
     /// Terms of a coefficient, in the order of the model.
     #[must_use]
-    pub fn terms(&self, coefficient: Coefficient, evidence: &[Evidence]) -> Vec<PosteriorTerm> {
+    pub fn terms(
+        &self,
+        coefficient: Coefficient,
+        evidence: &[ManeuverResults],
+    ) -> Vec<PosteriorTerm> {
         let of_coefficient = |d: &&Derivative| d.coefficient == coefficient;
-        let derivatives = self.buildup.derivatives.iter().filter(of_coefficient);
+        let derivatives = self.aero_model.derivatives.iter().filter(of_coefficient);
         let alphas = self.alphas_deg(coefficient, evidence);
         derivatives
             .filter_map(|derivative| self.term(derivative, &alphas, evidence))
@@ -68,15 +72,17 @@ impl TermSources<'_> {
     /// Upper limit of the number of points of a coefficient's grids, found without making the
     /// grids.
     #[must_use]
-    pub fn count_points(&self, coefficient: Coefficient, evidence: &[Evidence]) -> usize {
-        let derivatives = self.buildup.derivatives.iter();
+    pub fn count_points(&self, coefficient: Coefficient, evidence: &[ManeuverResults]) -> usize {
+        let derivatives = self.aero_model.derivatives.iter();
         let alphas = self.alphas_deg(coefficient, evidence).len();
         derivatives
             .filter(|derivative| derivative.coefficient == coefficient)
             .map(|derivative| {
-                let sums = self.buildup.combined.iter();
-                let own = sums.filter(|sum| sum.constant == derivative.name);
-                let names = own.map(|sum| &sum.name).chain([&derivative.name]);
+                let sums = self.aero_model.combined.iter();
+                let sums_of_constant = sums.filter(|sum| sum.constant == derivative.name);
+                let names = sums_of_constant
+                    .map(|sum| &sum.name)
+                    .chain([&derivative.name]);
                 let tables = names.map(|name| {
                     let (machs, thirds) = (self.tunnel.machs(name), self.tunnel.thirds(name));
                     machs.len().max(1).saturating_mul(thirds.len().max(1))
@@ -88,41 +94,39 @@ impl TermSources<'_> {
 
     /// Angles of attack of a coefficient's grids: the breakpoints of its tables, the flown range, and
     /// points between.
-    fn alphas_deg(&self, coefficient: Coefficient, evidence: &[Evidence]) -> Vec<f64> {
-        let names = self.buildup.derivatives.iter();
-        let names = names
-            .filter(|d| d.coefficient == coefficient)
-            .map(|d| &d.name)
-            .chain(self.buildup.combined.iter().map(|c| &c.name).filter(|sum| {
-                let constant = self.buildup.combined.iter().find(|c| c.name == **sum);
-                let constant = constant.and_then(|c| self.buildup.derivative(&c.constant));
-                constant.is_some_and(|d| d.coefficient == coefficient)
-            }));
+    fn alphas_deg(&self, coefficient: Coefficient, evidence: &[ManeuverResults]) -> Vec<f64> {
+        let names = self.table_names(coefficient);
         let tabulated: Vec<f64> = names
             .flat_map(|name| self.tunnel.alphas_deg(name))
             .collect();
-        let axis = coefficient.axis();
-        let own = evidence.iter().filter(|e| e.maneuver.axis == axis);
-        let flown = || own.clone().map(|e| e.maneuver.alpha_deg);
-        // Beyond the tables a whole step encloses the outermost maneuver.
         let step = self.settings.alpha_step_deg;
-        let lowest = flown().reduce(f64::min).map(|a| (a / step).floor() * step);
-        let highest = flown().reduce(f64::max).map(|a| (a / step).ceil() * step);
-        let first = tabulated.iter().copied().reduce(f64::min);
-        let last = tabulated.iter().copied().reduce(f64::max);
-        let below = lowest.filter(|a| first.is_none_or(|first| *a < first));
-        let above = highest.filter(|a| last.is_none_or(|last| *a > last));
+        let [below, above] = beyond_tables(&tabulated, &flown_alphas(coefficient, evidence), step);
         refined(tabulated.into_iter().chain(below).chain(above), step)
+    }
+
+    /// Names of the tables of a coefficient: its derivatives, and the sums with its constant.
+    fn table_names(&self, coefficient: Coefficient) -> impl Iterator<Item = &String> {
+        let is_of_coefficient =
+            move |derivative: &&Derivative| derivative.coefficient == coefficient;
+        let derivatives = self.aero_model.derivatives.iter();
+        let sums = self.aero_model.combined.iter().filter(move |sum| {
+            let constant = self.aero_model.derivative(&sum.constant);
+            constant.is_some_and(|derivative| is_of_coefficient(&derivative))
+        });
+        derivatives
+            .filter(is_of_coefficient)
+            .map(|derivative| &derivative.name)
+            .chain(sums.map(|sum| &sum.name))
     }
 
     fn term(
         &self,
         derivative: &Derivative,
         alphas: &[f64],
-        evidence: &[Evidence],
+        evidence: &[ManeuverResults],
     ) -> Option<PosteriorTerm> {
         let is_constant = derivative.regressor == Regressor::Constant;
-        let sum = self.buildup.combined.iter();
+        let sum = self.aero_model.combined.iter();
         let mut sum = sum.clone().find(|c| c.constant == derivative.name);
         let is_tabulated = |name: &str| self.tunnel.root_mean_square(name) > 0.0;
         if is_tabulated(&derivative.name) && sum.is_some_and(|s| !is_tabulated(&s.name)) {
@@ -147,7 +151,7 @@ impl TermSources<'_> {
         Some(PosteriorTerm {
             derivative: derivative.name.clone(),
             slope: sum.map(|s| s.slope.clone()),
-            unit: self.buildup.unit_of(name)?.name(),
+            unit: self.aero_model.unit_of(name)?.name(),
             prior,
             breakpoints_deg,
         })
@@ -155,7 +159,12 @@ impl TermSources<'_> {
 
     /// Tunnel's table over a grid, and the centre of the difference's relative size. A derivative
     /// without table gets the order of magnitude of its estimates; `None` without estimates.
-    fn table(&self, name: &str, grid: &Grid, evidence: &[Evidence]) -> Option<(TableOnGrid, f64)> {
+    fn table(
+        &self,
+        name: &str,
+        grid: &Grid,
+        evidence: &[ManeuverResults],
+    ) -> Option<(TableOnGrid, f64)> {
         let read = |node: super::grid::Node| self.tunnel.at(name, &node.condition());
         let values: Option<Vec<_>> = grid.nodes().into_iter().map(read).collect();
         let size = self.tunnel.root_mean_square(name);
@@ -183,8 +192,9 @@ impl TermSources<'_> {
         let rows = evidence
             .iter()
             .flat_map(|e| e.estimates.iter().chain(e.combined));
-        let own = rows.filter(|row| row.derivative == name && row.status == Status::Estimated);
-        let size = median(own.filter_map(|row| row.value).map(f64::abs))?;
+        let estimates =
+            rows.filter(|row| row.derivative == name && row.status == Status::Estimated);
+        let size = median(estimates.filter_map(|row| row.value).map(f64::abs))?;
         let table = TableOnGrid {
             source: PriorSource::Magnitude,
             mean: vec![0.0; grid.len()],
@@ -193,4 +203,24 @@ impl TermSources<'_> {
         };
         (size > 0.0).then_some((table, 1.0))
     }
+}
+
+/// Mean angles of attack of the maneuvers on a coefficient's axis.
+fn flown_alphas(coefficient: Coefficient, evidence: &[ManeuverResults]) -> Vec<f64> {
+    let on_axis = evidence
+        .iter()
+        .filter(|e| e.maneuver.axis == coefficient.axis());
+    on_axis.map(|e| e.maneuver.alpha_deg).collect()
+}
+
+/// Points below and above the tabulated angles of attack where maneuvers are flown there: a whole
+/// step encloses the outermost maneuver.
+fn beyond_tables(tabulated: &[f64], flown: &[f64], step: f64) -> [Option<f64>; 2] {
+    let least = |values: &[f64]| values.iter().copied().reduce(f64::min);
+    let largest = |values: &[f64]| values.iter().copied().reduce(f64::max);
+    let lowest = least(flown).map(|a| (a / step).floor() * step);
+    let highest = largest(flown).map(|a| (a / step).ceil() * step);
+    let below = lowest.filter(|a| least(tabulated).is_none_or(|first| *a < first));
+    let above = highest.filter(|a| largest(tabulated).is_none_or(|last| *a > last));
+    [below, above]
 }

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::grid::Grid;
 use super::observation::Observation;
-use super::prior_covariance::fading;
+use super::prior_covariance::matern_3_2;
 use super::scale_prior::Scale;
 use super::term::PosteriorTerm;
 use crate::aero::Condition;
@@ -101,8 +101,8 @@ impl Unknowns {
         for (i, (row, &term)) in rows.iter_mut().zip(&observation.terms).enumerate() {
             let bound = observation.noise[(i, i)].sqrt();
             if let Some(error) = self.classes.get(&(class, term)) {
-                let own = error.grid.shares(&observation.condition).into_iter();
-                row.extend(own.map(|(node, share)| (error.start + node, share * bound)));
+                let shares = error.grid.shares(&observation.condition).into_iter();
+                row.extend(shares.map(|(node, share)| (error.start + node, share * bound)));
             }
             for (error, change) in &observation.calibration {
                 let place = self.campaign.get(error);
@@ -159,7 +159,7 @@ impl Unknowns {
             let alphas = &error.grid.alphas_deg;
             let covariance = DMatrix::from_fn(alphas.len(), alphas.len(), |i, j| {
                 let distance = (alphas[i] - alphas[j]).abs() / CLASS_LENGTH_DEG;
-                self.class_error * self.class_error * fading(distance)
+                self.class_error * self.class_error * matern_3_2(distance)
             });
             blocks.push(root(&covariance, least));
         }

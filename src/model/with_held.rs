@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::campaign_model::Model;
-use super::evidence::Evidence;
+use super::evidence::ManeuverResults;
 use super::held_values::HeldDifferences;
 use super::unknowns::{SparseRow, covariance_between, weighted_sum};
 use crate::aero::Combined;
@@ -22,10 +22,10 @@ use crate::tables::EstimateRow;
 /// other flights.
 #[derive(Clone, Debug)]
 pub struct WithHeld<'a> {
-    evidence: &'a Evidence<'a>,
+    evidence: &'a ManeuverResults<'a>,
     /// Differences of the held derivatives from the tunnel.
     held: BTreeMap<&'a str, f64>,
-    /// Change of each parameter.
+    /// Change of each estimated parameter due to the new held values.
     change: DVector<f64>,
     /// Change of the parameters' covariance.
     covariance: DMatrix<f64>,
@@ -35,7 +35,7 @@ impl Model {
     /// Change of a maneuver's results if the values that it holds are taken from the posterior of
     /// the other flights.
     #[must_use]
-    pub fn with_held<'a>(&'a self, evidence: &'a Evidence<'a>) -> WithHeld<'a> {
+    pub fn with_held<'a>(&'a self, evidence: &'a ManeuverResults<'a>) -> WithHeld<'a> {
         let parameters = evidence.covariance.names.len();
         let mut with = WithHeld {
             evidence,
@@ -57,16 +57,20 @@ impl Model {
 impl<'a> WithHeld<'a> {
     fn add(&mut self, differences: &'a HeldDifferences, effects: &BTreeMap<&str, &ErrorEffect>) {
         let names = || differences.derivatives.iter().map(String::as_str);
-        let own: Vec<&ErrorEffect> = names().filter_map(|n| effects.get(n).copied()).collect();
-        if own.len() != differences.derivatives.len() {
+        let effects_of_held: Vec<&ErrorEffect> =
+            names().filter_map(|n| effects.get(n).copied()).collect();
+        if effects_of_held.len() != differences.derivatives.len() {
             return;
         }
         let change = |e: &ErrorEffect| DVector::from_column_slice(&e.change);
-        let gains: Vec<DVector<f64>> = own.iter().map(|e| change(e) / e.deviation).collect();
+        let gains: Vec<DVector<f64>> = effects_of_held
+            .iter()
+            .map(|e| change(e) / e.deviation)
+            .collect();
         let gains = DMatrix::from_columns(&gains);
         self.change -= &gains * &differences.values;
         self.covariance += &gains * &differences.covariance * gains.transpose();
-        for effect in own {
+        for effect in effects_of_held {
             let change = change(effect);
             self.covariance -= &change * change.transpose();
         }

@@ -104,7 +104,7 @@ fn configuration(config: &Config) -> BTreeMap<Stage, BTreeMap<String, Value>> {
             Stage::Estimate,
             named([
                 ("classes", classes),
-                ("model", value(&config.buildup)),
+                ("model", value(&config.aero_model)),
                 ("estimate", value(estimate)),
                 ("surfaces", value(&estimate.surfaces)),
                 ("joint", value(&estimate.joint)),

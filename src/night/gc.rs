@@ -13,7 +13,7 @@ use crate::store::{ArtefactName, Night, Nights, Store, files};
 
 /// Artefacts and nights that no published night needs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Unneeded {
+pub struct GarbageReport {
     /// Artefacts with their sizes, bytes.
     pub artefacts: BTreeMap<ArtefactName, u64>,
     pub nights: Vec<String>,
@@ -32,13 +32,13 @@ struct ServedReports {
 /// set. The store may serve several folders of reports; the nights of all of them count.
 ///
 /// # Errors
-/// A store in use; reports that cannot be found, or a night whose manifest cannot be read, since
-/// their needs are unknown; a disk that fails.
-pub fn gc(config: &Config, remove: bool, wait: Duration) -> Result<Unneeded> {
+/// A store in use; a disk that fails; reports that cannot be found, or a night whose manifest
+/// cannot be read, because the artefacts they need are unknown.
+pub fn gc(config: &Config, remove: bool, wait: Duration) -> Result<GarbageReport> {
     let store = Store::open(&config.store, wait)?;
     let served = served_reports(config, &store, remove, wait)?;
     let keep = config.report.keep_nights;
-    let mut unneeded = Unneeded::default();
+    let mut unneeded = GarbageReport::default();
     let mut needed: BTreeSet<ArtefactName> = BTreeSet::new();
     for reports in &served {
         let superfluous = if reports.is_own {

@@ -11,7 +11,7 @@ use crate::export::{self, ExportContents, daveml, jsbsim};
 use crate::lineage::Stage;
 use crate::numerics::random::RandomStream;
 use crate::pipeline::{Campaign, Conductor, Progress};
-use crate::store::table::Shelf;
+use crate::store::table::TableFolder;
 use crate::store::{atomic, table};
 
 /// Files and values of an export.
@@ -55,7 +55,7 @@ pub fn export(
     let contents = ExportContents {
         title: &config.title,
         aircraft: &config.aircraft,
-        buildup: &config.buildup,
+        aero_model: &config.aero_model,
         tunnel: &config.tunnel,
         posterior: &campaign.model.rows.posterior,
         correlations: &correlations,
@@ -75,7 +75,7 @@ fn write_draws(
     contents: &ExportContents,
     campaign: &Campaign,
     folder: &Path,
-    shelf: &Shelf,
+    shelf: &TableFolder,
     draws: Draws,
 ) -> Result<Vec<PathBuf>> {
     let mut all = Vec::new();
@@ -104,7 +104,7 @@ fn write(
     contents: &ExportContents,
     campaign: &Campaign,
     folder: &Path,
-    shelf: &Shelf,
+    shelf: &TableFolder,
 ) -> Result<Exported> {
     let tables = export::tables(contents);
     let rows = export::rows(&tables);
@@ -123,7 +123,11 @@ fn write(
     atomic::place(&section, jsbsim::section(contents, &tables).as_bytes())?;
     let tables_of_rows =
         ["flight_updated.csv", "flight_updated.parquet"].map(|name| folder.join(name));
-    let names = contents.buildup.derivatives.iter().map(|d| d.name.clone());
+    let names = contents
+        .aero_model
+        .derivatives
+        .iter()
+        .map(|d| d.name.clone());
     Ok(Exported {
         files: tables_of_rows.into_iter().chain([dml, section]).collect(),
         from_flight: rows.iter().filter(|r| r.is_flight == 1).count(),

@@ -6,7 +6,7 @@ use super::table_metadata::shelf_of_stage;
 use crate::error::Result;
 use crate::lineage::{Lineage, Stage};
 use crate::pipeline::Campaign;
-use crate::store::table::{self, Shelf};
+use crate::store::table::{self, TableFolder};
 use crate::tables::{EstimateRow, FitRow, JointRow, MatchRow, MatchVerdictRow, PredictedRow};
 
 /// Writes the tables of all stages as far as `until` into a folder.
@@ -45,21 +45,21 @@ pub fn publish_tables(
     table::publish(&shelf(until), &campaign.problems)
 }
 
-fn publish_ingest(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
+fn publish_ingest(shelf: &TableFolder, campaign: &Campaign) -> Result<()> {
     table::publish(shelf, &campaign.flight_rows)?;
     table::publish(shelf, &campaign.channels)?;
     table::publish(shelf, &campaign.checks)?;
     table::publish(shelf, &campaign.instruments)
 }
 
-fn publish_segment(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
+fn publish_segment(shelf: &TableFolder, campaign: &Campaign) -> Result<()> {
     table::publish(shelf, &campaign.maneuvers)?;
     table::publish(shelf, &campaign.unknown)?;
     table::publish(shelf, &campaign.events)
 }
 
 /// Publishes the rows of the maneuvers, then the rows of joint estimates.
-fn publish_estimate(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
+fn publish_estimate(shelf: &TableFolder, campaign: &Campaign) -> Result<()> {
     let joined = || campaign.joined.iter().map(|j| &j.estimated);
     let fits: Vec<FitRow> = followed_by(&campaign.fits, joined().map(|e| &e.fit));
     let joint_estimates = joined().flat_map(|e| &e.estimates);
@@ -87,12 +87,12 @@ fn followed_by<'a, T: Clone + 'a>(rows: &[T], others: impl Iterator<Item = &'a T
     all
 }
 
-fn publish_trend(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
+fn publish_trend(shelf: &TableFolder, campaign: &Campaign) -> Result<()> {
     table::publish(shelf, &campaign.outliers)?;
     table::publish(shelf, &campaign.trends)
 }
 
-fn publish_model(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
+fn publish_model(shelf: &TableFolder, campaign: &Campaign) -> Result<()> {
     let rows = &campaign.model.rows;
     table::publish(shelf, &rows.posterior)?;
     table::publish(shelf, &rows.covariance)?;
@@ -102,14 +102,14 @@ fn publish_model(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
     table::publish(shelf, &campaign.lift_and_drag)
 }
 
-fn publish_qualities(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
+fn publish_qualities(shelf: &TableFolder, campaign: &Campaign) -> Result<()> {
     let found = &campaign.qualities;
     table::publish(shelf, &found.qualities)?;
     table::publish(shelf, &found.levels)?;
     table::publish(shelf, &found.roots)
 }
 
-fn publish_match(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
+fn publish_match(shelf: &TableFolder, campaign: &Campaign) -> Result<()> {
     let matched = &campaign.matched;
     let rows: Vec<MatchRow> = matched.iter().flat_map(|m| &m.rows).cloned().collect();
     let verdicts = matched.iter().flat_map(|m| &m.verdicts);
@@ -118,7 +118,7 @@ fn publish_match(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
     table::publish(shelf, &verdicts)
 }
 
-fn publish_compare(shelf: &Shelf, campaign: &Campaign) -> Result<()> {
+fn publish_compare(shelf: &TableFolder, campaign: &Campaign) -> Result<()> {
     table::publish(shelf, &campaign.comparison)?;
     table::publish(shelf, &campaign.maneuver_comparison)?;
     table::publish(shelf, &campaign.verdicts)?;

@@ -115,8 +115,8 @@ impl NightRun<'_> {
         self.conductor.runner.config
     }
 
-    /// The current night, if this run would make the same one: it has this run's lineage, reaches
-    /// as far, and its files and artefacts are whole.
+    /// The current night, if this run would make the same night. It has this run's lineage, reaches
+    /// the same stage, and its files and artefacts are whole.
     fn valid_night(&self) -> Option<Night> {
         let night = self
             .nights

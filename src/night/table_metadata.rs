@@ -8,7 +8,7 @@ use serde::de::DeserializeOwned;
 
 use crate::error::{Error, Result};
 use crate::lineage::{Lineage, Stage};
-use crate::store::table::{self, Shelf};
+use crate::store::table::{self, TableFolder};
 
 const STAGE: &str = "harvest.stage";
 const CODE: &str = "harvest.code";
@@ -18,7 +18,7 @@ const TABLES: &str = "harvest.tables";
 
 /// A folder for the tables of a stage, whose files carry the lineage as far as that stage.
 #[must_use]
-pub fn shelf_of_stage(folder: &Path, lineage: &Lineage, stage: Stage) -> Shelf {
+pub fn shelf_of_stage(folder: &Path, lineage: &Lineage, stage: Stage) -> TableFolder {
     let part = lineage.until(stage);
     let pairs = [
         (STAGE, stage.name().to_owned()),
@@ -28,7 +28,7 @@ pub fn shelf_of_stage(folder: &Path, lineage: &Lineage, stage: Stage) -> Shelf {
         (TABLES, json(&part.tables)),
     ];
     let pairs = pairs.map(|(key, value)| (key.to_owned(), value));
-    Shelf::of(folder).with(pairs.to_vec())
+    TableFolder::of(folder).with(pairs.to_vec())
 }
 
 /// Lineage as text. Only a map whose keys are no strings would fail; a lineage has none.

@@ -146,7 +146,7 @@ struct FileComparison<'a> {
     damaged: Vec<String>,
     /// Files in whose place another file stands in the folder of reports.
     replaced: Vec<String>,
-    /// Tables whose rows differ from those that the artefacts make.
+    /// Tables whose published rows differ from the rows computed from the artefacts.
     other_rows: BTreeSet<String>,
     nights: &'a Nights,
     night: &'a Night,

@@ -1,8 +1,8 @@
 //! Bisection: the place in an interval at which a condition ceases to hold.
 
-/// Interval that remains after a number of halvings. The condition must hold up to some place and fail
-/// beyond it. It holds at the lower end and fails at the upper end, except at an end of the given interval
-/// that no halving has moved: that end is not tested.
+/// Interval that remains after a number of halvings. The condition must hold up to some place and
+/// fail beyond it. It holds at the lower end and fails at the upper end. An end of the given
+/// interval that no halving has moved is not tested.
 #[must_use]
 pub fn last_that_holds(
     interval: (f64, f64),

@@ -257,7 +257,7 @@ impl AlignedMatrix {
     /// Filters each column by 1/A forwards in time, A = 1 + Σ a_j z⁻ʲ.
     pub fn filter_columns(&mut self, coefficients: &[f64]) {
         let width = self.width();
-        Arch::new().dispatch(Filter {
+        Arch::new().dispatch(RecursiveFilter {
             coefficients,
             series: self.values_mut(),
             width,
@@ -268,7 +268,7 @@ impl AlignedMatrix {
     /// Filters each column by 1/A backwards in time.
     pub fn filter_columns_backwards(&mut self, coefficients: &[f64]) {
         let width = self.width();
-        Arch::new().dispatch(Filter {
+        Arch::new().dispatch(RecursiveFilter {
             coefficients,
             series: self.values_mut(),
             width,
@@ -338,20 +338,20 @@ impl WithSimd for Product<'_> {
     }
 }
 
-/// Filter u = s/A of each column in place, starting from zero.
-struct Filter<'a> {
+/// Recursive filter u = s/A of each column in place, starting from zero.
+struct RecursiveFilter<'a> {
     coefficients: &'a [f64],
     series: &'a mut [f64],
     width: usize,
     back: bool,
 }
 
-impl WithSimd for Filter<'_> {
+impl WithSimd for RecursiveFilter<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Filter {
+        let RecursiveFilter {
             coefficients,
             series,
             width,
@@ -495,7 +495,7 @@ mod tests {
         });
         let lagged = simd.vectorize(LaggedProducts { a: &a, b: &product });
         for back in [false, true] {
-            simd.vectorize(Filter {
+            simd.vectorize(RecursiveFilter {
                 coefficients: &[-0.8, 0.3],
                 series: series.values_mut(),
                 width: a.width(),

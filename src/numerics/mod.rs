@@ -1,6 +1,6 @@
-//! Numerical methods that several rooms share: linear algebra and dual numbers, distributions and order
-//! statistics, differences, sums over time and frequency, bisection, roots and minima, random numbers, and the processor's
-//! vectors.
+//! Numerical methods that several modules share: linear algebra and dual numbers, distributions and
+//! order statistics, differences, sums over time and frequency, bisection, roots and minima, random
+//! numbers, and the processor's vectors.
 
 pub mod bisection;
 pub mod chi_squared;

@@ -11,11 +11,11 @@
 //! | [`weighted_median`] | the smaller of the two middle values | ordered |
 //!
 //! Every function returns `None` for no values. The functions on `_in_place` reorder their argument
-//! and allocate nothing; they select in linear time. The upper median of many values is one of
-//! them, so it needs one selection where the mean of the middle two needs a second pass: noise
-//! estimates over thousands of samples use it. Trends use it for the scatter of the median
-//! maneuver, which then belongs to a maneuver and is not the mean of two classes; [`median`] would
-//! change the published scatter.
+//! and allocate nothing; they select in linear time. The upper median of many values is one of the
+//! values. It needs one selection; the mean of the middle two needs a second pass. Noise estimates
+//! over thousands of samples therefore use it. Trends use it for the scatter of the median
+//! maneuver, so that the scatter belongs to one maneuver and is not the mean of two classes.
+//! [`median`] would change the published scatter.
 
 /// Standard deviation of a normal distribution over the median of its absolute deviations: 1/Φ⁻¹(¾).
 pub const SIGMA_PER_MAD: f64 = 1.482_602_218_505_602;

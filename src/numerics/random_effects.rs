@@ -14,8 +14,8 @@ use super::bisection::try_last_that_holds;
 use super::chi_squared;
 use super::normal::NORMAL_90;
 
-/// Halvings of the interval of τ², whose ends are at most a factor of four apart unless τ² is below the
-/// least variance: to 2⁻⁶⁰ of its length, the last digit.
+/// Halvings of the interval of τ²: to 2⁻⁶⁰ of its length, the last digit. The ends are at most a
+/// factor of four apart, unless τ² is below the smallest variance.
 const HALVINGS: usize = 60;
 
 /// Probability that the scatter exceeds its limit.

@@ -1,5 +1,5 @@
-//! Cholesky's method and triangular systems by blocks: most of the work is products of matrices, which
-//! run several times as fast as the columns of the plain methods.
+//! Cholesky's method and triangular systems by blocks. Most of the work is products of matrices,
+//! which run several times as fast as the columns of the plain methods.
 
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 

@@ -7,7 +7,7 @@ use roxmltree::Node;
 use super::elements::{has_class, is_block, is_screen_only, plain_text};
 use super::fonts::Fonts;
 use super::inline_text::{InlineReader, LineLayout, lines};
-use super::item::{INK, Item, Mark, SOFT, Style, indented, joined};
+use super::item::{INK, Item, PlacedMark, SOFT, Style, indented, joined};
 use super::svg;
 use super::table;
 
@@ -21,7 +21,7 @@ const CHAPTER_SIZE: f32 = 13.0;
 const SECTION_SIZE: f32 = 10.5;
 /// Gap between children side by side, pt.
 const PAIR_GAP: f32 = 16.0;
-/// Largest size of a drawing's unit, pt.
+/// Largest scale of a drawing, pt per unit of its coordinates.
 const LARGEST_UNIT: f32 = 1.0;
 const LIST_INDENT: f32 = 11.0;
 const DEFINITION_INDENT: f32 = 90.0;
@@ -84,7 +84,9 @@ impl<'a> Blocks<'a> {
     fn add(&mut self, mut new: Vec<Item>, items: &mut Vec<Item>) {
         if let Some(first) = new.iter_mut().find(|i| !i.is_room) {
             let anchors = self.pending_anchors.drain(..);
-            first.marks.extend(anchors.map(|id| Mark::Anchor { id }));
+            first
+                .marks
+                .extend(anchors.map(|id| PlacedMark::Anchor { id }));
         }
         items.append(&mut new);
     }
@@ -102,7 +104,7 @@ impl<'a> Blocks<'a> {
         }
         if node.tag_name().name() == "nav" {
             items.push(Item {
-                marks: vec![Mark::Contents],
+                marks: vec![PlacedMark::Contents],
                 ..Item::default()
             });
         } else {
@@ -169,9 +171,9 @@ impl<'a> Blocks<'a> {
         }
         if let (Some(first), Some(level)) = (lines.first_mut(), level) {
             let title = plain_text(node);
-            first.marks.push(Mark::Heading { level, title });
+            first.marks.push(PlacedMark::Heading { level, title });
             if level == 0 {
-                first.marks.push(Mark::Fill {
+                first.marks.push(PlacedMark::Fill {
                     x: 0.0,
                     y: -3.0,
                     width,
@@ -190,7 +192,7 @@ impl<'a> Blocks<'a> {
             let lines = self.children(entry, width - LIST_INDENT, style);
             let mut lines = indented(lines, LIST_INDENT);
             if let Some(first) = lines.first_mut() {
-                first.marks.push(Mark::Text {
+                first.marks.push(PlacedMark::Text {
                     x: 2.0,
                     y: style.size * 1.02,
                     style,
@@ -243,7 +245,7 @@ impl<'a> Blocks<'a> {
         self.drawn_height += drawing.height * scale;
         vec![Item {
             height: drawing.height * scale,
-            marks: vec![Mark::Drawing {
+            marks: vec![PlacedMark::Drawing {
                 x: 0.0,
                 y: 0.0,
                 scale,
@@ -308,9 +310,11 @@ mod tests {
         let fonts = Fonts::load().unwrap();
         let mut blocks = Blocks::new(&fonts, 300.0);
         let items = blocks.children(xml.root_element(), 400.0, Style::of_size(TEXT_SIZE));
-        let drawing = items
-            .iter()
-            .find(|item| item.marks.iter().any(|m| matches!(m, Mark::Drawing { .. })));
+        let drawing = items.iter().find(|item| {
+            item.marks
+                .iter()
+                .any(|m| matches!(m, PlacedMark::Drawing { .. }))
+        });
         (drawing.unwrap().height, height_on_page(&items))
     }
 

@@ -6,7 +6,7 @@ use roxmltree::Node;
 
 use super::elements::is_screen_only;
 use super::fonts::{Fonts, Weight};
-use super::item::{Item, Mark, SOFT, Style};
+use super::item::{Item, PlacedMark, SOFT, Style};
 use super::svg::{self, Drawing};
 
 /// Size of a unit (px) of an inline drawing, pt.
@@ -376,7 +376,7 @@ impl LineSetter<'_> {
 
     fn end_run(&mut self) {
         if let Some(run) = self.run.take() {
-            self.item.marks.push(Mark::Text {
+            self.item.marks.push(PlacedMark::Text {
                 x: run.x,
                 y: self.base() - run.style.rise,
                 style: run.style,
@@ -409,7 +409,7 @@ impl LineSetter<'_> {
             }
         }
         if let Some(target) = link {
-            self.item.marks.push(Mark::Link {
+            self.item.marks.push(PlacedMark::Link {
                 x: from,
                 y: 0.0,
                 width: self.x - from,
@@ -436,7 +436,7 @@ impl LineSetter<'_> {
 
     fn set_drawing(&mut self, drawing: &Arc<Drawing>) {
         self.end_run();
-        self.item.marks.push(Mark::Drawing {
+        self.item.marks.push(PlacedMark::Drawing {
             x: self.x,
             y: self.base() - MIDDLE * self.size - 0.5 * drawing.height * PX,
             scale: PX,
@@ -448,7 +448,7 @@ impl LineSetter<'_> {
     fn set_page_of(&mut self, style: Style, width: f32, target: &str) {
         self.end_run();
         self.x += width;
-        self.item.marks.push(Mark::PageOf {
+        self.item.marks.push(PlacedMark::PageOf {
             x: self.x - self.fonts.width(style.weight, style.size, " "),
             y: self.base(),
             style,

@@ -47,7 +47,7 @@ impl Style {
 
 /// A mark at a place of an item.
 #[derive(Clone, Debug)]
-pub enum Mark {
+pub enum PlacedMark {
     /// A text from its base line's left end.
     Text {
         x: f32,
@@ -98,7 +98,7 @@ pub enum Mark {
 #[derive(Clone, Debug, Default)]
 pub struct Item {
     pub height: f32,
-    pub marks: Vec<Mark>,
+    pub marks: Vec<PlacedMark>,
     /// `true` if the item stays on the page of the next item.
     pub keep: bool,
     /// Repeated at the top of a page that this item begins.
@@ -134,20 +134,20 @@ impl Item {
     }
 }
 
-impl Mark {
+impl PlacedMark {
     /// The mark moved by a distance.
-    pub fn shifted_by(&self, dx: f32, dy: f32) -> Mark {
+    pub fn shifted_by(&self, dx: f32, dy: f32) -> PlacedMark {
         let mut mark = self.clone();
         match &mut mark {
-            Mark::Text { x, y, .. }
-            | Mark::Drawing { x, y, .. }
-            | Mark::Fill { x, y, .. }
-            | Mark::Link { x, y, .. }
-            | Mark::PageOf { x, y, .. } => {
+            PlacedMark::Text { x, y, .. }
+            | PlacedMark::Drawing { x, y, .. }
+            | PlacedMark::Fill { x, y, .. }
+            | PlacedMark::Link { x, y, .. }
+            | PlacedMark::PageOf { x, y, .. } => {
                 *x += dx;
                 *y += dy;
             }
-            Mark::Anchor { .. } | Mark::Heading { .. } | Mark::Contents => {}
+            PlacedMark::Anchor { .. } | PlacedMark::Heading { .. } | PlacedMark::Contents => {}
         }
         mark
     }

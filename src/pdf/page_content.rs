@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use super::fonts::Fonts;
-use super::item::{Colour, Mark, RULE, SOFT, Style};
+use super::item::{Colour, PlacedMark, RULE, SOFT, Style};
 use super::pagination::{HEIGHT, MARGIN, PagedDocument, WIDTH};
 use super::svg::Drawing;
 use super::svg_path::number;
@@ -51,23 +51,23 @@ impl<'a> PageContent<'a> {
         content
     }
 
-    fn mark(&mut self, mark: &Mark, document: &PagedDocument) {
+    fn mark(&mut self, mark: &PlacedMark, document: &PagedDocument) {
         match mark {
-            Mark::Text { x, y, style, text } => self.text(*x, *y, *style, text),
-            Mark::Fill {
+            PlacedMark::Text { x, y, style, text } => self.text(*x, *y, *style, text),
+            PlacedMark::Fill {
                 x,
                 y,
                 width,
                 height,
                 colour,
             } => self.fill([*x, *y, *width, *height], *colour),
-            Mark::Drawing {
+            PlacedMark::Drawing {
                 x,
                 y,
                 scale,
                 drawing,
             } => self.drawing(*x, *y, *scale, drawing),
-            Mark::Link {
+            PlacedMark::Link {
                 x,
                 y,
                 width,
@@ -78,7 +78,7 @@ impl<'a> PageContent<'a> {
                     self.link([*x, *y, *width, *height], *to);
                 }
             }
-            Mark::PageOf {
+            PlacedMark::PageOf {
                 x,
                 y,
                 style,
@@ -89,7 +89,7 @@ impl<'a> PageContent<'a> {
                     self.text_ending_at(*x, *y, *style, &format!("{prefix}{page}"));
                 }
             }
-            Mark::Anchor { .. } | Mark::Heading { .. } | Mark::Contents => {}
+            PlacedMark::Anchor { .. } | PlacedMark::Heading { .. } | PlacedMark::Contents => {}
         }
     }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::fonts::{Fonts, Weight};
-use super::item::{Item, Mark, SOFT, Style};
+use super::item::{Item, PlacedMark, SOFT, Style};
 
 /// A4, pt.
 pub const WIDTH: f32 = 595.0;
@@ -17,7 +17,7 @@ pub const PAGE_HEIGHT: f32 = HEIGHT - TOP - BOTTOM;
 /// Marks of a page, y from its top.
 #[derive(Debug, Default)]
 pub struct Page {
-    pub marks: Vec<Mark>,
+    pub marks: Vec<PlacedMark>,
 }
 
 /// A heading with its place.
@@ -95,10 +95,10 @@ impl PagedDocument {
         let page = self.pages.len();
         for mark in &item.marks {
             match mark {
-                Mark::Anchor { id } => {
+                PlacedMark::Anchor { id } => {
                     self.anchors.insert(id.clone(), (page, y));
                 }
-                Mark::Heading { level, title } => {
+                PlacedMark::Heading { level, title } => {
                     self.headings.push(Heading {
                         level: *level,
                         title: title.clone(),
@@ -125,7 +125,7 @@ struct Entry {
 
 /// Replaces the mark of the contents by a line for each heading.
 fn with_contents(mut items: Vec<Item>, fonts: &Fonts) -> Vec<Item> {
-    let is_place = |item: &Item| item.marks.iter().any(|m| matches!(m, Mark::Contents));
+    let is_place = |item: &Item| item.marks.iter().any(|m| matches!(m, PlacedMark::Contents));
     let Some(place) = items.iter().position(is_place) else {
         return items;
     };
@@ -138,7 +138,7 @@ fn with_contents(mut items: Vec<Item>, fonts: &Fonts) -> Vec<Item> {
         .collect();
     let title = Item {
         height: 16.0,
-        marks: vec![Mark::Text {
+        marks: vec![PlacedMark::Text {
             x: 0.0,
             y: 10.5,
             style: Style::of_size(10.5).bold(),
@@ -158,12 +158,12 @@ fn anchor_headings(items: &mut [Item]) -> Vec<Entry> {
     let mut entries = Vec::new();
     for item in items {
         let heading = item.marks.iter().find_map(|m| match m {
-            Mark::Heading { level, title } => Some((*level, title.clone())),
+            PlacedMark::Heading { level, title } => Some((*level, title.clone())),
             _ => None,
         });
         if let Some((level, title)) = heading {
             let anchor = format!("contents {}", entries.len());
-            item.marks.push(Mark::Anchor { id: anchor.clone() });
+            item.marks.push(PlacedMark::Anchor { id: anchor.clone() });
             entries.push(Entry {
                 level,
                 title,
@@ -201,20 +201,20 @@ fn contents_line(entry: &Entry, fonts: &Fonts) -> Item {
     Item {
         height: LINE_HEIGHT,
         marks: vec![
-            Mark::Text {
+            PlacedMark::Text {
                 x,
                 y: BASE,
                 style,
                 text,
             },
-            Mark::PageOf {
+            PlacedMark::PageOf {
                 x: COLUMN,
                 y: BASE,
                 style: number_style,
                 prefix: "",
                 target: entry.anchor.clone(),
             },
-            Mark::Link {
+            PlacedMark::Link {
                 x,
                 y: 0.0,
                 width: COLUMN - x,

@@ -10,7 +10,7 @@ use roxmltree::Node;
 use super::elements::{has_class, is_screen_only};
 use super::fonts::Fonts;
 use super::inline_text::{InlineReader, LineLayout, Word, lines, widths};
-use super::item::{Colour, INK, Item, Mark, RULE, Style};
+use super::item::{Colour, INK, Item, PlacedMark, RULE, Style};
 
 /// Sizes of type, tried in turn, pt.
 const SIZES: [f32; 5] = [7.5, 7.0, 6.5, 6.0, 5.5];
@@ -189,8 +189,8 @@ impl TableLayout {
     }
 
     /// Rule below a row.
-    fn rule(&self, row_height: f32, is_head: bool) -> Mark {
-        Mark::Fill {
+    fn rule(&self, row_height: f32, is_head: bool) -> PlacedMark {
+        PlacedMark::Fill {
             x: 0.0,
             y: row_height - 0.4,
             width: self.width(),
@@ -222,13 +222,15 @@ impl TableLayout {
         }
         item.height = item.height.max(self.size * 1.35 + 2.0 * room);
         let height = item.height;
-        let fills = shades.into_iter().map(|(x, width, colour)| Mark::Fill {
-            x: x - 0.5 * CELL_GAP,
-            y: 0.0,
-            width: width + CELL_GAP,
-            height,
-            colour,
-        });
+        let fills = shades
+            .into_iter()
+            .map(|(x, width, colour)| PlacedMark::Fill {
+                x: x - 0.5 * CELL_GAP,
+                y: 0.0,
+                width: width + CELL_GAP,
+                height,
+                colour,
+            });
         item.marks.splice(0..0, fills);
         item
     }

@@ -1,5 +1,5 @@
-//! Columns of the archive's files against the channel map, before anything is read: what a run would
-//! do without, and the flights that it would refuse.
+//! Columns of the archive's files compared with the channel map, before any data are read: the
+//! signals that a run would lack, and the flights that it would refuse.
 
 use std::collections::{BTreeMap, BTreeSet};
 

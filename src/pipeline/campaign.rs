@@ -9,7 +9,7 @@ use crate::estimate::Covariance;
 use crate::estimate::joint::Joined;
 use crate::estimate::prediction::Predicted;
 use crate::lineage::Stage;
-use crate::maneuver::{Maneuver, Means, Unknown};
+use crate::maneuver::{Maneuver, Means, UnclassifiedExcitation};
 use crate::model::Model;
 use crate::output_error::Outcome;
 use crate::proof_of_match::Matched;
@@ -79,7 +79,7 @@ pub struct Campaign {
     pub flight_corrections: Vec<FlightCorrections>,
     pub maneuvers: Vec<Maneuver>,
     /// Excitation that fits no class.
-    pub unknown: Vec<Unknown>,
+    pub unknown: Vec<UnclassifiedExcitation>,
     pub events: Vec<EventRow>,
     /// Corrections of the surfaces' delays, from all flights.
     pub delays: Vec<DelayCorrection>,

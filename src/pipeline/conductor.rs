@@ -99,14 +99,15 @@ impl<'a> Conductor<'a> {
     ///
     /// # Errors
     /// As [`Conductor::open`].
-    pub fn join(
+    pub fn open_shared(
         config: &'a Config,
         archive: Vec<FlightFiles>,
         absent: AbsentArtefacts,
         wait: Duration,
         progress: &'a dyn Progress,
     ) -> Result<Conductor<'a>> {
-        let store = Store::join(&config.store, wait)?.sharing(config.shared_store.as_deref())?;
+        let store =
+            Store::open_shared(&config.store, wait)?.sharing(config.shared_store.as_deref())?;
         let contents = store.contents();
         Conductor::new(config, store, contents, archive, absent, progress)
     }
@@ -246,7 +247,7 @@ impl<'a> Conductor<'a> {
         let Some(estimates) = estimate_step::estimate(runner, campaign)? else {
             return Ok(false);
         };
-        group_steps::join(runner, campaign, &estimates)?;
+        group_steps::estimate_jointly(runner, campaign, &estimates)?;
         group_steps::predict(runner, campaign, &estimates)?;
         estimate_step::collect_rows(campaign, estimates);
         Ok(campaign.state(Stage::Estimate).missing.is_empty())

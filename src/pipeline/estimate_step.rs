@@ -10,7 +10,7 @@ use super::ingested::Flight;
 use super::problems::problem;
 use super::step::{Companion, ComputedArtefact, LoadedOrMade, Step};
 use super::step_runner::StepRunner;
-use crate::aero::{Axis, Buildup, WindTunnel};
+use crate::aero::{AeroModel, Axis, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::config::Config;
 use crate::error::{ProblemStage, Result};
@@ -32,7 +32,7 @@ pub struct EstimateKey<'a> {
     maneuver: &'a Maneuver,
     class: Option<&'a Class>,
     aircraft: &'a Aircraft,
-    model: &'a Buildup,
+    model: &'a AeroModel,
     tunnel: &'a WindTunnel,
     estimate: &'a estimate::Settings,
     /// Corrections of the surfaces of the maneuver's axis.
@@ -111,7 +111,7 @@ impl<'a> Step for EstimateStep<'a> {
             maneuver: self.maneuver,
             class: config.class(&self.maneuver.class),
             aircraft: &config.aircraft,
-            model: &config.buildup,
+            model: &config.aero_model,
             tunnel: &config.tunnel,
             estimate: &config.estimate,
             delays: delays_of_axis(config, self.record.delays, self.maneuver.axis),
@@ -125,8 +125,8 @@ impl<'a> Step for EstimateStep<'a> {
             estimate_maneuver(self.config, &record, self.maneuver, self.record.delays);
         let history = estimated.history.take().map(|h| report::thinned(&h));
         self.store.save(&name.sibling(Kind::History), &history)?;
-        estimated.means = estimate::means(&record, self.maneuver, &self.config.buildup);
-        Ok(ComputedArtefact::Settled(estimated))
+        estimated.means = estimate::means(&record, self.maneuver, &self.config.aero_model);
+        Ok(ComputedArtefact::Final(estimated))
     }
 
     fn companions(&self, name: &ArtefactName, _: &Estimated) -> Vec<Companion> {
@@ -143,7 +143,7 @@ fn delays_of_axis<'a>(
     delays: &'a [DelayCorrection],
     axis: Axis,
 ) -> Vec<&'a DelayCorrection> {
-    let surfaces = config.buildup.derivatives_of(axis);
+    let surfaces = config.aero_model.derivatives_of(axis);
     let surfaces: Vec<&str> = surfaces.flat_map(|d| d.regressor.signals()).collect();
     let is_of_axis = |delay: &&DelayCorrection| surfaces.contains(&delay.surface.as_str());
     delays.iter().filter(is_of_axis).collect()
@@ -166,7 +166,7 @@ pub fn estimate_maneuver(
 pub fn context<'a>(config: &'a Config, delays: &'a [DelayCorrection]) -> Context<'a> {
     Context::new(
         &config.aircraft,
-        &config.buildup,
+        &config.aero_model,
         &config.tunnel,
         &config.estimate,
     )
@@ -180,7 +180,7 @@ pub fn context<'a>(config: &'a Config, delays: &'a [DelayCorrection]) -> Context
 /// A fault that stops the run.
 pub fn estimate(runner: &StepRunner, campaign: &mut Campaign) -> Result<Option<Vec<Estimated>>> {
     let all: Vec<&Maneuver> = campaign.maneuvers.iter().collect();
-    let brought = bring_maneuvers(runner, &campaign.flights, &all, &campaign.delays)?;
+    let brought = load_or_make_maneuvers(runner, &campaign.flights, &all, &campaign.delays)?;
     let mut missing = Vec::new();
     let mut estimates = Vec::new();
     for (maneuver, estimate) in campaign.maneuvers.iter().zip(brought) {
@@ -222,7 +222,7 @@ fn failure(estimated: &Estimated) -> Option<Failure> {
 ///
 /// # Errors
 /// A fault that stops the run.
-pub fn bring_maneuvers(
+pub fn load_or_make_maneuvers(
     runner: &StepRunner,
     flights: &[Flight],
     maneuvers: &[&Maneuver],
@@ -239,7 +239,7 @@ pub fn bring_maneuvers(
                 maneuver,
             })
             .collect();
-        runner.bring_all(&steps)
+        runner.load_or_make_all(&steps)
     };
     let brought: Result<Vec<Vec<_>>> = runner.with_progress("estimate", maneuvers.len(), || {
         flights.par_iter().map(of_flight).collect()

@@ -114,7 +114,7 @@ impl<'a> Step for JointStep<'a> {
             .map(|(member, fit)| (member.maneuver, format!("doubtful: {}", fit.reason)))
             .collect();
         let joint_id = &self.bin.joint_id;
-        Ok(ComputedArtefact::Settled(joint::estimate(
+        Ok(ComputedArtefact::Final(joint::estimate(
             joint_id,
             &members,
             &doubtful,
@@ -128,7 +128,11 @@ impl<'a> Step for JointStep<'a> {
 ///
 /// # Errors
 /// A fault that stops the run.
-pub fn join(runner: &StepRunner, campaign: &mut Campaign, estimates: &[Estimated]) -> Result<()> {
+pub fn estimate_jointly(
+    runner: &StepRunner,
+    campaign: &mut Campaign,
+    estimates: &[Estimated],
+) -> Result<()> {
     let Some(settings) = &runner.config.estimate.joint else {
         return Ok(());
     };
@@ -150,7 +154,10 @@ pub fn join(runner: &StepRunner, campaign: &mut Campaign, estimates: &[Estimated
             delays: &campaign.delays,
         })
         .collect();
-    let brought: Result<Vec<_>> = steps.par_iter().map(|step| runner.bring(step)).collect();
+    let brought: Result<Vec<_>> = steps
+        .par_iter()
+        .map(|step| runner.load_or_make(step))
+        .collect();
     for (bin, joined) in bins.iter().zip(brought?) {
         if let Some(joined) = joined {
             add_joined(campaign, joined.artefact);
@@ -231,7 +238,7 @@ impl<'a> Step for PredictStep<'a> {
             }
             None => Predicted::not_predicted("the configuration has no such class", from.len()),
         };
-        Ok(ComputedArtefact::Settled(predicted))
+        Ok(ComputedArtefact::Final(predicted))
     }
 }
 
@@ -273,7 +280,7 @@ pub fn predict(
             own,
             from,
         };
-        Ok(runner.bring(&step)?.map(|brought| brought.artefact))
+        Ok(runner.load_or_make(&step)?.map(|brought| brought.artefact))
     };
     let brought: Result<Vec<Option<Predicted>>> =
         sources.par_iter().enumerate().map(bring).collect();

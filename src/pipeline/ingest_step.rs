@@ -78,8 +78,10 @@ impl<'a> Step for IngestStep<'a> {
         let ingested = writing.ingest(self.files)?;
         drop(in_work);
         Ok(match self.passing_fault() {
-            None => ComputedArtefact::Settled(ingested),
-            Some(fault) => ComputedArtefact::Passing(IngestedFlight::rejected(self.item(), fault)),
+            None => ComputedArtefact::Final(ingested),
+            Some(fault) => {
+                ComputedArtefact::Temporary(IngestedFlight::rejected(self.item(), fault))
+            }
         })
     }
 
@@ -167,7 +169,7 @@ fn bring_flight(
 ) -> Result<Option<LoadedOrMade<IngestedFlight>>> {
     let id = &files.flight_id;
     match contents.fingerprint(id) {
-        Ok(content) => runner.bring(&IngestStep {
+        Ok(content) => runner.load_or_make(&IngestStep {
             runner,
             shares,
             files,

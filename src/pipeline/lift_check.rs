@@ -3,7 +3,7 @@
 
 use super::campaign::Campaign;
 use super::problems::problem;
-use crate::aero::{Buildup, Coefficient, WindTunnel};
+use crate::aero::{AeroModel, Coefficient, WindTunnel};
 use crate::config::Config;
 use crate::error::{Problem, ProblemStage};
 use crate::ingest::LiftPoint;
@@ -25,7 +25,7 @@ pub fn compare_lift(config: &Config, campaign: &mut Campaign) {
         .filter(|flight| flight.is_accepted());
     let found = accepted.filter_map(|flight| {
         let lift = &flight.ingested.assessment.lift;
-        let factor = common_factor(lift, &config.buildup, &config.tunnel)?;
+        let factor = common_factor(lift, &config.aero_model, &config.tunnel)?;
         Some(mass_problem(flight.id(), factor))
     });
     let found: Vec<Problem> = found.collect();
@@ -42,9 +42,9 @@ fn mass_problem(flight_id: &str, factor: f64) -> Problem {
 
 /// Ratio of flight to tunnel that is nearest to one, if all ratios are beyond [`FACTOR`] on one
 /// side.
-fn common_factor(lift: &[LiftPoint], buildup: &Buildup, tunnel: &WindTunnel) -> Option<f64> {
+fn common_factor(lift: &[LiftPoint], aero_model: &AeroModel, tunnel: &WindTunnel) -> Option<f64> {
     let ratio = |point: &LiftPoint| {
-        let tunnel = tunnel_normal_force(point, buildup, tunnel)?;
+        let tunnel = tunnel_normal_force(point, aero_model, tunnel)?;
         Some(point.normal_force / tunnel).filter(|ratio| *ratio > 0.0)
     };
     let ratios: Vec<f64> = lift.iter().filter_map(ratio).collect();
@@ -61,7 +61,11 @@ fn common_factor(lift: &[LiftPoint], buildup: &Buildup, tunnel: &WindTunnel) -> 
 }
 
 /// Normal force coefficient of the tunnel without surfaces and rates; `None` beyond its tables.
-fn tunnel_normal_force(point: &LiftPoint, buildup: &Buildup, tunnel: &WindTunnel) -> Option<f64> {
+fn tunnel_normal_force(
+    point: &LiftPoint,
+    aero_model: &AeroModel,
+    tunnel: &WindTunnel,
+) -> Option<f64> {
     let value = |name: &str| {
         let alphas = tunnel.alphas_deg(name);
         let is_inside = alphas.first()? <= &point.alpha_deg && &point.alpha_deg <= alphas.last()?;
@@ -69,10 +73,10 @@ fn tunnel_normal_force(point: &LiftPoint, buildup: &Buildup, tunnel: &WindTunnel
         Some(value.filter(|_| is_inside)?.value)
     };
     let is_normal = |name: &str| {
-        let derivative = buildup.derivative(name);
+        let derivative = aero_model.derivative(name);
         derivative.is_some_and(|d| d.coefficient == Coefficient::CN)
     };
-    let sum = buildup
+    let sum = aero_model
         .combined
         .iter()
         .find(|sum| is_normal(&sum.constant))?;
@@ -85,14 +89,14 @@ mod tests {
     use crate::aero::wind_tunnel::{Settings, TunnelPoint};
     use crate::aero::{Axis, Combined, Derivative, Regressor};
 
-    fn buildup() -> Buildup {
+    fn aero_model() -> AeroModel {
         let derivative = |name: &str, regressor| Derivative {
             name: name.to_owned(),
             coefficient: Coefficient::CN,
             regressor,
         };
         assert_eq!(Coefficient::CN.axis(), Axis::Longitudinal);
-        Buildup {
+        AeroModel {
             derivatives: vec![
                 derivative("N0", Regressor::Constant),
                 derivative("Na", Regressor::Alpha),
@@ -102,7 +106,7 @@ mod tests {
                 constant: "N0".to_owned(),
                 slope: "Na".to_owned(),
             }],
-            ..Buildup::default()
+            ..AeroModel::default()
         }
     }
 
@@ -137,7 +141,7 @@ mod tests {
     #[test]
     fn a_factor_at_every_angle_in_the_tables_is_found_and_no_other() {
         for as_sum in [true, false] {
-            let factor = |factors| common_factor(&lift(factors), &buildup(), &tunnel(as_sum));
+            let factor = |factors| common_factor(&lift(factors), &aero_model(), &tunnel(as_sum));
             let near = |factor: Option<f64>, expected: f64| {
                 factor.is_some_and(|factor| (factor - expected).abs() < 1e-9)
             };

@@ -11,7 +11,7 @@ use super::ingested::Flight;
 use super::model_stage::by_maneuver;
 use super::step::{ComputedArtefact, Step};
 use super::step_runner::StepRunner;
-use crate::aero::{Buildup, WindTunnel};
+use crate::aero::{AeroModel, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::config::Config;
 use crate::error::Result;
@@ -32,7 +32,7 @@ pub struct MatchKey<'a> {
     ingest: &'a str,
     maneuver: &'a Maneuver,
     aircraft: &'a Aircraft,
-    model: &'a Buildup,
+    model: &'a AeroModel,
     specification: &'a Specification,
     /// Fingerprint of all models' derivatives, and of the posterior with its covariance.
     derivatives: &'a str,
@@ -70,7 +70,7 @@ impl<'a> Step for MatchStep<'a> {
             ingest: &self.record.flight.fingerprint,
             maneuver: self.maneuver,
             aircraft: self.basis.aircraft,
-            model: self.basis.buildup,
+            model: self.basis.aero_model,
             specification: self.basis.specification,
             derivatives: self.derivatives,
             own: self.own.clone(),
@@ -83,7 +83,7 @@ impl<'a> Step for MatchStep<'a> {
         if self.maneuver.is_rejected() {
             let reason = format!("rejected: {}", self.maneuver.quality.reason);
             let matched = proof_of_match::not_flown(self.basis, self.maneuver, &reason);
-            return Ok(ComputedArtefact::Settled(matched));
+            return Ok(ComputedArtefact::Final(matched));
         }
         let record = self.record.read_maneuver(self.maneuver)?;
         let condition = self.maneuver.condition(self.basis.tunnel);
@@ -98,7 +98,7 @@ impl<'a> Step for MatchStep<'a> {
         };
         let mut matched = proof_of_match::fly_again(self.basis, &flown);
         matched.history = matched.history.map(|h| crate::report::thinned(&h));
-        Ok(ComputedArtefact::Settled(matched))
+        Ok(ComputedArtefact::Final(matched))
     }
 }
 
@@ -134,14 +134,14 @@ pub fn fly_again(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
                 own: own_estimates(campaign, &estimates, i),
             })
             .collect();
-        runner.bring_all(&steps)
+        runner.load_or_make_all(&steps)
     };
-    let brought: Result<Vec<Vec<_>>> =
+    let matched: Result<Vec<Vec<_>>> =
         runner.with_progress("match", campaign.maneuvers.len(), || {
             campaign.flights.par_iter().map(of_flight).collect()
         });
-    let brought = brought?.into_iter().flatten().flatten();
-    campaign.matched = brought.map(|brought| brought.artefact).collect();
+    let matched = matched?.into_iter().flatten().flatten();
+    campaign.matched = matched.map(|loaded| loaded.artefact).collect();
     Ok(())
 }
 
@@ -218,7 +218,7 @@ impl Databases {
     ) -> ProofInputs<'a> {
         ProofInputs {
             aircraft: &config.aircraft,
-            buildup: &config.buildup,
+            aero_model: &config.aero_model,
             models: &self.models,
             posterior: &self.posterior,
             tunnel: &self.tunnel,

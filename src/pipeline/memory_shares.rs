@@ -78,8 +78,8 @@ fn clamped(value: f64, least: usize, most: usize) -> usize {
     count
 }
 
-/// Calls `work` on every item in a few threads of its own, and returns the results in the order of
-/// the items; `None` for an item whose thread panicked.
+/// Calls `work` on every item in a few new threads, and returns the results in the order of the
+/// items. `None` for an item whose thread panicked.
 ///
 /// Within `work` the thread pool serves one item: no thread of the pool begins another while it
 /// waits.

@@ -40,7 +40,9 @@ pub use progress::Progress;
 
 pub(crate) use campaign::{Campaign, Failure, MissingArtefact, StageState};
 pub(crate) use conductor::{Conductor, method_versions};
-pub(crate) use estimate_step::{EstimateStep, LazyRecord, bring_maneuvers, estimate_maneuver};
+pub(crate) use estimate_step::{
+    EstimateStep, LazyRecord, estimate_maneuver, load_or_make_maneuvers,
+};
 pub(crate) use ingested::{Flight, IngestedFlight};
 pub(crate) use match_step::decisive_differences;
 pub(crate) use model_stage::evidence;

@@ -9,7 +9,7 @@ use crate::config::Config;
 use crate::error::{Problem, ProblemStage};
 use crate::estimate::HeldValues;
 use crate::maneuver::Means;
-use crate::model::{self, Evidence, Failure, MOST_POINTS, Model, PublishedManeuver};
+use crate::model::{self, Failure, MOST_POINTS, ManeuverResults, Model, PublishedManeuver};
 use crate::output_error::Outcome;
 use crate::tables::{EstimateRow, LiftAndDragRow};
 
@@ -19,9 +19,9 @@ pub const MODEL_VERSION: u32 = 5;
 /// Computes the posterior from the maneuvers that converged.
 pub fn fit_model(config: &Config, campaign: &mut Campaign) {
     let evidence = evidence(campaign);
-    let found = model::model(&evidence, &config.buildup, &config.tunnel, &config.model);
+    let found = model::model(&evidence, &config.aero_model, &config.tunnel, &config.model);
     let problems: Vec<_> = found.failed.iter().map(failed).collect();
-    let sums = &config.buildup.combined;
+    let sums = &config.aero_model.combined;
     let read_held = |rows: &[EstimateRow]| match config.estimate.held_values {
         HeldValues::Posterior => with_held(rows, &found, &evidence, sums),
         HeldValues::Tunnel => rows.to_vec(),
@@ -40,7 +40,7 @@ pub fn fit_model(config: &Config, campaign: &mut Campaign) {
 }
 
 /// Results of the maneuvers that converged, as evidence for the posterior.
-pub fn evidence(campaign: &Campaign) -> Vec<Evidence<'_>> {
+pub fn evidence(campaign: &Campaign) -> Vec<ManeuverResults<'_>> {
     let estimates = by_maneuver(&campaign.estimates);
     let combined = by_maneuver(&campaign.combined);
     let maneuvers = campaign.maneuvers.iter().zip(&campaign.covariances);
@@ -48,7 +48,7 @@ pub fn evidence(campaign: &Campaign) -> Vec<Evidence<'_>> {
         let (maneuver, covariance) = pair;
         let covariance = covariance.as_ref()?;
         let id = maneuver.maneuver_id.as_str();
-        (fit.outcome == Outcome::Converged).then_some(Evidence {
+        (fit.outcome == Outcome::Converged).then_some(ManeuverResults {
             maneuver,
             estimates: estimates.get(id)?,
             combined: combined.get(id).copied().unwrap_or_default(),
@@ -62,20 +62,20 @@ pub fn evidence(campaign: &Campaign) -> Vec<Evidence<'_>> {
 fn lift_and_drag(
     config: &Config,
     model: &Model,
-    evidence: &[Evidence],
+    evidence: &[ManeuverResults],
     means: &BTreeMap<&str, &Means>,
     estimates: &[EstimateRow],
 ) -> Vec<LiftAndDragRow> {
     let estimates = by_maneuver(estimates);
     let by_posterior = config.estimate.held_values == HeldValues::Posterior;
-    let of_maneuver = |evidence: &Evidence| {
+    let of_maneuver = |evidence: &ManeuverResults| {
         let id = evidence.maneuver.maneuver_id.as_str();
         let flown = PublishedManeuver {
             evidence,
             estimates: estimates.get(id)?,
             means: means.get(id)?,
             aircraft: &config.aircraft,
-            buildup: &config.buildup,
+            aero_model: &config.aero_model,
         };
         Some(model.lift_and_drag(&flown, by_posterior))
     };
@@ -86,13 +86,13 @@ fn lift_and_drag(
 fn with_held(
     rows: &[EstimateRow],
     model: &Model,
-    evidence: &[Evidence],
+    evidence: &[ManeuverResults],
     sums: &[Combined],
 ) -> Vec<EstimateRow> {
     let evidence = evidence
         .iter()
         .map(|e| (e.maneuver.maneuver_id.as_str(), e));
-    let evidence: BTreeMap<&str, &Evidence> = evidence.collect();
+    let evidence: BTreeMap<&str, &ManeuverResults> = evidence.collect();
     let mut new = Vec::with_capacity(rows.len());
     for own in rows.chunk_by(|a, b| a.maneuver_id == b.maneuver_id) {
         match evidence.get(own[0].maneuver_id.as_str()) {

@@ -19,7 +19,7 @@ pub fn judge_qualities(config: &Config, campaign: &mut Campaign) {
     let basis = JudgedAircraft {
         model: &campaign.model,
         aircraft: &config.aircraft,
-        buildup: &config.buildup,
+        aero_model: &config.aero_model,
         tunnel: &config.tunnel,
         specification,
     };

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::Config;
 use crate::error::{Problem, Result};
-use crate::maneuver::{Event, Maneuver, Unknown};
+use crate::maneuver::{Event, Maneuver, UnclassifiedExcitation};
 use crate::segment::{self, Segmented};
 use crate::store::record_file::{RecordFile, RecordHeader};
 use crate::tables::EventRow;
@@ -28,7 +28,7 @@ const EVENT_S: f64 = 10.0;
 pub struct FoundManeuvers {
     pub maneuvers: Vec<Maneuver>,
     /// Excitation that fits no class.
-    pub unknown: Vec<Unknown>,
+    pub unknown: Vec<UnclassifiedExcitation>,
     pub events: Vec<EventRow>,
     pub problems: Vec<Problem>,
 }

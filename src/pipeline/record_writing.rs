@@ -26,7 +26,7 @@ use crate::store::{ArtefactName, Kind, Store};
 type Columns<'a> = ComputedColumns<'a, Opened>;
 
 /// Reason that a record is not written.
-enum Halt {
+enum WriteStop {
     /// A fault of the flight; it is rejected.
     Rejected(Problem),
     /// A fault of the disk; it stops the run.
@@ -97,7 +97,7 @@ impl RecordWriting<'_> {
         let id = &stretch.flight_id;
         let name = ArtefactName::new(Kind::Records, id, self.fingerprint);
         let path = self.store.path(&name);
-        let mut draft = Draft::of(&path)?;
+        let mut draft = Draft::create(&path)?;
         let mut readers: Vec<ChannelReader> = plans
             .iter()
             .map(|p| ChannelReader::new(p, stretch, &self.config.ingest))
@@ -107,8 +107,8 @@ impl RecordWriting<'_> {
             .and_then(|()| self.check(stretch, readers, &draft));
         let assessment = match checked {
             Ok(assessment) => assessment,
-            Err(Halt::Rejected(problem)) => return Ok(IngestedStretch::rejected(id, problem)),
-            Err(Halt::Disk(reason)) => return Err(Error::store(&path, &reason)),
+            Err(WriteStop::Rejected(problem)) => return Ok(IngestedStretch::rejected(id, problem)),
+            Err(WriteStop::Disk(reason)) => return Err(Error::store(&path, &reason)),
         };
         let digest = draft.digest();
         draft.place()?;
@@ -126,16 +126,17 @@ impl RecordWriting<'_> {
         stretch: &Stretch,
         readers: Vec<ChannelReader>,
         draft: &Draft,
-    ) -> Result<Assessment, Halt> {
-        let written = record_file::open(draft.draft()).map_err(|e| Halt::Disk(e.to_string()))?;
+    ) -> Result<Assessment, WriteStop> {
+        let written =
+            record_file::open(draft.draft()).map_err(|e| WriteStop::Disk(e.to_string()))?;
         let reader = WindowReader::new(written);
         let flowed = readers.into_iter().map(ChannelReader::finish).collect();
         let judged = ingest::assess(stretch, flowed, &self.basis(), &|signals, samples| {
             reader.window(signals, samples)
         });
         match reader.into_failure() {
-            Some(reason) => Err(Halt::Disk(reason)),
-            None => judged.map_err(Halt::Rejected),
+            Some(reason) => Err(WriteStop::Disk(reason)),
+            None => judged.map_err(WriteStop::Rejected),
         }
     }
 
@@ -146,7 +147,7 @@ impl RecordWriting<'_> {
         stretch: &Stretch,
         readers: &mut [ChannelReader],
         draft: &mut Draft,
-    ) -> Result<(), Halt> {
+    ) -> Result<(), WriteStop> {
         let samples = stretch.clock.samples;
         let signals: Vec<String> = readers.iter().map(|r| r.signal().to_owned()).collect();
         let mut writer = record_file::Writer::create(
@@ -154,9 +155,9 @@ impl RecordWriting<'_> {
             signals.iter().map(String::as_str),
             draft.writer(),
         )
-        .map_err(Halt::Disk)?;
+        .map_err(WriteStop::Disk)?;
         for start in (0..samples).step_by(GROUP) {
-            let writers = writer.group().map_err(Halt::Disk)?;
+            let writers = writer.group().map_err(WriteStop::Disk)?;
             let mut group = GroupEncoding {
                 opened,
                 shares: self.shares,
@@ -167,13 +168,15 @@ impl RecordWriting<'_> {
             let appended = writer.append(|| group.next_batch());
             match (appended, group.fault) {
                 (Ok(()), _) => {}
-                (Err(reason), None) => return Err(Halt::Disk(reason)),
+                (Err(reason), None) => return Err(WriteStop::Disk(reason)),
                 (Err(_), Some(refusal)) => {
-                    return Err(Halt::Rejected(refusal.into_problem(&stretch.flight_id)));
+                    return Err(WriteStop::Rejected(
+                        refusal.into_problem(&stretch.flight_id),
+                    ));
                 }
             }
         }
-        writer.finish().map_err(Halt::Disk)
+        writer.finish().map_err(WriteStop::Disk)
     }
 
     /// Clock and constants of a record with these recorded signals.

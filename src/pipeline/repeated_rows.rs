@@ -11,8 +11,8 @@ use crate::maneuver::Maneuver;
 /// Share of common rows from which a flight counts as a copy of another.
 const COPY_SHARE: f64 = 0.9;
 
-/// Signatures compare ten seconds at a time: up to this much more on either side may be repeated,
-/// s.
+/// Interval of the signatures, s. The extent of repeated rows is known to this accuracy at either
+/// end.
 const SIGNATURE_STEP_S: f64 = 10.0;
 
 /// Rejects flights whose id another flight has: `f.2` may be a file and the second stretch of `f`.

@@ -88,7 +88,7 @@ impl<'a> Step for SegmentStep<'a> {
 
     fn make(&self, _: &ArtefactName) -> Result<ComputedArtefact<FoundManeuvers>> {
         let record = self.flight.open(self.store)?;
-        find_maneuvers(self.config, &record, &self.events).map(ComputedArtefact::Settled)
+        find_maneuvers(self.config, &record, &self.events).map(ComputedArtefact::Final)
     }
 }
 
@@ -131,7 +131,7 @@ fn bring_flights(
         .par_iter()
         .map(|flight| {
             let found = match SegmentStep::new(runner.config, &runner.store, flight) {
-                Ok(step) => runner.bring(&step),
+                Ok(step) => runner.load_or_make(&step),
                 // A record that cannot be opened will be made again.
                 Err(_) if runner.absent == AbsentArtefacts::Report => Ok(None),
                 Err(error) => Err(error),

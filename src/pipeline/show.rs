@@ -36,7 +36,7 @@ pub enum ChartSubject {
 
 /// A chart that was written.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Picture {
+pub struct WrittenChart {
     pub path: PathBuf,
     /// Problems of the flight or maneuver.
     pub problems: Vec<Problem>,
@@ -53,7 +53,7 @@ pub fn show(
     subject: &ChartSubject,
     out: Option<&Path>,
     progress: &dyn Progress,
-) -> Result<Picture> {
+) -> Result<WrittenChart> {
     let conductor = Conductor::open(config, Duration::ZERO, progress)?;
     let (id, svg, problems) = match subject {
         ChartSubject::Flight(id) => {
@@ -73,7 +73,7 @@ pub fn show(
     let default = || config.reports.join("show").join(file_name(id));
     let path = out.map_or_else(default, Path::to_path_buf);
     atomic::place(&path, svg.as_bytes())?;
-    Ok(Picture { path, problems })
+    Ok(WrittenChart { path, problems })
 }
 
 fn problems_of(campaign: &Campaign, is_wanted: impl Fn(&Problem) -> bool) -> Vec<Problem> {
@@ -205,7 +205,7 @@ fn maneuvers_of(campaign: &Campaign, id: &str) -> Vec<Maneuver> {
 /// Sorts the configured signals into groups: surfaces have derivatives, pilot controls have counted
 /// steps, flags are up or down in a class.
 fn groups(config: &Config) -> SignalGroups {
-    let derivatives = config.buildup.derivatives.iter();
+    let derivatives = config.aero_model.derivatives.iter();
     let signals = derivatives.flat_map(|d| d.regressor.signals());
     let surfaces = unique(signals.map(str::to_owned));
     let stepping = config

@@ -49,10 +49,10 @@ pub trait Step: Sync {
 #[derive(Clone, Debug)]
 pub enum ComputedArtefact<A> {
     /// Determined by the key alone; it is saved.
-    Settled(A),
+    Final(A),
     /// Affected by a temporary fault, such as a file that changed meanwhile; the next run tries
     /// again.
-    Passing(A),
+    Temporary(A),
 }
 
 /// A file that belongs to an artefact.

@@ -9,7 +9,7 @@ use super::progress::Progress;
 use super::step::{Companion, ComputedArtefact, LoadedOrMade, Step};
 use crate::config::Config;
 use crate::error::Result;
-use crate::store::{ArtefactName, InputDigests, Listed, Store};
+use crate::store::{ArtefactName, InWorkEntry, InputDigests, Store};
 
 /// Treatment of an artefact that is absent from the store.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,22 +54,22 @@ impl<'a> StepRunner<'a> {
     ///
     /// # Errors
     /// As [`Step::make`]; an artefact that cannot be saved.
-    pub fn bring<S: Step>(&self, step: &S) -> Result<Option<LoadedOrMade<S::Artefact>>> {
-        let brought = match (self.load(step), self.absent) {
-            (Some(brought), _) => brought,
+    pub fn load_or_make<S: Step>(&self, step: &S) -> Result<Option<LoadedOrMade<S::Artefact>>> {
+        let result = match (self.load(step), self.absent) {
+            (Some(result), _) => result,
             (None, AbsentArtefacts::Report) => {
                 self.note_missing(step.name());
                 return Ok(None);
             }
             (None, AbsentArtefacts::Make) => self.make(step)?,
         };
-        if brought.is_stored {
-            self.store.require(&brought.name);
-            for companion in step.companions(&brought.name, &brought.artefact) {
+        if result.is_stored {
+            self.store.require(&result.name);
+            for companion in step.companions(&result.name, &result.artefact) {
                 self.store.require(&companion.name);
             }
         }
-        Ok(Some(brought))
+        Ok(Some(result))
     }
 
     /// Loads a step's artefact; `None` unless it and its companions are unchanged.
@@ -89,11 +89,11 @@ impl<'a> StepRunner<'a> {
     fn make<S: Step>(&self, step: &S) -> Result<LoadedOrMade<S::Artefact>> {
         let name = step.name();
         let (artefact, is_stored) = match step.make(&name)? {
-            ComputedArtefact::Settled(artefact) => {
+            ComputedArtefact::Final(artefact) => {
                 self.store.save(&name, &artefact)?;
                 (artefact, true)
             }
-            ComputedArtefact::Passing(artefact) => (artefact, false),
+            ComputedArtefact::Temporary(artefact) => (artefact, false),
         };
         Ok(LoadedOrMade {
             name,
@@ -128,17 +128,20 @@ impl<'a> StepRunner<'a> {
     /// Loads or makes the artefacts of several steps in parallel, in their order.
     ///
     /// # Errors
-    /// As [`StepRunner::bring`].
-    pub fn bring_all<S: Step>(&self, steps: &[S]) -> Result<Vec<Option<LoadedOrMade<S::Artefact>>>>
+    /// As [`StepRunner::load_or_make`].
+    pub fn load_or_make_all<S: Step>(
+        &self,
+        steps: &[S],
+    ) -> Result<Vec<Option<LoadedOrMade<S::Artefact>>>>
     where
         S::Artefact: Send,
     {
         steps
             .par_iter()
             .map(|step| {
-                let brought = self.bring(step);
+                let result = self.load_or_make(step);
                 self.advance(step.item());
-                brought
+                result
             })
             .collect()
     }
@@ -156,7 +159,7 @@ impl<'a> StepRunner<'a> {
 
     /// Reports a flight as being processed, to the progress display and in the store, until the
     /// returned value is dropped.
-    pub fn start_flight<'b>(&'b self, flight_id: &'b str) -> Option<Listed<'b>> {
+    pub fn start_flight<'b>(&'b self, flight_id: &'b str) -> Option<InWorkEntry<'b>> {
         self.progress.start(flight_id);
         self.store.list_in_work(flight_id)
     }

@@ -9,7 +9,7 @@ use super::estimate_step::LazyRecord;
 use super::ingested::Flight;
 use super::step::{ComputedArtefact, Step};
 use super::step_runner::StepRunner;
-use crate::aero::{Buildup, WindTunnel};
+use crate::aero::{AeroModel, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::config::Config;
 use crate::error::Result;
@@ -28,7 +28,7 @@ pub struct SurfacesKey<'a> {
     ingest: &'a str,
     maneuvers: &'a [&'a Maneuver],
     aircraft: &'a Aircraft,
-    model: &'a Buildup,
+    model: &'a AeroModel,
     tunnel: &'a WindTunnel,
 }
 
@@ -56,7 +56,7 @@ impl<'a> Step for SurfacesStep<'a> {
             ingest: &self.flight.fingerprint,
             maneuvers: self.maneuvers,
             aircraft: &self.config.aircraft,
-            model: &self.config.buildup,
+            model: &self.config.aero_model,
             tunnel: &self.config.tunnel,
         }
     }
@@ -67,11 +67,11 @@ impl<'a> Step for SurfacesStep<'a> {
         let parts: Result<Vec<(Record, &Maneuver)>> = self.maneuvers.iter().map(part).collect();
         let basis = AircraftModel {
             aircraft: &self.config.aircraft,
-            buildup: &self.config.buildup,
+            aero_model: &self.config.aero_model,
             tunnel: &self.config.tunnel,
         };
         let evidence = surfaces::flight_evidence(self.flight.id(), &parts?, basis);
-        Ok(ComputedArtefact::Settled(evidence))
+        Ok(ComputedArtefact::Final(evidence))
     }
 }
 
@@ -85,24 +85,24 @@ pub fn surfaces(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
         .iter()
         .filter(|f| f.is_accepted())
         .collect();
-    let bring = |flight: &&Flight| {
+    let evidence_of = |flight: &&Flight| {
         let of_flight = |m: &&Maneuver| m.flight_id == flight.id();
         let maneuvers: Vec<&Maneuver> = campaign.maneuvers.iter().filter(of_flight).collect();
-        let brought = runner.bring(&SurfacesStep {
+        let evidence = runner.load_or_make(&SurfacesStep {
             config: runner.config,
             store: &runner.store,
             flight,
             maneuvers: &maneuvers,
         });
         runner.advance(flight.id());
-        brought
+        evidence
     };
-    let brought: Result<Vec<_>> = runner.with_progress("surfaces", flights.len(), || {
-        flights.par_iter().map(bring).collect()
+    let loaded: Result<Vec<_>> = runner.with_progress("surfaces", flights.len(), || {
+        flights.par_iter().map(evidence_of).collect()
     });
     let ids: Vec<String> = flights.iter().map(|f| f.id().to_owned()).collect();
     let mut known = Vec::with_capacity(ids.len());
-    for (flight_id, evidence) in ids.into_iter().zip(brought?) {
+    for (flight_id, evidence) in ids.into_iter().zip(loaded?) {
         match evidence {
             Some(evidence) => known.push(evidence.artefact),
             None => campaign

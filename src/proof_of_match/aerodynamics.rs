@@ -10,7 +10,7 @@
 use nalgebra::Vector3;
 
 use super::derivative_table::DerivativeTable;
-use crate::aero::{Axis, Buildup, Coefficient, Derivative, Regressor};
+use crate::aero::{AeroModel, Axis, Coefficient, Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::flight::signal;
 use crate::rigid_body::AirData;
@@ -28,8 +28,8 @@ pub const MOMENT: [usize; 3] = [4, 1, 5];
 /// Recorded signals of a build-up, each once: surfaces and vanes. The flow itself comes from the
 /// simulation.
 #[must_use]
-pub fn recorded_signals(buildup: &Buildup) -> Vec<&str> {
-    let all = buildup
+pub fn recorded_signals(aero_model: &AeroModel) -> Vec<&str> {
+    let all = aero_model
         .derivatives
         .iter()
         .flat_map(|d| d.regressor.signals());
@@ -41,9 +41,9 @@ pub fn recorded_signals(buildup: &Buildup) -> Vec<&str> {
     signals
 }
 
-/// Flow at the c.g. and rotation, in deg, rad/s, ft/s, lbf/ft².
+/// Inputs of the aerodynamics: flow at the c.g. and rotation, in deg, rad/s, ft/s, lbf/ft².
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Flow {
+pub struct AeroInputs {
     pub alpha_deg: f64,
     pub beta_deg: f64,
     pub velocity: f64,
@@ -53,11 +53,11 @@ pub struct Flow {
     pub qbar: f64,
 }
 
-impl Flow {
-    /// Flow from the air data at the c.g., rates in rad/s.
+impl AeroInputs {
+    /// Inputs from the air data at the c.g., rates in rad/s.
     #[must_use]
-    pub fn new(air: &AirData, rates: [f64; 3], alpha_rate: f64) -> Flow {
-        Flow {
+    pub fn new(air: &AirData, rates: [f64; 3], alpha_rate: f64) -> AeroInputs {
+        AeroInputs {
             alpha_deg: DEG * air.alpha,
             beta_deg: DEG * air.beta,
             velocity: air.velocity_ft_s,
@@ -119,7 +119,7 @@ pub struct Aerodynamics<'a> {
     aircraft: &'a Aircraft,
     /// Coefficient and factor of each derivative, in the order of the build-up.
     terms: Vec<(usize, Factor)>,
-    has_lag: bool,
+    has_alpha_rate: bool,
     pub table: DerivativeTable,
 }
 
@@ -136,11 +136,11 @@ impl<'a> Aerodynamics<'a> {
     #[must_use]
     pub fn new(
         aircraft: &'a Aircraft,
-        buildup: &Buildup,
+        aero_model: &AeroModel,
         table: DerivativeTable,
     ) -> Aerodynamics<'a> {
-        let derivatives = buildup.derivatives.iter();
-        let recorded = recorded_signals(buildup);
+        let derivatives = aero_model.derivatives.iter();
+        let recorded = recorded_signals(aero_model);
         let term = |d: &Derivative| {
             let factors = Factors {
                 aircraft,
@@ -152,7 +152,7 @@ impl<'a> Aerodynamics<'a> {
         Aerodynamics {
             aircraft,
             terms: derivatives.map(term).collect(),
-            has_lag: buildup.lags().next().is_some(),
+            has_alpha_rate: aero_model.along_alpha_rate().next().is_some(),
             table,
         }
     }
@@ -160,7 +160,7 @@ impl<'a> Aerodynamics<'a> {
     /// Factors of all derivatives in a flow, with the recorded signals.
     pub fn factors<'b>(
         &'b self,
-        flow: &'b Flow,
+        flow: &'b AeroInputs,
         recorded: &'b [f64],
     ) -> impl Iterator<Item = f64> + 'b {
         let terms = self.terms.iter();
@@ -209,7 +209,7 @@ impl<'a> Aerodynamics<'a> {
 /// Aerodynamics about a trim, prepared for a run of thousands of instants. The coefficients at the
 /// trim are computed once; a factor that several derivatives have is computed once per instant.
 #[derive(Clone, Debug)]
-pub struct AboutTrim<'a> {
+pub struct TrimmedAerodynamics<'a> {
     table: &'a DerivativeTable,
     /// Terms of each coefficient in the order of the build-up, without the constants.
     terms: [Vec<TrimmedTerm>; COEFFICIENTS],
@@ -217,7 +217,7 @@ pub struct AboutTrim<'a> {
     factors: Vec<&'a Factor>,
     /// Values of the factors at the present instant.
     values: Vec<f64>,
-    has_lag: bool,
+    has_alpha_rate: bool,
     trim_alpha_deg: f64,
 }
 
@@ -225,16 +225,16 @@ pub struct AboutTrim<'a> {
 #[derive(Clone, Debug)]
 struct TrimmedTerm {
     derivative: usize,
-    /// Index of the term's factor in [`AboutTrim::values`].
+    /// Index of the term's factor in [`TrimmedAerodynamics::values`].
     factor: usize,
     is_along_alpha: bool,
     /// Factor at the trim; along α the integral of the derivative there.
     at_trim: f64,
 }
 
-impl<'a> AboutTrim<'a> {
+impl<'a> TrimmedAerodynamics<'a> {
     #[must_use]
-    pub fn new(aerodynamics: &'a Aerodynamics, trim: &SimulationTrim) -> AboutTrim<'a> {
+    pub fn new(aerodynamics: &'a Aerodynamics, trim: &SimulationTrim) -> TrimmedAerodynamics<'a> {
         let table = &aerodynamics.table;
         let place = table.position_of(trim.alpha_deg);
         let mut terms = [const { Vec::new() }; COEFFICIENTS];
@@ -260,25 +260,25 @@ impl<'a> AboutTrim<'a> {
                 factors.push(factor);
             }
         }
-        AboutTrim {
+        TrimmedAerodynamics {
             table,
             terms,
             values: vec![0.0; factors.len()],
-            has_lag: aerodynamics.has_lag,
+            has_alpha_rate: aerodynamics.has_alpha_rate,
             factors,
             trim_alpha_deg: trim.alpha_deg,
         }
     }
 
-    /// True if the coefficients depend on the rate of the angle of attack.
+    /// `true` if the coefficients depend on the rate of the angle of attack.
     #[must_use]
-    pub fn have_lag(&self) -> bool {
-        self.has_lag
+    pub fn have_alpha_rate(&self) -> bool {
+        self.has_alpha_rate
     }
 
     /// Change of the coefficients from the trim.
     #[must_use]
-    pub fn change(&mut self, flow: &Flow, recorded: &[f64]) -> [f64; COEFFICIENTS] {
+    pub fn change(&mut self, flow: &AeroInputs, recorded: &[f64]) -> [f64; COEFFICIENTS] {
         for (value, factor) in self.values.iter_mut().zip(&self.factors) {
             *value = factor.value(flow, recorded);
         }
@@ -296,10 +296,10 @@ impl<'a> AboutTrim<'a> {
         change
     }
 
-    /// Change of the coefficients from the trim, with its slopes along the flow, and along each
-    /// derivative raised by the same amount at every angle of attack.
+    /// Change of the coefficients from the trim, with its slopes along the flow and along each
+    /// derivative. A derivative is raised by the same amount at every angle of attack.
     #[must_use]
-    pub fn change_with_slopes(&mut self, flow: &Flow, recorded: &[f64]) -> CoefficientSlopes {
+    pub fn change_with_slopes(&mut self, flow: &AeroInputs, recorded: &[f64]) -> CoefficientSlopes {
         let change = self.change(flow, recorded);
         let entries = self.table.entries(self.table.position_of(flow.alpha_deg));
         let along = self.factors.iter().map(|f| f.slopes(flow, recorded));
@@ -309,12 +309,12 @@ impl<'a> AboutTrim<'a> {
         for (sums, terms) in by_flow.iter_mut().zip(&self.terms) {
             for term in terms {
                 if term.is_along_alpha {
-                    sums[Flow::ALPHA] += entries.integral_slope(term.derivative);
+                    sums[AeroInputs::ALPHA] += entries.integral_slope(term.derivative);
                     by_derivative[term.derivative] = flow.alpha_deg - self.trim_alpha_deg;
                     continue;
                 }
                 let moved = self.values[term.factor] - term.at_trim;
-                sums[Flow::ALPHA] += entries.value_slope(term.derivative) * moved;
+                sums[AeroInputs::ALPHA] += entries.value_slope(term.derivative) * moved;
                 let value = entries.value(term.derivative);
                 for (sum, slope) in sums.iter_mut().zip(&along[term.factor]) {
                     *sum += value * slope;
@@ -395,7 +395,7 @@ impl Factors<'_> {
 
 impl Factor {
     #[inline]
-    fn value(&self, flow: &Flow, recorded: &[f64]) -> f64 {
+    fn value(&self, flow: &AeroInputs, recorded: &[f64]) -> f64 {
         let at = |place: &usize| recorded.get(*place).copied().unwrap_or(0.0);
         match self {
             Factor::Constant => 1.0,
@@ -413,23 +413,25 @@ impl Factor {
     }
 
     /// Slopes along the flow.
-    fn slopes(&self, flow: &Flow, recorded: &[f64]) -> FlowSlopes {
+    fn slopes(&self, flow: &AeroInputs, recorded: &[f64]) -> FlowSlopes {
         let mut slopes = [0.0; FLOW];
         match self {
             Factor::Constant | Factor::Recorded(_) => {}
-            Factor::Alpha => slopes[Flow::ALPHA] = 1.0,
-            Factor::Beta => slopes[Flow::BETA] = 1.0,
-            Factor::Velocity => slopes[Flow::VELOCITY] = 1.0,
-            Factor::Mach => slopes[Flow::MACH] = 1.0,
+            Factor::Alpha => slopes[AeroInputs::ALPHA] = 1.0,
+            Factor::Beta => slopes[AeroInputs::BETA] = 1.0,
+            Factor::Velocity => slopes[AeroInputs::VELOCITY] = 1.0,
+            Factor::Mach => slopes[AeroInputs::MACH] = 1.0,
             Factor::Rate { axis, half_length } => {
-                slopes[Flow::RATES + axis] = half_length / flow.velocity;
-                slopes[Flow::VELOCITY] = -self.value(flow, recorded) / flow.velocity;
+                slopes[AeroInputs::RATES + axis] = half_length / flow.velocity;
+                slopes[AeroInputs::VELOCITY] = -self.value(flow, recorded) / flow.velocity;
             }
             Factor::AlphaRate { half_length } => {
-                slopes[Flow::ALPHA_RATE] = half_length / flow.velocity;
-                slopes[Flow::VELOCITY] = -self.value(flow, recorded) / flow.velocity;
+                slopes[AeroInputs::ALPHA_RATE] = half_length / flow.velocity;
+                slopes[AeroInputs::VELOCITY] = -self.value(flow, recorded) / flow.velocity;
             }
-            Factor::Vane { .. } => slopes[Flow::QBAR] = -self.value(flow, recorded) / flow.qbar,
+            Factor::Vane { .. } => {
+                slopes[AeroInputs::QBAR] = -self.value(flow, recorded) / flow.qbar;
+            }
             Factor::Magnitude(of) => {
                 let sign = of.value(flow, recorded).signum();
                 slopes = of.slopes(flow, recorded).map(|slope| sign * slope);

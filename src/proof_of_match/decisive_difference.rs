@@ -1,8 +1,8 @@
 //! Difference that decides whether a repeat flight passes, as a linear function of the derivatives.
 //!
-//! To first order the outputs of a repeat flight differ from a model's by four parts: the mean
-//! difference, the effects of the derivatives' deviations, the effects of the start's errors, and
-//! the sensors' noise. At one sample the difference is therefore normal, and its nearest limit is a
+//! To first order the outputs of a repeat flight and of a model differ by four parts: the mean
+//! difference, the effect of the derivatives' deviations, the effect of the start's errors, and
+//! sensor noise. At one sample the difference is therefore normal, and its nearest limit is a
 //! number of standard deviations away: its distance. The decisive difference is
 //!
 //! 1. of an alternative: the difference at the sample with the smallest distance;
@@ -23,7 +23,7 @@ use super::mean_run::{MeanRun, acting_derivatives};
 use super::outputs::output_index;
 use super::recording::ManeuverRecording;
 use super::specification::Tolerance;
-use crate::aero::{Buildup, Condition};
+use crate::aero::{AeroModel, Condition};
 use crate::model::{LocalPosterior, LocalValue};
 use crate::tables::MatchedQuantity;
 
@@ -57,10 +57,10 @@ impl PredictedDutchRoll<'_> {
     fn difference(
         &self,
         posterior: &LocalPosterior,
-        buildup: &Buildup,
+        aero_model: &AeroModel,
         tolerance: &Tolerance,
     ) -> Option<LinearDifference> {
-        let moving = acting_derivatives(posterior, buildup);
+        let moving = acting_derivatives(posterior, aero_model);
         let deviation = |(value, derivative): &(usize, usize)| {
             (*derivative, posterior.covariance[(*value, *value)].sqrt())
         };
@@ -82,14 +82,14 @@ impl PredictedDutchRoll<'_> {
 }
 
 impl MeanRun {
-    /// The decisive difference of the run of a model at every `stride`-th sample, and of its Dutch
-    /// roll if that is available; `None` if a run departs or no tolerance can be judged.
+    /// Decisive difference of a model's run at every `stride`-th sample, and of its Dutch roll if
+    /// available. `None` if a run departs or no tolerance can be judged.
     #[must_use]
     pub fn decisive(
         &self,
         flown: (&ManeuverRecording, &FreeRun),
         dutch_roll: Option<PredictedDutchRoll>,
-        (posterior, buildup): (&LocalPosterior, &Buildup),
+        (posterior, aero_model): (&LocalPosterior, &AeroModel),
         judged: &[Judged],
     ) -> Option<LinearDifference> {
         if flown.1.has_departed || self.run.has_departed {
@@ -97,7 +97,7 @@ impl MeanRun {
         }
         let worst = |own: &Judged| {
             if own.tolerance.quantity.is_of_dutch_roll() {
-                let difference = dutch_roll?.difference(posterior, buildup, &own.tolerance)?;
+                let difference = dutch_roll?.difference(posterior, aero_model, &own.tolerance)?;
                 return Some((difference.distance(&posterior.covariance), difference));
             }
             self.worst(flown, posterior, own)

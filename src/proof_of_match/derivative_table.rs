@@ -1,7 +1,7 @@
 //! Derivatives of a model over angle of attack in the flight condition of one maneuver, tabulated
 //! closely for the inner loop.
 
-use crate::aero::{Buildup, Condition, Regressor, WindTunnel};
+use crate::aero::{AeroModel, Condition, Regressor, WindTunnel};
 use crate::numerics::trapezoid::running_integral;
 
 /// Spacing of the table, deg. Between its points the table is linear, as most databases are.
@@ -35,16 +35,16 @@ impl DerivativeTable {
     /// the fallback, or is zero.
     #[must_use]
     pub fn new(
-        buildup: &Buildup,
+        aero_model: &AeroModel,
         model: &WindTunnel,
         fallback: &WindTunnel,
         condition: &Condition,
     ) -> DerivativeTable {
         let first_deg = ((condition.alpha_deg - REACH_DEG) / STEP_DEG).floor() * STEP_DEG;
         let nodes = node_count();
-        let derivatives = buildup.derivatives.len();
+        let derivatives = aero_model.derivatives.len();
         let mut values = vec![0.0; nodes * derivatives];
-        for (i, derivative) in buildup.derivatives.iter().enumerate() {
+        for (i, derivative) in aero_model.derivatives.iter().enumerate() {
             let name = &derivative.name;
             let source = model.reader(name).or_else(|| fallback.reader(name));
             let at = |node: usize| {

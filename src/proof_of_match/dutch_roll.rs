@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::derivative_table::DerivativeTable;
-use crate::aero::{Axis, Buildup, Derivative, Regressor, WindTunnel};
+use crate::aero::{AeroModel, Axis, Derivative, Regressor, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::maneuver::{Maneuver, Means};
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
@@ -81,7 +81,7 @@ impl LateralModes {
     /// Equations of a maneuver; `None` if a derivative has no value or there is no oscillation.
     #[must_use]
     pub fn new(
-        (aircraft, buildup, tunnel): (&Aircraft, &Buildup, &WindTunnel),
+        (aircraft, aero_model, tunnel): (&Aircraft, &AeroModel, &WindTunnel),
         (maneuver, means): (&Maneuver, &Means),
         estimates: &OwnEstimates,
     ) -> Option<LateralModes> {
@@ -90,20 +90,20 @@ impl LateralModes {
         let nothing = BTreeMap::new();
         let flight = SteadyFlight {
             aircraft,
-            buildup,
+            aero_model,
             trim: &trim,
             controls: Controls {
                 feedback: &nothing_by_surface(),
                 pitch: &nothing,
             },
         };
-        let derivatives = of_motion(buildup);
-        let own = |i: &usize| estimates.value(&buildup.derivatives[*i].name);
+        let derivatives = of_motion(aero_model);
+        let own = |i: &usize| estimates.value(&aero_model.derivatives[*i].name);
         let own: Option<Vec<f64>> = derivatives.iter().map(own).collect();
         let own = DVector::from_vec(own?);
         let values = derivatives.iter().map(|i| LocalValue {
-            coefficient: buildup.derivatives[*i].coefficient,
-            derivative: buildup.derivatives[*i].name.clone(),
+            coefficient: aero_model.derivatives[*i].coefficient,
+            derivative: aero_model.derivatives[*i].name.clone(),
             kind: LocalKind::Derivative,
             is_mach_slope: false,
         });
@@ -114,7 +114,7 @@ impl LateralModes {
         });
         let names = derivatives
             .iter()
-            .map(|i| buildup.derivatives[*i].name.as_str());
+            .map(|i| aero_model.derivatives[*i].name.as_str());
         let names: Vec<&str> = names.collect();
         Some(LateralModes {
             flight: dutch_roll(&linear, &own)?,
@@ -228,12 +228,12 @@ impl OwnEstimates {
 }
 
 /// Lateral derivatives of the motion; surfaces are fixed.
-fn of_motion(buildup: &Buildup) -> Vec<usize> {
+fn of_motion(aero_model: &AeroModel) -> Vec<usize> {
     let is_of_motion = |d: &Derivative| {
         let is_motion = d.regressor.surface().is_none() && d.regressor != Regressor::Constant;
         is_motion && d.coefficient.axis() == Axis::Lateral
     };
-    let derivatives = buildup.derivatives.iter().enumerate();
+    let derivatives = aero_model.derivatives.iter().enumerate();
     derivatives
         .filter(|(_, d)| is_of_motion(d))
         .map(|(i, _)| i)

@@ -2,7 +2,9 @@
 //! used.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
-use super::aerodynamics::{AboutTrim, Aerodynamics, COEFFICIENTS, Flow, SimulationTrim};
+use super::aerodynamics::{
+    AeroInputs, Aerodynamics, COEFFICIENTS, SimulationTrim, TrimmedAerodynamics,
+};
 use super::load_changes::LoadSlopes;
 use super::outputs::{Outputs, outputs};
 use super::recording::ManeuverRecording;
@@ -120,7 +122,7 @@ impl Simulation<'_> {
     /// Flies the first `samples` samples, every `stride`-th of which is a step.
     #[must_use]
     pub fn fly(&self, start: &Start, samples: usize, stride: usize) -> FreeRun {
-        self.fly_with(start, (samples, stride), &mut Alone)
+        self.fly_with(start, (samples, stride), &mut NoObserver)
     }
 
     /// As [`Simulation::fly`], with computations beside the run.
@@ -128,13 +130,13 @@ impl Simulation<'_> {
         &self,
         start: &Start,
         (samples, stride): (usize, usize),
-        companion: &mut impl Companion,
+        observer: &mut impl StageObserver,
     ) -> FreeRun {
         let step_s = stride as f64 * self.recording.step_s;
         let mut equations = RunEquations {
             simulation: self,
             start,
-            aerodynamics: AboutTrim::new(&self.aerodynamics, &start.trim),
+            aerodynamics: TrimmedAerodynamics::new(&self.aerodynamics, &start.trim),
         };
         let mut state = start.body();
         let mut run = FreeRun {
@@ -154,8 +156,8 @@ impl Simulation<'_> {
             });
             run.outputs
                 .push(outputs(&readings, instant.air.velocity_ft_s));
-            companion.at_stage(0, &instant, (&mut equations, 2 * sample));
-            companion.at_sample(&instant);
+            observer.at_stage(0, &instant, (&mut equations, 2 * sample));
+            observer.at_sample(&instant);
             if sample + stride < samples {
                 // The first stage is at the sample itself.
                 let rate = |stage: usize, at: &BodyState| {
@@ -164,11 +166,11 @@ impl Simulation<'_> {
                     }
                     let point = 2 * sample + stride * POINT[stage];
                     let instant = equations.instant(at, point);
-                    companion.at_stage(stage, &instant, (&mut equations, point));
+                    observer.at_stage(stage, &instant, (&mut equations, point));
                     instant.rate
                 };
                 let end = runge_kutta::step(&state, step_s, rate, BodyState::plus);
-                companion.after_step(&end);
+                observer.after_step(&end);
                 state = end.normalised();
             }
         }
@@ -177,7 +179,7 @@ impl Simulation<'_> {
 }
 
 /// Computation beside a run, at the instants of its stages.
-pub trait Companion {
+pub trait StageObserver {
     /// Called at each stage, with the equations and the point of the recording. The first stage of
     /// a step is at its sample.
     fn at_stage(&mut self, stage: usize, instant: &Instant, at: (&mut RunEquations, usize));
@@ -189,10 +191,10 @@ pub trait Companion {
     fn after_step(&mut self, end: &BodyState);
 }
 
-/// Companion that computes nothing.
-struct Alone;
+/// Observer that computes nothing.
+struct NoObserver;
 
-impl Companion for Alone {
+impl StageObserver for NoObserver {
     fn at_stage(&mut self, _: usize, _: &Instant, _: (&mut RunEquations, usize)) {}
     fn at_sample(&mut self, _: &Instant) {}
     fn after_step(&mut self, _: &BodyState) {}
@@ -218,13 +220,13 @@ impl WithSimd for Sensing<'_> {
 pub struct RunEquations<'a> {
     simulation: &'a Simulation<'a>,
     start: &'a Start,
-    aerodynamics: AboutTrim<'a>,
+    aerodynamics: TrimmedAerodynamics<'a>,
 }
 
 impl RunEquations<'_> {
     /// Motion at a state and a point of the recording.
     fn instant(&mut self, state: &BodyState, point: usize) -> Instant {
-        if !self.aerodynamics.have_lag() {
+        if !self.aerodynamics.have_alpha_rate() {
             return self.instant_at(0.0, state, point);
         }
         let implied = |alpha_rate: f64| {
@@ -238,14 +240,14 @@ impl RunEquations<'_> {
     /// Slopes of the loads at an instant, and slope of each derivative's coefficient along the
     /// derivative.
     pub fn load_slopes(&mut self, instant: &Instant, point: usize) -> (LoadSlopes, Vec<f64>) {
-        let has_lag = self.aerodynamics.have_lag();
+        let has_alpha_rate = self.aerodynamics.have_alpha_rate();
         let state = &instant.state;
-        let alpha_rate = if has_lag {
+        let alpha_rate = if has_alpha_rate {
             AirData::alpha_rate(&state.velocity, &instant.rate.velocity)
         } else {
             0.0
         };
-        let flow = Flow::new(&instant.air, state.rates.into(), alpha_rate);
+        let flow = AeroInputs::new(&instant.air, state.rates.into(), alpha_rate);
         let recorded = self.simulation.recording.signals(point);
         let slopes = self.aerodynamics.change_with_slopes(&flow, recorded);
         let loads = LoadSlopes::new(
@@ -253,7 +255,7 @@ impl RunEquations<'_> {
             instant,
             &self.coefficients(slopes.change),
             slopes.by_flow,
-            has_lag,
+            has_alpha_rate,
         );
         (loads, slopes.by_derivative)
     }
@@ -270,7 +272,7 @@ impl RunEquations<'_> {
         let inputs = recording.inputs(point);
         let mut air = AirData::new(&state.velocity, state.position.z);
         air.qbar_psf *= self.start.density_ratio;
-        let flow = Flow::new(&air, state.rates.into(), alpha_rate);
+        let flow = AeroInputs::new(&air, state.rates.into(), alpha_rate);
         let change = self.aerodynamics.change(&flow, recording.signals(point));
         let coefficients = self.coefficients(change);
         let model = &self.simulation.aerodynamics;

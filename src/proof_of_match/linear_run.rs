@@ -10,7 +10,7 @@ use std::array::from_fn;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::aerodynamics::COEFFICIENTS;
-use super::free_run::{Companion, FreeRun, RunEquations, STATES, Simulation, Start};
+use super::free_run::{FreeRun, RunEquations, STATES, Simulation, StageObserver, Start};
 use super::load_changes::LoadSlopes;
 use super::outputs::COUNT;
 use crate::numerics::lanes::{Lanes, each};
@@ -35,7 +35,7 @@ pub type Histories = [Vec<f64>; COUNT];
 
 /// A run with the slopes of its outputs along parameters.
 #[derive(Clone, Debug)]
-pub struct LinearRun {
+pub struct RunWithSensitivities {
     pub run: FreeRun,
     /// Histories of the slopes, in the order of the parameters, up to a departure.
     pub slopes: Vec<Histories>,
@@ -49,11 +49,11 @@ impl Simulation<'_> {
         &self,
         (start, parameters): (&Start, &[Parameter]),
         (samples, stride): (usize, usize),
-    ) -> LinearRun {
+    ) -> RunWithSensitivities {
         let step_s = stride as f64 * self.recording.step_s;
         let mut slopes = RunSlopes::new(self, (start, parameters), step_s);
         let run = self.fly_with(start, (samples, stride), &mut slopes);
-        LinearRun {
+        RunWithSensitivities {
             run,
             slopes: slopes.histories,
         }
@@ -122,7 +122,7 @@ impl<'a> RunSlopes<'a> {
     }
 }
 
-impl Companion for RunSlopes<'_> {
+impl StageObserver for RunSlopes<'_> {
     fn at_stage(&mut self, stage: usize, instant: &Instant, at: (&mut RunEquations, usize)) {
         let (equations, point) = at;
         let inputs = self.simulation.recording.inputs(point);
@@ -153,7 +153,7 @@ impl Companion for RunSlopes<'_> {
         let Some(stage) = self.stages[0] else {
             return;
         };
-        Arch::new().dispatch(Read {
+        Arch::new().dispatch(OutputSlopes {
             readings: &ReadingSlopes::new(instant, self.simulation.aircraft),
             stage: &stage,
             direct: self.direct[0].slice(),
@@ -172,7 +172,7 @@ impl Companion for RunSlopes<'_> {
         let [Some(a), Some(b), Some(c), Some(d)] = self.stages else {
             return;
         };
-        Arch::new().dispatch(Advance {
+        Arch::new().dispatch(StateUpdateSlopes {
             stages: &[a, b, c, d],
             direct: from_fn(|stage| self.direct[stage].slice()),
             end: end.attitude.coords.into(),
@@ -213,7 +213,7 @@ impl StageSlopes {
 }
 
 /// Slopes of the outputs at a sample.
-struct Read<'a> {
+struct OutputSlopes<'a> {
     readings: &'a ReadingSlopes,
     stage: &'a StageSlopes,
     direct: &'a [f64],
@@ -223,7 +223,7 @@ struct Read<'a> {
     outputs: &'a mut [f64],
 }
 
-impl WithSimd for Read<'_> {
+impl WithSimd for OutputSlopes<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -257,7 +257,7 @@ impl WithSimd for Read<'_> {
 }
 
 /// Slopes of the state after a step.
-struct Advance<'a> {
+struct StateUpdateSlopes<'a> {
     stages: &'a [StageSlopes; STAGES],
     direct: [&'a [f64]; STAGES],
     /// Attitude at the end, before it is normalised.
@@ -267,7 +267,7 @@ struct Advance<'a> {
     states: &'a mut [f64],
 }
 
-impl WithSimd for Advance<'_> {
+impl WithSimd for StateUpdateSlopes<'_> {
     type Output = ();
 
     #[inline(always)]

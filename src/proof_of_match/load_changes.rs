@@ -8,7 +8,7 @@ use std::array::from_fn;
 
 use pulp::Simd;
 
-use super::aerodynamics::{Aerodynamics, COEFFICIENTS, FORCE, Flow, FlowSlopes, MOMENT};
+use super::aerodynamics::{AeroInputs, Aerodynamics, COEFFICIENTS, FORCE, FlowSlopes, MOMENT};
 use crate::numerics::lanes::{Lanes, combination, each};
 use crate::rigid_body::{AirChange, BodySlopes, Instant, StateChange};
 use crate::units::DEG;
@@ -29,14 +29,14 @@ pub struct LoadSlopes {
     force: [f64; 3],
     moment: [f64; 3],
     /// Slope of each component of force and moment along its coefficient.
-    force_by_own: [f64; 3],
-    moment_by_own: [f64; 3],
-    lag: Option<Lag>,
+    force_by_coefficient: [f64; 3],
+    moment_by_coefficient: [f64; 3],
+    alpha_rate: Option<AlphaRateTerm>,
 }
 
 /// Slopes of α̇ where the loads depend on α̇, so that its equation is implicit.
 #[derive(Clone, Copy, Debug)]
-struct Lag {
+struct AlphaRateTerm {
     by_velocity: [f64; 3],
     /// Along the accelerations at a constant α̇.
     by_acceleration: [f64; 3],
@@ -53,47 +53,48 @@ impl LoadSlopes {
         instant: &Instant,
         coefficients: &[f64; COEFFICIENTS],
         mut by_flow: [FlowSlopes; COEFFICIENTS],
-        has_lag: bool,
+        has_alpha_rate: bool,
     ) -> LoadSlopes {
         let qbar = instant.air.qbar_psf;
         let area = qbar * aerodynamics.area();
         let (force, moment) = aerodynamics.loads(coefficients, qbar);
         for slopes in &mut by_flow {
-            slopes[Flow::ALPHA] *= DEG;
-            slopes[Flow::BETA] *= DEG;
-            slopes[Flow::QBAR] *= qbar;
+            slopes[AeroInputs::ALPHA] *= DEG;
+            slopes[AeroInputs::BETA] *= DEG;
+            slopes[AeroInputs::QBAR] *= qbar;
         }
         let mut slopes = LoadSlopes {
             coefficients: by_flow,
             force: force.into(),
             moment: moment.into(),
-            force_by_own: FORCE.map(|(_, sign)| sign * area),
-            moment_by_own: aerodynamics.lengths().map(|length| length * area),
-            lag: None,
+            force_by_coefficient: FORCE.map(|(_, sign)| sign * area),
+            moment_by_coefficient: aerodynamics.lengths().map(|length| length * area),
+            alpha_rate: None,
         };
-        slopes.lag = has_lag.then(|| slopes.lag(instant));
+        slopes.alpha_rate = has_alpha_rate.then(|| slopes.alpha_rate_term(instant));
         slopes
     }
 
     /// Slopes of α̇ = (u ẇ − w u̇)/(u² + w²), with u and w the velocities along body x and z. u̇
     /// and ẇ are linear in α̇.
-    fn lag(&self, instant: &Instant) -> Lag {
-        let along = |i: usize| self.coefficients[i][Flow::ALPHA_RATE];
-        let force: [f64; 3] = from_fn(|i| self.force_by_own[i] * along(FORCE[i].0));
-        let moment = from_fn(|i| self.moment_by_own[i] * along(MOMENT[i]));
+    fn alpha_rate_term(&self, instant: &Instant) -> AlphaRateTerm {
+        let along = |i: usize| self.coefficients[i][AeroInputs::ALPHA_RATE];
+        let force: [f64; 3] = from_fn(|i| self.force_by_coefficient[i] * along(FORCE[i].0));
+        let moment = from_fn(|i| self.moment_by_coefficient[i] * along(MOMENT[i]));
         let [u, _, w]: [f64; 3] = instant.state.velocity.into();
         let [u_rate, _, w_rate]: [f64; 3] = instant.rate.velocity.into();
         let per_square = 1.0 / (u * u + w * w);
         let alpha_rate = (u * w_rate - w * u_rate) * per_square;
-        let own = (u * force[2] - w * force[0]) * per_square / instant.loading.mass_slug;
-        let per_balance = per_square / (1.0 - own);
-        Lag {
+        // α̇ = α̇₀ + gain · α̇, so every slope of α̇₀ is divided by 1 − gain.
+        let gain = (u * force[2] - w * force[0]) * per_square / instant.loading.mass_slug;
+        let factor = per_square / (1.0 - gain);
+        AlphaRateTerm {
             by_velocity: [
-                (w_rate - 2.0 * alpha_rate * u) * per_balance,
+                (w_rate - 2.0 * alpha_rate * u) * factor,
                 0.0,
-                (-u_rate - 2.0 * alpha_rate * w) * per_balance,
+                (-u_rate - 2.0 * alpha_rate * w) * factor,
             ],
-            by_acceleration: [-w * per_balance, 0.0, u * per_balance],
+            by_acceleration: [-w * factor, 0.0, u * factor],
             force,
             moment,
         }
@@ -122,25 +123,25 @@ impl LoadSlopes {
             force: each(
                 #[inline(always)]
                 |i| {
-                    let own = coefficients[FORCE[i].0] * self.force_by_own[i];
-                    own.plus(self.force[i], air.relative_qbar)
+                    let by_coefficient = coefficients[FORCE[i].0] * self.force_by_coefficient[i];
+                    by_coefficient.plus(self.force[i], air.relative_qbar)
                 },
             ),
             moment: each(
                 #[inline(always)]
                 |i| {
-                    let own = coefficients[MOMENT[i]] * self.moment_by_own[i];
-                    own.plus(self.moment[i], air.relative_qbar)
+                    let by_coefficient = coefficients[MOMENT[i]] * self.moment_by_coefficient[i];
+                    by_coefficient.plus(self.moment[i], air.relative_qbar)
                 },
             ),
         };
-        if let Some(lag) = &self.lag {
+        if let Some(term) = &self.alpha_rate {
             let rate = body.change(state, &loads.force, &loads.moment);
-            let alpha_rate = combination(&lag.by_velocity, &state.velocity())
-                + combination(&lag.by_acceleration, &rate.velocity());
+            let alpha_rate = combination(&term.by_velocity, &state.velocity())
+                + combination(&term.by_acceleration, &rate.velocity());
             for i in 0..3 {
-                loads.force[i] = loads.force[i].plus(lag.force[i], alpha_rate);
-                loads.moment[i] = loads.moment[i].plus(lag.moment[i], alpha_rate);
+                loads.force[i] = loads.force[i].plus(term.force[i], alpha_rate);
+                loads.moment[i] = loads.moment[i].plus(term.moment[i], alpha_rate);
             }
         }
         loads

@@ -14,7 +14,7 @@ use super::recording::ManeuverRecording;
 use super::repeat_flight::{self, Probabilities, Repeats};
 use super::specification::{Specification, Test};
 use super::start::{self, MatchedStart};
-use crate::aero::{Axis, Buildup, Coefficient, WindTunnel};
+use crate::aero::{AeroModel, Axis, Coefficient, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::flight::Record;
 use crate::maneuver::{Maneuver, Means};
@@ -31,7 +31,7 @@ const MOVED_DEG: f64 = 0.5;
 #[derive(Clone, Debug)]
 pub struct ProofInputs<'a> {
     pub aircraft: &'a Aircraft,
-    pub buildup: &'a Buildup,
+    pub aero_model: &'a AeroModel,
     /// Models in the order of the specification.
     pub models: &'a [(ModelSource, WindTunnel)],
     /// Posterior as a database, about which repeat flights are drawn.
@@ -105,7 +105,7 @@ fn dutch_roll(
     own: Option<(&Means, &OwnEstimates)>,
 ) -> Option<LateralModes> {
     let (means, estimates) = own.filter(|_| maneuver.axis == Axis::Lateral)?;
-    let model = (basis.aircraft, basis.buildup, basis.tunnel);
+    let model = (basis.aircraft, basis.aero_model, basis.tunnel);
     LateralModes::new(model, (maneuver, means), estimates)
 }
 
@@ -204,7 +204,7 @@ impl<'a> RepeatableManeuver<'a> {
             let signal = output.signal();
             return Err(format!("its trim needs `{signal}`, which is not recorded"));
         }
-        let aircraft = (basis.aircraft, basis.buildup);
+        let aircraft = (basis.aircraft, basis.aero_model);
         Ok(RepeatableManeuver {
             basis,
             maneuver,
@@ -222,7 +222,7 @@ impl<'a> RepeatableManeuver<'a> {
         let local = self.local.ok_or("the posterior has nothing of its axis")?;
         let posterior = self.trimmed(basis.posterior);
         let about = (&posterior.simulation, &posterior.start);
-        let mean = MeanRun::fly(about, local, (basis.buildup, self.maneuver.axis))
+        let mean = MeanRun::fly(about, local, (basis.aero_model, self.maneuver.axis))
             .ok_or("its start is not determined")?;
         let follows_mean = *model == ModelSource::Posterior;
         let own = (!follows_mean).then(|| self.trimmed(database));
@@ -231,7 +231,7 @@ impl<'a> RepeatableManeuver<'a> {
         let judged = judgement::judged(&self.tests, self.modes.is_some());
         let predicted = |modes| predicted_dutch_roll(modes, &posterior.simulation, simulation);
         let dutch_roll = self.modes.as_ref().map(predicted).transpose()?;
-        let about = (local, basis.buildup);
+        let about = (local, basis.aero_model);
         let decisive = mean
             .decisive((&self.recording, &run), dutch_roll, about, &judged)
             .ok_or("its simulation departs, or no tolerance can be judged")?;
@@ -266,11 +266,11 @@ impl<'a> RepeatableManeuver<'a> {
     fn trimmed(&self, database: &WindTunnel) -> Trimmed<'_> {
         let basis = self.basis;
         let condition = self.maneuver.condition(basis.tunnel);
-        let table = DerivativeTable::new(basis.buildup, database, basis.tunnel, &condition);
+        let table = DerivativeTable::new(basis.aero_model, database, basis.tunnel, &condition);
         let simulation = Simulation {
             aircraft: basis.aircraft,
             recording: &self.recording,
-            aerodynamics: Aerodynamics::new(basis.aircraft, basis.buildup, table),
+            aerodynamics: Aerodynamics::new(basis.aircraft, basis.aero_model, table),
         };
         let start = start::matched(&simulation);
         Trimmed { simulation, start }
@@ -279,7 +279,7 @@ impl<'a> RepeatableManeuver<'a> {
     /// Repeat flights about the posterior's mean.
     fn repeats(&self, posterior: &Trimmed, mean: &FreeRun) -> Option<Repeats> {
         let basis = self.basis;
-        let model = (basis.buildup, self.maneuver.axis);
+        let model = (basis.aero_model, self.maneuver.axis);
         let flown = (&posterior.simulation, &posterior.start);
         let known = (self.local?, self.modes.as_ref());
         repeat_flight::repeats(flown, mean, known, model, basis.specification.draws)

@@ -1,23 +1,23 @@
-//! Free run at the mean of a posterior, with the slopes of its outputs along the derivatives and the
-//! parameters of its start, and the deficiency of a flight against it.
+//! Free run at the mean of a posterior, with the sensitivities of its outputs to the derivatives
+//! and the start's parameters. Also the deficiency of a flight against this run.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::free_run::{FreeRun, STATES, Simulation};
-use super::linear_run::{Histories, LinearRun, Parameter};
+use super::linear_run::{Histories, Parameter, RunWithSensitivities};
 use super::outputs::{COUNT, Outputs};
 use super::recording::ManeuverRecording;
 use super::start::MatchedStart;
-use crate::aero::{Axis, Buildup, Regressor};
+use crate::aero::{AeroModel, Axis, Regressor};
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
 use crate::numerics::sample_count::whole_steps;
 
 /// Longest step of the run with slopes, s. Probabilities differ by 0.2 % rms from those of steps of a quarter.
 const LONGEST_STEP_S: f64 = 0.1;
 
-/// Root mean square of the differences between flight and mean up to which posterior, start and noise
-/// explain them, in standard deviations: few directions carry the deviations, so that they reach two
-/// by chance.
+/// Limit of the rms difference between flight and mean run, in standard deviations of what
+/// posterior, start and noise explain. Few directions carry the deviations, so two is reached by
+/// chance.
 const EXPLAINED_DEVIATIONS: f64 = 2.0;
 
 /// Run about which flights repeat, with the slopes of its outputs.
@@ -39,17 +39,17 @@ impl MeanRun {
     pub fn fly(
         (simulation, start): (&Simulation, &MatchedStart),
         posterior: &LocalPosterior,
-        (buildup, axis): (&Buildup, Axis),
+        (aero_model, axis): (&AeroModel, Axis),
     ) -> Option<MeanRun> {
         let covariance = start.covariance.as_ref()?;
         let recording = simulation.recording;
         let stride = stride(recording);
-        let derivatives = acting_derivatives(posterior, buildup);
+        let derivatives = acting_derivatives(posterior, aero_model);
         let own = start_parameters(axis);
         let moved = derivatives.iter().map(|(_, d)| Parameter::Derivative(*d));
         let parameters: Vec<Parameter> = moved.chain(own.map(Parameter::Start)).collect();
         let steps = (recording.samples, stride);
-        let LinearRun { run, slopes } =
+        let RunWithSensitivities { run, slopes } =
             simulation.fly_with_slopes((&start.start, &parameters), steps);
         Some(MeanRun {
             stride,
@@ -66,9 +66,9 @@ impl MeanRun {
         self.slopes.split_at(self.derivatives.len())
     }
 
-    /// Deficiency of the run at every `stride`-th sample, whose outputs are `mean`: measured less
-    /// computed outputs, reduced by the share of their mean square that deviations of the derivatives,
-    /// start and noise explain. `roots` are those of the covariances of derivatives and start.
+    /// Deficiency of the run with the outputs `mean`, at every `stride`-th sample: measured less
+    /// computed outputs. It is reduced by the fraction of their mean square that derivatives, start
+    /// and noise explain. `roots` are those of the covariances of derivatives and start.
     #[must_use]
     pub fn deficiency(
         &self,
@@ -130,12 +130,15 @@ fn stride(recording: &ManeuverRecording) -> usize {
 /// Indices of the derivatives that affect a simulation, among the values of a posterior and in the
 /// build-up.
 #[must_use]
-pub fn acting_derivatives(posterior: &LocalPosterior, buildup: &Buildup) -> Vec<(usize, usize)> {
+pub fn acting_derivatives(
+    posterior: &LocalPosterior,
+    aero_model: &AeroModel,
+) -> Vec<(usize, usize)> {
     let index = |value: &LocalValue| {
         let is_slope = value.kind == LocalKind::Derivative && !value.is_mach_slope;
-        let mut derivatives = buildup.derivatives.iter();
+        let mut derivatives = aero_model.derivatives.iter();
         let index = derivatives.position(|d| is_slope && d.name == value.derivative)?;
-        (buildup.derivatives[index].regressor != Regressor::Constant).then_some(index)
+        (aero_model.derivatives[index].regressor != Regressor::Constant).then_some(index)
     };
     let values = posterior.values.iter().enumerate();
     values.filter_map(|(i, v)| Some((i, index(v)?))).collect()

@@ -2,10 +2,10 @@
 
 use super::aerodynamics::recorded_signals;
 use super::outputs::{COUNT, MATCHED, Outputs};
-use crate::aero::Buildup;
+use crate::aero::AeroModel;
 use crate::aircraft::{Aircraft, Thrust};
 use crate::dynamics::Motion;
-use crate::dynamics::motion::{MassProperties, Window};
+use crate::dynamics::motion::{ManeuverSignals, MassProperties};
 use crate::flight::Record;
 use crate::maneuver::Maneuver;
 use crate::numerics::differences;
@@ -15,8 +15,7 @@ use crate::rigid_body::{Loading, Mass};
 /// Least number of samples of a maneuver that can be flown again.
 const FEWEST_SAMPLES: usize = 20;
 
-/// Least time over which the trim is matched, s: half a second at 40 Hz gives a rate's slope to a
-/// tenth of a degree per second squared.
+/// Shortest time for matching the trim, s. At 40 Hz, 0.5 s gives the slope of a rate to 0.1 deg/s².
 const LEAST_TRIM_S: f64 = 0.5;
 
 /// Least noise of each output, standard deviation, in the order of the outputs: finer than any
@@ -68,7 +67,7 @@ impl ManeuverRecording {
     pub fn new(
         record: &Record,
         maneuver: &Maneuver,
-        (aircraft, buildup): (&Aircraft, &Buildup),
+        (aircraft, aero_model): (&Aircraft, &AeroModel),
         longest_trim_s: f64,
     ) -> Result<ManeuverRecording, String> {
         let first = record.sample_at(maneuver.start_s);
@@ -77,9 +76,9 @@ impl ManeuverRecording {
         if samples < FEWEST_SAMPLES {
             return Err(format!("it has {samples} samples only"));
         }
-        let signals = recorded_signals(buildup);
+        let signals = recorded_signals(aero_model);
         let mass = MassProperties::Recorded;
-        let window = Window::cut(
+        let window = ManeuverSignals::cut(
             aircraft,
             record,
             range.clone(),
@@ -168,7 +167,7 @@ fn inputs(motion: &Motion) -> SimulationInputs {
 }
 
 /// Values of some signals, point by point.
-fn by_point(window: &Window, names: &[&str]) -> Vec<f64> {
+fn by_point(window: &ManeuverSignals, names: &[&str]) -> Vec<f64> {
     let signals: Vec<&[f64]> = names.iter().map(|name| window.signal(name)).collect();
     let at = |point: usize| {
         let signals = signals.iter();

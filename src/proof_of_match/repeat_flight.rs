@@ -7,9 +7,9 @@
 //! follow from the slopes of one free run. The noise of the sensors is white and independent, so
 //! its part of the probability is exact for each draw.
 //!
-//! A flight may differ from the mean by more than these parts explain, for example if a derivative
-//! varies in a way that the posterior smooths, or the equations lack an effect. This *deficiency*
-//! belongs to the aircraft, so a repeat flight shows it again.
+//! A flight may differ from the mean by more than these parts explain. A derivative may vary in a
+//! way that the posterior smooths, or the equations may lack an effect. This *deficiency* belongs
+//! to the aircraft, so a repeat flight shows it again.
 
 use pulp::Arch;
 
@@ -22,7 +22,7 @@ use super::outputs::{Outputs, output_index};
 use super::recording::ManeuverRecording;
 use super::specification::Tolerance;
 use super::start::MatchedStart;
-use crate::aero::{Axis, Buildup};
+use crate::aero::{AeroModel, Axis};
 use crate::model::LocalPosterior;
 use crate::numerics::normal;
 use crate::numerics::random::RandomStream;
@@ -76,14 +76,14 @@ impl Probabilities {
     }
 }
 
-/// Draws repeat flights about the mean of a posterior, whose run in short steps is `mean`; `None`
-/// if the start is not determined or the axis has no posterior.
+/// Draws repeat flights about the mean of a posterior; `mean` is the run at the mean in short
+/// steps. `None` if the start is not determined or the axis has no posterior.
 #[must_use]
 pub fn repeats(
     (simulation, start): (&Simulation, &MatchedStart),
     mean: &FreeRun,
     (posterior, modes): (&LocalPosterior, Option<&LateralModes>),
-    model: (&Buildup, Axis),
+    model: (&AeroModel, Axis),
     draws: usize,
 ) -> Option<Repeats> {
     let about = MeanRun::fly((simulation, start), posterior, model)?;

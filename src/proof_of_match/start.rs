@@ -2,14 +2,14 @@
 //!
 //! As in a qualification test guide, the simulator is trimmed to the aircraft before it runs free.
 //! Initial state and the six coefficients at trim are chosen so that the simulation fits all
-//! outputs best up to the first input, weighted by their noise. After that the model alone changes
-//! the coefficients.
+//! outputs best up to the first input. The outputs are weighted by their noise. After that the
+//! model alone changes the coefficients.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::aerodynamics::{AboutTrim, COEFFICIENTS, Flow, SimulationTrim};
+use super::aerodynamics::{AeroInputs, COEFFICIENTS, SimulationTrim, TrimmedAerodynamics};
 use super::free_run::{FreeRun, STATES, Simulation, Start};
-use super::linear_run::{LinearRun, Parameter};
+use super::linear_run::{Parameter, RunWithSensitivities};
 use super::outputs::COUNT;
 use super::recording::ManeuverRecording;
 use crate::dynamics::{Equations, Lateral, Longitudinal, Motion};
@@ -74,7 +74,7 @@ impl StartSlopes {
     fn of(simulation: &Simulation, start: &Start) -> Option<(StartSlopes, FreeRun)> {
         let recording = simulation.recording;
         let parameters: [Parameter; PARAMETERS] = std::array::from_fn(Parameter::Start);
-        let LinearRun { run, slopes } =
+        let RunWithSensitivities { run, slopes } =
             simulation.fly_with_slopes((start, &parameters), (recording.trim_samples, 1));
         if run.has_departed {
             return None;
@@ -120,7 +120,7 @@ fn as_measured(simulation: &Simulation) -> Start {
         factors: mean_factors(simulation),
         alpha_deg: mean(motions.iter().map(|m| DEG * m.alpha)),
     };
-    let mut about_trim = AboutTrim::new(&simulation.aerodynamics, &trim);
+    let mut about_trim = TrimmedAerodynamics::new(&simulation.aerodynamics, &trim);
     let implied: Vec<[f64; COEFFICIENTS]> = motions
         .iter()
         .enumerate()
@@ -158,9 +158,9 @@ fn state(motion: &Motion) -> [f64; STATES] {
     ]
 }
 
-/// Flow of a measured motion, with the Mach number of the standard atmosphere.
-fn flow(simulation: &Simulation, motion: &Motion) -> Flow {
-    Flow {
+/// Inputs of a measured motion, with the Mach number of the standard atmosphere.
+fn flow(simulation: &Simulation, motion: &Motion) -> AeroInputs {
+    AeroInputs {
         mach: motion.velocity / air(simulation.recording.altitude_ft).sound_ft_s,
         alpha_deg: DEG * motion.alpha,
         beta_deg: DEG * motion.beta,

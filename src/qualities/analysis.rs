@@ -208,9 +208,9 @@ impl Drawn {
             && (is_certain || WITHIN_ONE_DEVIATION.contains(&self.share(within)))
     }
 
-    /// Interval between quantiles. The standard deviation is half the width of the central 68 %: that
-    /// of all values is infinite for a quotient whose denominator may be zero. NaN for what draws
-    /// without a value leave open; an end is infinite if the quantile is.
+    /// Interval between quantiles. The standard deviation is half the width of the central 68 %.
+    /// The standard deviation of all values is infinite for a quotient whose denominator may be
+    /// zero. NaN for what draws without a value leave open; an end is infinite if the quantile is.
     pub fn uncertainty(&self) -> Uncertainty {
         let at = |share: f64| {
             let known = Some(share).filter(|_| !self.lacks_values());
@@ -279,7 +279,7 @@ pub fn linearised(
     let fixed = BTreeMap::new();
     let flight = SteadyFlight {
         aircraft: basis.aircraft,
-        buildup: basis.buildup,
+        aero_model: basis.aero_model,
         trim,
         controls: Controls {
             feedback: match airframe {

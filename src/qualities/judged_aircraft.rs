@@ -1,7 +1,7 @@
 //! Aircraft and posterior whose flying qualities are judged.
 
 use super::specification::Specification;
-use crate::aero::{Buildup, WindTunnel};
+use crate::aero::{AeroModel, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::model::Model;
 
@@ -10,7 +10,7 @@ use crate::model::Model;
 pub struct JudgedAircraft<'a> {
     pub model: &'a Model,
     pub aircraft: &'a Aircraft,
-    pub buildup: &'a Buildup,
+    pub aero_model: &'a AeroModel,
     pub tunnel: &'a WindTunnel,
     pub specification: &'a Specification,
 }

@@ -25,8 +25,8 @@ pub struct JudgedQuantity {
     pub limits: Vec<f64>,
 }
 
-/// Quantity of an airframe in steady flight at an angle of attack; `None` if the angle was not
-/// flown, the mode does not exist or the quantity is not finite.
+/// Quantity of an airframe in steady flight at an angle of attack. `None` if the angle was not
+/// flown, the mode does not exist, or the quantity is not finite.
 #[must_use]
 pub fn judged_quantity(
     basis: &JudgedAircraft,

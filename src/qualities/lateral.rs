@@ -42,7 +42,7 @@ impl SteadyFlight<'_> {
         LinearModel {
             rigid: rates.by_state,
             control_slopes: vec![Vector::zeros(); effects.len()],
-            lag: None,
+            alpha_rate: None,
             slopes: effects.into_iter().map(slope).collect(),
             velocity: trim.velocity,
             gravity: trim.gravity,

@@ -33,8 +33,8 @@ pub fn meets(limit: &LevelLimit, level: Level, values: &Values) -> bool {
         && range.max.is_none_or(|max| value <= max)
 }
 
-/// Minimum of a level with its rise, which starts from zero if the level has no minimum of its own;
-/// `None` for a level without either.
+/// Minimum of a level with its rise. The rise starts from zero if the level states no minimum.
+/// `None` for a level with neither minimum nor rise.
 #[must_use]
 pub fn minimum(limit: &LevelLimit, level: Level, values: &Values) -> Option<f64> {
     let own = limit.range(level)?.min;

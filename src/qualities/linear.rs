@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DVector, SMatrix, SVector};
 
 use super::trim::Trim;
-use crate::aero::{Buildup, Coefficient, Derivative, Regressor};
+use crate::aero::{AeroModel, Coefficient, Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::dynamics::COEFFICIENTS;
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
@@ -20,7 +20,8 @@ pub type Vector = SVector<f64, STATES>;
 pub type ByCoefficient = SMatrix<f64, STATES, COEFFICIENTS>;
 
 /// Linear equations of an axis, with their slopes along each value of the posterior. The rates of
-/// the states x with the pitch control u are A x + B u, or with a lag A x + B u + m α̇.
+/// the states x with the pitch control u are A x + B u. With a term along the rate of the angle of
+/// attack they are A x + B u + m α̇.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearModel {
     /// Matrix A without aerodynamics.
@@ -28,14 +29,14 @@ pub struct LinearModel {
     pub slopes: Vec<Matrix>,
     pub control_slopes: Vec<Vector>,
     /// `None` if no derivative is along α̇.
-    pub lag: Option<Lag>,
+    pub alpha_rate: Option<AlphaRateTerm>,
     pub velocity: f64,
     pub gravity: f64,
 }
 
 /// Effect of α̇ on the rates of the states.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Lag {
+pub struct AlphaRateTerm {
     /// Index of α among the states.
     pub alpha: usize,
     /// Slopes of m along each value of the posterior.
@@ -71,16 +72,16 @@ impl LinearModel {
             slopes: self.slopes[..count].to_vec(),
             control_slopes: self.control_slopes[..count].to_vec(),
         };
-        match &self.lag {
+        match &self.alpha_rate {
             None => explicit,
-            Some(lag) => lag.solved(&explicit, values),
+            Some(term) => term.solved(&explicit, values),
         }
     }
 }
 
-impl Lag {
-    /// Solves the equations with a lag for the rates. Let e be the unit vector of α and I the
-    /// identity. Then ẋ = (I − m eᵀ)⁻¹ (A x + B u), and the inverse is I + m eᵀ/(1 − eᵀm). The
+impl AlphaRateTerm {
+    /// Solves the equations with a term along α̇ for the rates. Let e be the unit vector of α and I
+    /// the identity. Then ẋ = (I − m eᵀ)⁻¹ (A x + B u), and the inverse is I + m eᵀ/(1 − eᵀm). The
     /// slopes follow from the slopes of (I − m eᵀ) A.
     fn solved(&self, explicit: &SolvedEquations, values: &DVector<f64>) -> SolvedEquations {
         let effect = weighted_sum(&self.slopes, values);
@@ -91,9 +92,11 @@ impl Lag {
         let control = solve_vector(explicit.control);
         let of_matrix = explicit.slopes.iter().zip(&self.slopes);
         let of_control = explicit.control_slopes.iter().zip(&self.slopes);
-        let slope = |(own, lag): (&Matrix, &Vector)| solve(own + lag * matrix.row(self.alpha));
-        let control_slope =
-            |(own, lag): (&Vector, &Vector)| solve_vector(own + lag * control[self.alpha]);
+        let slope =
+            |(slope, effect): (&Matrix, &Vector)| solve(slope + effect * matrix.row(self.alpha));
+        let control_slope = |(slope, effect): (&Vector, &Vector)| {
+            solve_vector(slope + effect * control[self.alpha])
+        };
         SolvedEquations {
             matrix,
             control,
@@ -174,7 +177,7 @@ pub struct Controls<'a> {
 #[derive(Clone, Copy, Debug)]
 pub struct SteadyFlight<'a> {
     pub aircraft: &'a Aircraft,
-    pub buildup: &'a Buildup,
+    pub aero_model: &'a AeroModel,
     pub trim: &'a Trim,
     pub controls: Controls<'a>,
 }
@@ -187,7 +190,7 @@ impl SteadyFlight<'_> {
         let values = posterior.values.iter();
         values
             .map(|value| {
-                let derivative = self.buildup.derivative(&value.derivative);
+                let derivative = self.aero_model.derivative(&value.derivative);
                 derivative.map_or_else(Effect::default, |derivative| {
                     self.effect(value, derivative, posterior, states)
                 })

@@ -9,7 +9,9 @@
 //! The pitch control balances the moment M of the thrust. Unlike the moment of the control, that of
 //! the thrust does not grow with V.
 
-use super::linear::{AxisStates, ByCoefficient, Lag, LinearModel, Matrix, SteadyFlight, Vector};
+use super::linear::{
+    AlphaRateTerm, AxisStates, ByCoefficient, LinearModel, Matrix, SteadyFlight, Vector,
+};
 use super::trim::Trim;
 use crate::aircraft::Aircraft;
 use crate::dynamics::{Equations, Longitudinal};
@@ -94,10 +96,14 @@ impl SteadyFlight<'_> {
             rigid: without.by_state,
             slopes: vec![],
             control_slopes: vec![],
-            lag: self.buildup.lags().next().map(|_| Lag {
-                alpha: ALPHA,
-                slopes: vec![],
-            }),
+            alpha_rate: self
+                .aero_model
+                .along_alpha_rate()
+                .next()
+                .map(|_| AlphaRateTerm {
+                    alpha: ALPHA,
+                    slopes: vec![],
+                }),
             velocity: trim.velocity,
             gravity: trim.gravity,
         };
@@ -110,8 +116,8 @@ impl SteadyFlight<'_> {
             }
             linear.slopes.push(slope);
             linear.control_slopes.push(column * effect.by_control);
-            if let Some(lag) = &mut linear.lag {
-                lag.slopes.push(column * effect.by_alpha_rate);
+            if let Some(term) = &mut linear.alpha_rate {
+                term.slopes.push(column * effect.by_alpha_rate);
             }
         }
         linear

@@ -47,8 +47,8 @@ impl SolvedEquations {
         Dual::new(self.control[i], slopes.collect())
     }
 
-    /// Larger zero of the transfer function from control to pitch attitude: with θ held at zero the
-    /// moment sets the control, and velocity and α remain.
+    /// Larger zero of the transfer function from control to pitch attitude. With θ held at zero the
+    /// moment determines the control, and velocity and α remain.
     fn attitude_zero(&self) -> Dual {
         let entry = |i: usize, j: usize| self.a(i, j) - self.b(i) * self.a(2, j) / self.b(2);
         let [xx, xz, zx, zz] = [entry(0, 0), entry(0, 1), entry(1, 0), entry(1, 1)];
@@ -87,6 +87,7 @@ fn longitudinal(
             diverging.map_or_else(|| f64::NAN.into(), |root| time_to_double(root.real())),
         ),
         (FlyingQuality::AttitudeZero, entries.attitude_zero()),
+        // CAP = ω²/(n/α): ω² is the product of the fast roots, n/α the load factor per radian.
         (
             FlyingQuality::ControlAnticipation,
             fast.product.clone() / load_factor.clone(),

@@ -12,9 +12,9 @@ use crate::tables::{
 /// Probability of one or more false alarms over the histories of all series.
 const ALARM_PROBABILITY: f64 = 0.01;
 
-/// Probability of one or more possible changes by chance over the histories of all series. A step of
-/// seven standard errors over eight flights has a probability of 0.004 in its series, and of 0.2 over
-/// fifty series: not sure, and worth a look.
+/// Probability of one or more possible changes by chance over the histories of all series. A step
+/// of seven standard errors over eight flights has a chance probability of 0.004 in one series and
+/// 0.2 in fifty series. It is reported as possible.
 const POSSIBLE_PROBABILITY: f64 = 0.25;
 
 /// Number of standard deviations above which an error common to all flights is certain.
@@ -89,8 +89,8 @@ impl ExaminedSeries {
 
     /// Verdict on the order of the flights; `tests` is the number of series with a history.
     ///
-    /// The probability of a change by chance is multiplied by the number of tests (Bonferroni), so
-    /// false verdicts over all series are no more frequent than stated.
+    /// The probability of a change by chance is multiplied by the number of tests (Bonferroni).
+    /// False verdicts over all series are thus no more frequent than stated.
     fn trend(&self, tests: usize) -> InstrumentTrend {
         let Some(change) = &self.change else {
             return InstrumentTrend::TooFewFlights;

@@ -1,8 +1,9 @@
 //! Errors that the flights of one recorder have in common.
 //!
 //! The flights draw the error of an instrument from one distribution: a mean that belongs to the
-//! recorder, and a scatter between flights. A flight that hardly determines the error takes it from
-//! the others; a flight far from the others is reported and never corrected by that error.
+//! recorder, and a scatter between flights. A flight that hardly determines an error takes it from
+//! the other flights. A flight far from the others is reported, and never corrected by the others'
+//! error.
 //!
 //! 1. [`error_series`]: one error of one instrument over the flights.
 //! 2. [`common_error`]: mean, scatter, and flights far from the others.

@@ -1,6 +1,5 @@
-//! First-order changes of a body's motion: of its air data and of the rate of its state, by the
-//! exact slopes of the equations at an instant. Several changes are computed together in the lanes
-//! of vectors.
+//! First-order changes of a body's air data and of the rate of its state, by the exact slopes of
+//! the equations at an instant. Several changes are computed together in the lanes of vectors.
 #![expect(
     clippy::inline_always,
     reason = "compiled into free runs for the processor at hand"
@@ -152,7 +151,7 @@ pub(crate) struct BodySlopes {
     velocity: [f64; 3],
     rates: [f64; 3],
     attitude: [f64; 4],
-    gravity: Down,
+    gravity: DownDirection,
     gravity_ft_s2: f64,
     per_mass: f64,
     /// Rows of the inertia matrix and of its inverse.
@@ -164,15 +163,15 @@ pub(crate) struct BodySlopes {
 
 /// Direction down in body axes, with its slopes along the attitude quaternion.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Down {
+pub(crate) struct DownDirection {
     pub direction: [f64; 3],
     by_attitude: [[f64; 4]; 3],
 }
 
-impl Down {
+impl DownDirection {
     /// Third row of the rotation matrix of the quaternion at unit length, whose entries are of second degree in it.
     #[must_use]
-    pub fn new(state: &BodyState) -> Down {
+    pub fn new(state: &BodyState) -> DownDirection {
         let attitude = attitude(state);
         let per_length = 1.0 / state.attitude.norm();
         let [i, j, k, w] = attitude.map(|a| a * per_length);
@@ -188,7 +187,7 @@ impl Down {
             let unit = [i, j, k, w];
             from_fn(|n| 2.0 * (by_unit[row][n] - along * unit[n]) * per_length)
         });
-        Down {
+        DownDirection {
             direction,
             by_attitude,
         }
@@ -217,7 +216,7 @@ impl BodySlopes {
             velocity: state.velocity.into(),
             rates: state.rates.into(),
             attitude: attitude(state),
-            gravity: Down::new(state),
+            gravity: DownDirection::new(state),
             gravity_ft_s2,
             per_mass: 1.0 / mass.mass_slug,
             // Both matrices are symmetric.

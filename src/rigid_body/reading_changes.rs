@@ -7,9 +7,9 @@
 use nalgebra::Vector3;
 use pulp::Simd;
 
-use super::changes::{AirChange, Down, StateChange};
+use super::changes::{AirChange, DownDirection, StateChange};
 use super::readings::Instant;
-use crate::aircraft::{Aircraft, Flow, Position, Reading};
+use crate::aircraft::{Aircraft, Position, Reading, VaneFlow};
 use crate::numerics::lanes::{Lanes, combination, each};
 use crate::units::{DEG, G0_FT_S2};
 
@@ -31,7 +31,7 @@ pub(crate) struct ReadingsChange<S: Simd> {
 pub(crate) struct ReadingSlopes {
     alpha_vane: VaneSlopes,
     beta_vane: VaneSlopes,
-    down: Down,
+    down: DownDirection,
     an: AccelerometerSlopes,
     ax: AccelerometerSlopes,
     ay: AccelerometerSlopes,
@@ -66,7 +66,7 @@ impl ReadingSlopes {
         ReadingSlopes {
             alpha_vane: VaneSlopes::new(&sensors.alpha_reading(&flow, cg), &flow),
             beta_vane: VaneSlopes::new(&sensors.beta_reading(&flow, cg), &flow),
-            down: Down::new(&instant.state),
+            down: DownDirection::new(&instant.state),
             an: accelerometer(sensors.an, 2, -1.0),
             ax: accelerometer(sensors.ax, 0, 1.0),
             ay: accelerometer(sensors.ay, 1, 1.0),
@@ -105,9 +105,9 @@ impl ReadingSlopes {
 }
 
 impl VaneSlopes {
-    /// Slopes of a vane. Its angle does not change if speed and rates grow by the same factor, so
-    /// its slope along the speed follows from those along the rates.
-    fn new(reading: &Reading, flow: &Flow) -> VaneSlopes {
+    /// Slopes of a vane. A vane's angle does not change if speed and rates grow by the same factor.
+    /// Its slope along the speed therefore follows from the slopes along the rates.
+    fn new(reading: &Reading, flow: &VaneFlow) -> VaneSlopes {
         let by_rates = reading.by_rates;
         let along: f64 = by_rates
             .iter()

@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use super::air_data::AirData;
 use super::body::{BodyState, StateRate};
 use super::loading::Loading;
-use crate::aircraft::{Aircraft, Flow, Position};
+use crate::aircraft::{Aircraft, Position, VaneFlow};
 use crate::units::{DEG, G0_FT_S2};
 
 /// Motion at one instant, as the sensors measure it.
@@ -46,8 +46,8 @@ pub struct Readings {
 impl Instant {
     /// Flow at the vanes.
     #[inline(always)]
-    pub(super) fn flow(&self) -> Flow {
-        Flow {
+    pub(super) fn flow(&self) -> VaneFlow {
+        VaneFlow {
             alpha: self.air.alpha,
             beta: self.air.beta,
             velocity: self.air.velocity_ft_s,

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use crate::aircraft::{Aircraft, Flow, Position};
+use crate::aircraft::{Aircraft, Position, VaneFlow};
 use crate::flight::{Record, signal};
 use crate::maneuver::{Class, Maneuver, ManeuverOrigin, Quality, Recognised};
 use crate::numerics::mean::finite_mean;
@@ -100,7 +100,7 @@ fn mean_alpha_deg(
 ) -> Option<f64> {
     let alpha = |k: usize| -> Option<f64> {
         let at = |name: &str| record.values(name).and_then(|v| v.get(k)).copied();
-        let at_vanes = Flow {
+        let at_vanes = VaneFlow {
             alpha: at(signal::ALPHA_VANE)? / DEG,
             beta: at(signal::BETA_VANE)? / DEG,
             velocity: at(signal::VELOCITY)?,

@@ -3,15 +3,15 @@
 use crate::aircraft::Aircraft;
 use crate::error::did_you_mean;
 use crate::flight::Record;
-use crate::maneuver::{Class, Event, Maneuver, Unknown};
+use crate::maneuver::{Class, Event, Maneuver, UnclassifiedExcitation};
 use crate::tables::{EventRow, EventVerdict};
 
 use super::segmented::Segmented;
 use super::settings::QualityLimits;
 use super::{condition, problems};
 
-/// Difference up to which starts and ends of a found maneuver and an event agree, s: coarse enough
-/// for times that are read from a strip chart.
+/// Difference up to which starts and ends of a found maneuver and an event agree, s. It is coarse
+/// enough for times read from a strip chart.
 const AGREEMENT_S: f64 = 1.0;
 
 /// Share of the shorter window above which an event replaces a maneuver, also one of the other
@@ -59,7 +59,7 @@ pub fn with_events(
             Err(reason) => problems.push(problems::at_time(record, event.start_s, reason)),
         }
     }
-    let is_explained = |u: &Unknown| given.iter().any(|g| explains(g, u));
+    let is_explained = |u: &UnclassifiedExcitation| given.iter().any(|g| explains(g, u));
     let (explained, unknown) = unknown.into_iter().partition::<Vec<_>, _>(is_explained);
     let explained = problems::of_unknown(record, &explained);
     problems.retain(|problem| !explained.contains(problem));
@@ -124,8 +124,8 @@ fn replaces(given: &Maneuver, found: &Maneuver, step_s: f64) -> bool {
     shares_most || given.axis == found.axis && has_input
 }
 
-/// True if the analyst's maneuver covers more than half of an excitation that fits no class.
-fn explains(given: &Maneuver, unknown: &Unknown) -> bool {
+/// `true` if the analyst's maneuver covers more than half of an excitation that fits no class.
+fn explains(given: &Maneuver, unknown: &UnclassifiedExcitation) -> bool {
     let lasting_s = unknown.end_s - unknown.start_s;
     overlap_s(given, unknown.start_s, unknown.end_s) > REPLACING_SHARE * lasting_s
 }

@@ -7,7 +7,7 @@ use super::recognition::found::FoundManeuver;
 use super::settings::Settings;
 use crate::error::{Problem, ProblemStage};
 use crate::flight::{Record, signal};
-use crate::maneuver::{Class, Unknown};
+use crate::maneuver::{Class, UnclassifiedExcitation};
 
 /// Least number of maneuvers that contradict a constant flag before it counts as stuck: one may be
 /// misclassified.
@@ -29,8 +29,8 @@ pub(super) fn at_time(record: &Record, time_s: f64, reason: String) -> Problem {
 }
 
 /// One problem for each excitation that fits no class.
-pub(super) fn of_unknown(record: &Record, unknown: &[Unknown]) -> Vec<Problem> {
-    let problem = |u: &Unknown| {
+pub(super) fn of_unknown(record: &Record, unknown: &[UnclassifiedExcitation]) -> Vec<Problem> {
+    let problem = |u: &UnclassifiedExcitation| {
         let lasting_s = u.end_s - u.start_s;
         let reason = format!(
             "excitation of {lasting_s:.1} s that fits no class: {}; steps seen: {}",

@@ -1,6 +1,6 @@
-//! Quality of a maneuver before it is estimated: trimmed at the start, α held, one axis alone,
-//! above the noise, surfaces free of their stops, samples as recorded. A maneuver beyond a limit is
-//! rejected with the reason.
+//! Quality of a maneuver before it is estimated. A good maneuver starts trimmed, holds α, moves one
+//! axis alone and exceeds the noise. Its surfaces are free of their stops, and its samples are as
+//! recorded. A maneuver beyond a limit is rejected with the reason.
 
 use std::ops::RangeInclusive;
 
@@ -12,20 +12,20 @@ use crate::numerics::differences::white_noise;
 use crate::numerics::sample_count::nearest;
 use crate::units::RAD;
 
-/// Time before the first input that is excluded from the lead-in, s: the detected time of a step is
+/// Time before the first input that is excluded from the lead-in, s. The detected time of a step is
 /// within a few samples of the input's begin.
 const CLEAR_OF_INPUT_S: f64 = 0.1;
 
-/// Share of a surface's travel within which it counts as at its stop: larger than the sensor's
-/// error there, smaller than the margin that commands leave.
+/// Fraction of a surface's travel within which the surface counts as at its stop. It is larger than
+/// the sensor's error there, and smaller than the margin that commands leave.
 const AT_STOP: f64 = 0.01;
 
-/// Share of an actuator's rate above which it counts as at its full rate: it leaves room for the
-/// noise of a difference between two samples.
+/// Fraction of an actuator's rate above which the actuator counts as at its full rate. The rest is
+/// room for the noise of a difference between two samples.
 const AT_FULL_RATE: f64 = 0.9;
 
-/// Half the time over which a rate is differentiated, s: short compared with the aircraft's motion,
-/// but long enough that gyro noise contributes little to the acceleration.
+/// Half the time over which a rate is differentiated, s. It is short compared with the aircraft's
+/// motion, and long enough that gyro noise contributes little to the acceleration.
 const HALF_SPAN_S: f64 = 0.1;
 
 /// Least number of samples of a mean square about a line: two determine the line.

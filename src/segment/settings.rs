@@ -11,9 +11,9 @@ settings! {
         /// left out. It is drawn, and a flight without it is listed in `problems`. A surface that steps while it is
         /// up is not taken for feedback to the pilot, unless the flag is stuck.
         pub excitation_flag: String = String::new(),
-        /// Signals of the pilot's controls. A surface that steps with one of them is geared to it,
-        /// one that steps right after it is feedback; neither counts as excitation by the on-board
-        /// system.
+        /// Signals of the pilot's controls. A surface that steps with a control is geared to it; a
+        /// surface that steps right after a control is feedback. Neither counts as excitation by
+        /// the on-board system.
         pub pilot_controls: Vec<String> = Vec::new(),
         /// Smallest change of each signal that counts as a step, in the signal's unit. Smaller:
         /// turbulence and feedback are counted as steps. Larger: small doublets are missed. Classes

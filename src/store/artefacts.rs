@@ -14,7 +14,7 @@ use serde::de::DeserializeOwned;
 use super::artefact_name::{ArtefactName, Kind};
 use super::atomic;
 use super::fingerprint::{Digest, sealed, unsealed};
-use super::in_work::{InWorkList, Listed};
+use super::in_work::{InWorkEntry, InWorkList};
 use super::input_digests::InputDigests;
 use super::lock::Lock;
 use super::regular;
@@ -67,7 +67,7 @@ impl Store {
         }
         Ok(Store {
             _lock: Some(lock),
-            in_work: Some(InWorkList::of(folder)),
+            in_work: Some(InWorkList::start_empty(folder)),
             ..Store::read_only(folder)
         })
     }
@@ -77,7 +77,7 @@ impl Store {
     ///
     /// # Errors
     /// As [`Store::open`].
-    pub fn join(folder: &Path, wait: Duration) -> Result<Store> {
+    pub fn open_shared(folder: &Path, wait: Duration) -> Result<Store> {
         let lock = Lock::share(&folder.join("lock"), "store", wait)?;
         Ok(Store {
             _lock: Some(lock),
@@ -102,7 +102,7 @@ impl Store {
     }
 
     /// Lists a flight as being processed until the returned value is dropped.
-    pub fn list_in_work<'a>(&'a self, flight_id: &'a str) -> Option<Listed<'a>> {
+    pub fn list_in_work<'a>(&'a self, flight_id: &'a str) -> Option<InWorkEntry<'a>> {
         self.in_work.as_ref().map(|list| list.add(flight_id))
     }
 
@@ -322,8 +322,8 @@ impl Store {
         }
     }
 
-    /// `true` if the folder has an artefact whose seal fits, or only the object store has it, with this
-    /// size.
+    /// `true` if the local file has a valid seal, or, without a local file, if the object store has
+    /// the artefact in this size.
     #[must_use]
     pub fn is_intact(&self, name: &ArtefactName, bytes: u64) -> bool {
         if self.has_file(name) {

@@ -19,7 +19,7 @@ pub fn place(path: &Path, bytes: &[u8]) -> Result<()> {
     if regular::read(path).is_ok_and(|present| present == bytes) {
         return Ok(());
     }
-    let mut draft = Draft::of(path)?;
+    let mut draft = Draft::create(path)?;
     draft
         .file
         .write_all(bytes)
@@ -54,11 +54,11 @@ impl Write for Digesting<'_> {
 }
 
 impl Draft {
-    /// Begins a file that is to be at `path`, creating folders as needed.
+    /// Creates a temporary file that is to be at `path`, and the folders of `path` as needed.
     ///
     /// # Errors
     /// [`Error::Io`] naming the folder.
-    pub fn of(path: &Path) -> Result<Draft> {
+    pub fn create(path: &Path) -> Result<Draft> {
         let folder = path.parent().unwrap_or(Path::new("."));
         fs::create_dir_all(folder).map_err(Error::io(folder, "cannot create the folder"))?;
         let mut builder = tempfile::Builder::new();
@@ -198,7 +198,7 @@ mod tests {
     fn a_drafts_digest_is_the_files() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("record.parquet");
-        let mut draft = Draft::of(&path).unwrap();
+        let mut draft = Draft::create(&path).unwrap();
         let mut writer = draft.writer();
         for part in [vec![1; 3_000_000], vec![], vec![2; 17]] {
             writer.write_all(&part).unwrap();

@@ -27,14 +27,14 @@ pub struct InWorkList {
 
 /// A flight on the list, until it is dropped.
 #[derive(Debug)]
-pub struct Listed<'a> {
+pub struct InWorkEntry<'a> {
     list: &'a InWorkList,
     flight_id: &'a str,
 }
 
 impl InWorkList {
-    /// Empty list of a store that this run holds alone. Removes the list of a killed run.
-    pub fn of(folder: &Path) -> InWorkList {
+    /// Starts an empty list of a store that this run holds alone: removes the file of a killed run.
+    pub fn start_empty(folder: &Path) -> InWorkList {
         let list = InWorkList {
             path: folder.join(FILE),
             flights: Mutex::default(),
@@ -43,11 +43,11 @@ impl InWorkList {
         list
     }
 
-    pub fn add<'a>(&'a self, flight_id: &'a str) -> Listed<'a> {
+    pub fn add<'a>(&'a self, flight_id: &'a str) -> InWorkEntry<'a> {
         self.change(|flights| {
             flights.insert(flight_id.to_owned(), timestamp(SystemTime::now()));
         });
-        Listed {
+        InWorkEntry {
             list: self,
             flight_id,
         }
@@ -67,7 +67,7 @@ impl InWorkList {
     }
 }
 
-impl Drop for Listed<'_> {
+impl Drop for InWorkEntry<'_> {
     fn drop(&mut self) {
         self.list.change(|flights| {
             flights.remove(self.flight_id);
@@ -97,7 +97,7 @@ mod tests {
     fn flights_in_work_are_listed_while_the_store_is_held() {
         let folder = tempfile::tempdir().unwrap();
         let lock = Lock::take(&folder.path().join("lock"), "store", Duration::ZERO).unwrap();
-        let list = InWorkList::of(folder.path());
+        let list = InWorkList::start_empty(folder.path());
         let first = list.add("007");
         let second = list.add("008");
         let listed: Vec<String> = in_work(folder.path()).into_keys().collect();

@@ -2,9 +2,10 @@
 //! flight.
 //!
 //! A remembered digest counts while the file system reports the same device, inode, size, time of
-//! last write and time of last change, which no program can set. A file that changed within
-//! [`SETTLED`] before it was read is not remembered: it may change again within a tick of the file
-//! system's clock. A system without such times (not Unix) reads every file each time.
+//! last write and time of last change. No program can set the time of last change. A file that
+//! changed within [`SETTLED`] before it was read is not remembered: it may change again within a
+//! tick of the file system's clock. A system without such times (not Unix) reads every file each
+//! time.
 //!
 //! An object is unchanged while its size and its ETag are. That holds on every machine, so the
 //! digests of objects are shared with the store ([`InputDigests::objects`]).

@@ -2,10 +2,10 @@
 //!
 //! The lock belongs to the operating system and ends with the process that holds it. A dead process
 //! blocks nobody, even if the note still names it. A shared file system may extend the lock to
-//! other machines; on one without locks every run proceeds. The lock only prevents waste: artefacts
-//! are named by the fingerprint of everything that decides them and appear whole by a rename, so
-//! two runs that make the same artefact make the same bytes. A run whose temporary file another run
-//! removes has to try again.
+//! other machines; on one without locks every run proceeds. The lock only prevents wasted work. An
+//! artefact's name is the fingerprint of everything that determines it, and it appears whole by a
+//! rename. Two runs that compute the same artefact write the same bytes. A run whose temporary file
+//! another run removes has to try again.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, Write};

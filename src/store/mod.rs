@@ -30,7 +30,7 @@ mod visible_text;
 pub use artefact_name::{ArtefactName, Kind};
 pub use artefacts::Store;
 pub use fingerprint::{Digest, Fingerprint};
-pub use in_work::{InWork, Listed, in_work};
+pub use in_work::{InWork, InWorkEntry, in_work};
 pub use input_digests::InputDigests;
 pub use log::Log;
 pub use night_manifest::{Night, Summary};

@@ -15,8 +15,8 @@ use crate::flight::channel::RawColumn;
 /// Key of the field metadata that states a column's unit.
 pub(super) const UNIT: &str = "unit";
 
-/// Largest number of rows that are encoded or decoded at a time: 128 kB of a column, so a few MB for a file of
-/// some ten columns and row groups of any size.
+/// Largest number of rows that are encoded or decoded at a time: 128 kB of a column. A file of ten
+/// columns needs a few MB, whatever the size of its row groups.
 pub(super) const BATCH_ROWS: usize = 16_384;
 
 /// Encodes columns of one length as the bytes of a Parquet file.
@@ -34,8 +34,8 @@ pub fn bytes(columns: &BTreeMap<String, RawColumn>) -> Result<Vec<u8>, String> {
     encode(&batch)
 }
 
-/// Encodes columns of one length, one of them the clock, as the bytes of a tall Parquet file: time,
-/// name and value, in the order of time and name. A value that is not finite has no row.
+/// Encodes columns of one length, one of them the clock, as a tall Parquet file with time, name and
+/// value, sorted by time and name. A value that is not finite has no row.
 ///
 /// # Errors
 /// The reason.

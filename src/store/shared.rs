@@ -98,7 +98,7 @@ impl Shared {
     /// The object is gone, damaged or cannot be read.
     pub fn fetch(&self, name: &str, file: &Path, written: &Digest) -> Result<()> {
         let path = self.place.join(name);
-        let mut draft = Draft::of(file)?;
+        let mut draft = Draft::create(file)?;
         if !object::fetch(&path, &mut draft.writer()).map_err(|e| e.at(&path))? {
             self.listing().remove(name);
             return Err(Error::damaged(&path, &"it is gone; run again"));

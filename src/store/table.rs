@@ -20,17 +20,17 @@ use crate::tables::{ExportRow, FitRow, PredictedRow};
 
 /// Folder of published tables, with the metadata of their Parquet files.
 #[derive(Clone, Debug, Default)]
-pub struct Shelf {
+pub struct TableFolder {
     /// `None` publishes nothing.
     folder: Option<PathBuf>,
     provenance: Vec<(String, String)>,
 }
 
-impl Shelf {
+impl TableFolder {
     /// A folder for tables without provenance.
     #[must_use]
-    pub fn of(folder: &Path) -> Shelf {
-        Shelf {
+    pub fn of(folder: &Path) -> TableFolder {
+        TableFolder {
             folder: Some(folder.to_owned()),
             provenance: Vec::new(),
         }
@@ -39,7 +39,7 @@ impl Shelf {
     /// Adds pairs to the key-value metadata of each Parquet file; the CSV beside it has no
     /// metadata.
     #[must_use]
-    pub fn with(mut self, provenance: Vec<(String, String)>) -> Shelf {
+    pub fn with(mut self, provenance: Vec<(String, String)>) -> TableFolder {
         self.provenance = provenance;
         self
     }
@@ -69,7 +69,11 @@ pub fn provenance(path: &Path) -> Result<BTreeMap<String, String>> {
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Store`] naming the file.
-pub fn publish_fits(shelf: &Shelf, fits: &[FitRow], predicted: &[PredictedRow]) -> Result<()> {
+pub fn publish_fits(
+    shelf: &TableFolder,
+    fits: &[FitRow],
+    predicted: &[PredictedRow],
+) -> Result<()> {
     let none = PredictedRow::default();
     let beside: Vec<&PredictedRow> = (0..fits.len())
         .map(|i| predicted.get(i).unwrap_or(&none))
@@ -84,7 +88,7 @@ pub fn publish_fits(shelf: &Shelf, fits: &[FitRow], predicted: &[PredictedRow]) 
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Store`] naming the file.
-pub fn publish_export(shelf: &Shelf, rows: &[ExportRow], third: Option<&str>) -> Result<()> {
+pub fn publish_export(shelf: &TableFolder, rows: &[ExportRow], third: Option<&str>) -> Result<()> {
     let columns = ExportRow::columns(&rows.iter().collect::<Vec<_>>());
     let named = columns.into_iter().filter_map(|mut column| {
         if column.name == ExportRow::THIRD {
@@ -104,7 +108,7 @@ pub fn publish_export(shelf: &Shelf, rows: &[ExportRow], third: Option<&str>) ->
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Store`] naming the file.
-pub fn publish<T: Table>(shelf: &Shelf, rows: &[T]) -> Result<()> {
+pub fn publish<T: Table>(shelf: &TableFolder, rows: &[T]) -> Result<()> {
     publish_as(shelf, T::NAME, rows)
 }
 
@@ -112,12 +116,12 @@ pub fn publish<T: Table>(shelf: &Shelf, rows: &[T]) -> Result<()> {
 ///
 /// # Errors
 /// [`Error::Io`] or [`Error::Store`] naming the file.
-pub fn publish_as<T: Table>(shelf: &Shelf, name: &str, rows: &[T]) -> Result<()> {
+pub fn publish_as<T: Table>(shelf: &TableFolder, name: &str, rows: &[T]) -> Result<()> {
     let columns = T::columns(&rows.iter().collect::<Vec<_>>());
     place(shelf, name, rows.len(), &columns)
 }
 
-fn place(shelf: &Shelf, name: &str, rows: usize, columns: &[Column]) -> Result<()> {
+fn place(shelf: &TableFolder, name: &str, rows: usize, columns: &[Column]) -> Result<()> {
     let Some(folder) = &shelf.folder else {
         return Ok(());
     };
@@ -219,7 +223,7 @@ mod tests {
     #[test]
     fn a_table_without_rows_has_its_columns() {
         let folder = tempfile::tempdir().unwrap();
-        publish::<FitRow>(&Shelf::of(folder.path()), &[]).unwrap();
+        publish::<FitRow>(&TableFolder::of(folder.path()), &[]).unwrap();
         let csv = std::fs::read_to_string(folder.path().join("fits.csv")).unwrap();
         assert!(
             csv.starts_with(
@@ -239,7 +243,7 @@ mod tests {
             correlation: Some(f64::NAN),
             verdict: CheckVerdict::NotExcited,
         };
-        publish(&Shelf::of(folder.path()), &[row]).unwrap();
+        publish(&TableFolder::of(folder.path()), &[row]).unwrap();
         let csv = std::fs::read_to_string(folder.path().join("checks.csv")).unwrap();
         assert_eq!(
             csv.lines().nth(1),
@@ -270,7 +274,7 @@ mod tests {
             correlation: None,
             verdict: CheckVerdict::NotExcited,
         };
-        publish(&Shelf::of(folder.path()), std::slice::from_ref(&row)).unwrap();
+        publish(&TableFolder::of(folder.path()), std::slice::from_ref(&row)).unwrap();
         let csv = std::fs::read_to_string(folder.path().join("checks.csv")).unwrap();
         let written = csv.lines().nth(1).unwrap();
         assert!(
@@ -281,7 +285,7 @@ mod tests {
             flight_id: "a\u{1}\u{202e}b".into(),
             ..row
         };
-        publish(&Shelf::of(folder.path()), &[row]).unwrap();
+        publish(&TableFolder::of(folder.path()), &[row]).unwrap();
         let csv = std::fs::read_to_string(folder.path().join("checks.csv")).unwrap();
         assert!(csv.lines().nth(1).unwrap().starts_with("a__b,"), "{csv}");
     }
@@ -289,7 +293,7 @@ mod tests {
     #[test]
     fn parquet_has_the_unit_and_meaning_of_each_column() {
         let folder = tempfile::tempdir().unwrap();
-        publish::<FitRow>(&Shelf::of(folder.path()), &[]).unwrap();
+        publish::<FitRow>(&TableFolder::of(folder.path()), &[]).unwrap();
         let metadata = provenance(&folder.path().join("fits.parquet")).unwrap();
         let columns: serde_json::Value = serde_json::from_str(&metadata[COLUMNS]).unwrap();
         assert_eq!(columns[0]["name"], "maneuver_id");

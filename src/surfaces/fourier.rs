@@ -69,7 +69,7 @@ impl Band {
     }
 
     /// Series with their spectra, prepared for shifts in time.
-    pub fn shifted(&self, series: &[Vec<f64>]) -> Vec<Shifted> {
+    pub fn shifted(&self, series: &[Vec<f64>]) -> Vec<DelayedSpectrum> {
         let both = series.iter().flat_map(|series| {
             [
                 without_mean(series, &self.taper),
@@ -78,7 +78,7 @@ impl Band {
         });
         let mut spectra = self.sums(&both.collect::<Vec<_>>()).into_iter();
         std::iter::from_fn(|| {
-            Some(Shifted {
+            Some(DelayedSpectrum {
                 spectrum: spectra.next()?,
                 edges: spectra.next()?,
             })
@@ -128,12 +128,12 @@ fn taper(sample: usize, samples: usize) -> (f64, f64) {
 /// τ) has the spectrum e^(jωτ) ∫ w(t − τ) y(t) e^(−jωt) dt. Since the taper rises over seconds, w(t
 /// − τ) ≈ w(t) − τ w'(t).
 #[derive(Clone, Debug)]
-pub struct Shifted {
+pub struct DelayedSpectrum {
     spectrum: Spectrum,
     edges: Spectrum,
 }
 
-impl Shifted {
+impl DelayedSpectrum {
     /// Spectrum of the series `delay_s` later, and its slope along the delay, 1/s.
     pub fn spectrum_at_delay(&self, frequencies_hz: &[f64], delay_s: f64) -> (Spectrum, Spectrum) {
         let all = frequencies_hz.iter().zip(&self.spectrum).zip(&self.edges);

@@ -1,15 +1,15 @@
-//! A maneuver in the form for equation error in the frequency domain: the spectra of the
-//! coefficients that the measured motion implies, and of their regressors.
+//! A maneuver prepared for equation error in the frequency domain: spectra of the coefficients that
+//! the measured motion implies, and of their regressors.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use nalgebra::Complex;
 
-use super::fourier::{Band, Shifted, Spectrum};
-use crate::aero::{Axis, Buildup, Derivative, Regressor, WindTunnel};
+use super::fourier::{Band, DelayedSpectrum, Spectrum};
+use crate::aero::{AeroModel, Axis, Derivative, Regressor, WindTunnel};
 use crate::aircraft::Aircraft;
-use crate::dynamics::motion::{MassProperties, Window, slope_reach};
+use crate::dynamics::motion::{ManeuverSignals, MassProperties, slope_reach};
 use crate::dynamics::{COEFFICIENTS, Equations, Lateral, Longitudinal};
 use crate::flight::{Record, signal};
 use crate::maneuver::Maneuver;
@@ -35,7 +35,7 @@ pub struct CoefficientData {
 /// One derivative of the build-up.
 #[derive(Clone, Debug)]
 pub struct TermData {
-    pub regressor: Shifted,
+    pub regressor: DelayedSpectrum,
     /// Index of its surface.
     pub surface: Option<usize>,
     /// Tunnel's value.
@@ -48,7 +48,7 @@ pub struct TermData {
 #[derive(Clone, Copy, Debug)]
 pub struct AircraftModel<'a> {
     pub aircraft: &'a Aircraft,
-    pub buildup: &'a Buildup,
+    pub aero_model: &'a AeroModel,
     pub tunnel: &'a WindTunnel,
 }
 
@@ -68,10 +68,10 @@ impl ManeuverData {
     ) -> Option<ManeuverData> {
         let range = record.sample_at(maneuver.start_s)..record.sample_at(maneuver.end_s) + 1;
         let band = Band::new(range.len(), record.step_s)?;
-        let derivatives = derivatives(record, E::AXIS, basis.buildup);
+        let derivatives = derivatives(record, E::AXIS, basis.aero_model);
         let surfaces = surfaces_of(&derivatives);
         let signals = surfaces.iter().map(String::as_str);
-        let window = Window::cut(
+        let window = ManeuverSignals::cut(
             basis.aircraft,
             record,
             range,
@@ -88,7 +88,7 @@ impl ManeuverData {
         let regressors = regressors(&band, &case);
         let condition = maneuver.condition(basis.tunnel);
         let term = |j: usize| {
-            let derivative = basis.buildup.derivative(&case.names[j])?;
+            let derivative = basis.aero_model.derivative(&case.names[j])?;
             let regressor = regressors.get(&case.terms[j].column)?;
             let tunnel = basis.tunnel.at(&derivative.name, &condition);
             Some(TermData {
@@ -139,7 +139,7 @@ fn implied_spectra<const NX: usize, E: Equations<NX>>(
 fn regressors<const NX: usize, E: Equations<NX>>(
     band: &Band,
     case: &Case<NX, E>,
-) -> BTreeMap<usize, Shifted> {
+) -> BTreeMap<usize, DelayedSpectrum> {
     let columns = case.terms.iter().enumerate();
     let first: BTreeMap<usize, usize> = columns.rev().map(|(j, term)| (term.column, j)).collect();
     let series: Vec<Vec<f64>> = first
@@ -151,7 +151,7 @@ fn regressors<const NX: usize, E: Equations<NX>>(
 
 /// Derivatives of an axis without the constants, which the mean removes, and without those whose
 /// regressors follow from signals that are not recorded.
-fn derivatives<'a>(record: &Record, axis: Axis, buildup: &'a Buildup) -> Vec<&'a Derivative> {
+fn derivatives<'a>(record: &Record, axis: Axis, aero_model: &'a AeroModel) -> Vec<&'a Derivative> {
     let has_alpha_rate = [signal::AN, signal::AX]
         .iter()
         .all(|s| record.is_recorded(s));
@@ -160,7 +160,7 @@ fn derivatives<'a>(record: &Record, axis: Axis, buildup: &'a Buildup) -> Vec<&'a
         let has_regressor = has_alpha_rate || !d.regressor.has_alpha_rate();
         has_regressor && signals.all(|s| record.signals.contains_key(s))
     };
-    buildup
+    aero_model
         .derivatives_of(axis)
         .filter(|d| d.regressor != Regressor::Constant)
         .filter(is_recorded)

@@ -1,5 +1,8 @@
 //! Least squares on one coefficient in the frequency domain, with weights from the spectrum of its
 //! own residuals (Whittle's likelihood).
+//!
+//! Unlike the regression of `output_error::likelihood::equation_error` it has priors and returns the
+//! information on delays of the surfaces.
 
 use nalgebra::{Complex, DMatrix, DVector};
 

@@ -11,8 +11,9 @@ table! {
         pub wind_tunnel: Option<f64>,
         /// Flight minus tunnel, in the column `unit`.
         pub difference: Option<f64>,
-        /// Standard error of the difference, in the column `unit`: the posterior's standard deviation;
-        /// for a maneuver the root sum of squares of its bound and the tunnel's stated error.
+        /// Standard error of the difference, in the column `unit`. For the posterior its standard
+        /// deviation; for a maneuver the root sum of squares of its bound and the tunnel's stated
+        /// error.
         pub uncertainty: Option<f64>,
         /// Difference over the tunnel's magnitude.
         pub difference_pct: Option<f64> ["%"],
@@ -162,8 +163,8 @@ table! {
         pub verdict: Verdict,
         /// Median over the range of the difference over the other value's magnitude.
         pub difference_pct: Option<f64> ["%"],
-        /// Range in words: `flight lower than tunnel from 35° to 60°, by 30%`, the median, with the
-        /// extremes in brackets where they are far from it.
+        /// Range in words: `flight lower than tunnel from 35° to 60°, by 30%`. The percentage is
+        /// the median, with the extremes in brackets if they are far from it.
         pub words: String,
     }
 }

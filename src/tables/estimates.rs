@@ -21,7 +21,7 @@ table! {
         /// undetermined derivatives that have no tunnel value to be held at.
         pub reason: String,
         /// Starting values of the iteration that led to the outcome: the configured ones, or the
-        /// other ones where these do not converge.
+        /// alternative if these do not converge.
         pub start: Option<StartingValues>,
         /// Number of steps of the iteration.
         pub iterations: usize ["1"],
@@ -29,7 +29,7 @@ table! {
         /// for maneuvers that filter error estimates together.
         pub initial_cost: Option<f64> ["1"],
         /// Cost J of eq. 1.2 at the end of output error, also where filter error follows. Like the
-        /// initial cost with the weights of the class's table, whatever weights the fit has, and none
+        /// initial cost it has the weights of the class's table, whatever weights the fit has. None
         /// for maneuvers that filter error estimates together.
         pub final_cost: Option<f64> ["1"],
         /// Condition number of the information matrix scaled to unit diagonal; beyond 10¹⁰ the fit
@@ -46,9 +46,10 @@ table! {
         pub confounded: Option<String>,
         /// Method of the estimates.
         pub method: Option<EstimationMethod>,
-        /// Speed of the gusts across the flight path, rms, as filter error found them: `w_g` of
-        /// a longitudinal, `v_g` of a lateral maneuver. Found from the gusts' fast part, for a scale
-        /// of turbulence of 1,750 ft. Of maneuvers estimated together the root mean square.
+        /// Gust speed across the flight path, rms, by filter error: `w_g` of a longitudinal, `v_g`
+        /// of a lateral maneuver. Filter error estimates the high-frequency intensity of the flow
+        /// angle; it is converted to a speed with a turbulence scale of 1,750 ft (Dryden). Of
+        /// maneuvers estimated together the root mean square.
         pub gust_ft_s: Option<f64> ["ft/s"],
         /// Rotary gust, rms: `q_g`, or the larger one of `p_g` and `r_g`. Of maneuvers estimated together
         /// the root mean square.
@@ -61,9 +62,10 @@ table! {
         /// Log-likelihood that filter error gained over output error; none for maneuvers estimated
         /// together.
         pub likelihood_gain: Option<f64> ["1"],
-        /// Distance of the derivatives from equation error, √(dᵀ C⁻¹ d / n): d are the differences of
-        /// the n derivatives that both estimate, C is the sum of both covariances. Around or below
-        /// one where they agree: both use the same data, so that C is rather too large.
+        /// Distance of the derivatives from equation error, √(dᵀ C⁻¹ d / n). d are the differences
+        /// of the n derivatives that both methods estimate, C is the sum of the two covariances.
+        /// Around or below one if they agree: the methods use the same data, so that C is rather
+        /// too large.
         pub equation_error_distance: Option<f64> ["1"],
     }
 }
@@ -142,30 +144,40 @@ table! {
     /// `bound`, `bound_held` and `bound_calibration` are standard deviations (one sigma).
     /// `bound_corrected` is the half width of a 95 % interval over 1.96.
     ///
-    /// - `bound` is the Cramér-Rao bound for any weights W: the root of the diagonal of
-    ///   H⁻¹ [Σ Sᵀ W R̂ W S] H⁻¹ + G P Gᵀ, with S the sensitivities of the outputs, H = Σ Sᵀ W S,
-    ///   and R̂ the variances of the residuals. It assumes white residuals.
+    /// - `bound` is the Cramér-Rao bound with the effect G P Gᵀ of the held values: the root of the
+    ///   diagonal of a covariance. In output error the covariance is
+    ///   H⁻¹ [Σ Sᵀ W R̂ W S] H⁻¹ + G P Gᵀ for any weights W. S are the sensitivities of the
+    ///   outputs, H = Σ Sᵀ W S, and R̂ the variances of the residuals. In filter error it is
+    ///   H⁻¹ + G P Gᵀ, with H the information matrix of the innovations. Both assume that residuals
+    ///   or innovations are white.
     /// - `bound_held` is the root of the diagonal of G P Gᵀ: the effect of the uncertainty P of the
-    ///   tunnel's values on the estimates. G = −H⁻¹ Σ Sᵀ W S_h, with S_h the sensitivities to the
-    ///   values that are held, or that act at the tunnel's value though inactive. P is the tunnel
-    ///   table's `uncertainty`, or 20 % (`held_uncertainty_pct`) of the root mean square of the
+    ///   held values on the estimates. G = −H⁻¹ Σ Sᵀ W S_h, with W the inverse covariance of the
+    ///   innovations in filter error. S_h are the sensitivities to the held values. Inactive
+    ///   derivatives that act at the tunnel's value count as held. P is the tunnel table's
+    ///   `uncertainty`, or 20 % (`held_uncertainty_pct`) of the root mean square of the
     ///   derivative's table. Maneuvers that hold the same value share its error: it does not
     ///   average out.
-    /// - `bound_corrected` allows for coloured residuals: in place of R̂ stands the autocovariance of
-    ///   an autoregressive process per output. It also counts noise of the measured surfaces and
-    ///   errors of calibration. Student's t accounts for the few seconds from which the
-    ///   autocovariance is estimated. It is never below `bound`, and contains `bound_held`.
-    ///   `docs/coverage.md` has the measured coverage of its intervals.
-    /// - `bound_calibration` is the effect of each instrument's `uncertainty` in `aircraft.yaml`: the
-    ///   estimates' change with one standard deviation of each signal's bias and scale error, as a
-    ///   root sum of squares. It does not average out over maneuvers with the same instruments.
+    /// - `bound_corrected` allows for coloured residuals, or innovations in filter error: the
+    ///   autocovariance of an autoregressive process per output replaces their variances. It also
+    ///   counts noise of the measured surfaces and errors of calibration. Student's t accounts for
+    ///   the few seconds from which the autocovariance is estimated. `bound_corrected` is never
+    ///   below `bound`, and contains `bound_held`. `docs/coverage.md` has the measured coverage of
+    ///   its intervals.
+    /// - `bound_calibration` is the effect of each instrument's `uncertainty` in `aircraft.yaml`.
+    ///   It is the root sum of squares of the estimates' changes with one standard deviation of
+    ///   each signal's bias and scale error. It does not average out over maneuvers with the same
+    ///   instruments.
     ///
     /// No bound contains errors of signals without such an `uncertainty` (as shipped: mass, c.g.,
-    /// inertias), or noise of signals other than the five outputs and the surfaces.
+    /// inertias). None contains noise of signals other than the five outputs and the surfaces.
+    ///
+    /// With `estimate: held_values: posterior` the stage `model` replaces the held values and their
+    /// uncertainty P by those of the posterior of the other flights. It changes `value`, `bound`,
+    /// `bound_held` and `bound_corrected`.
     ///
     /// Rows of maneuvers estimated together follow, with `flight_id` `joint`. They have the shared
-    /// derivatives only. Trends, comparison and report are made from the single maneuvers alone, so
-    /// that the same data do not count twice; to count maneuvers, leave out `flight_id` `joint`.
+    /// derivatives only. Trends, comparison and report use the single maneuvers alone, so that the
+    /// same data do not count twice. To count maneuvers, leave out `flight_id` `joint`.
     pub struct EstimateRow in "estimates" per "maneuver and derivative or bias of its axis" {
         /// Maneuver, or group of maneuvers estimated together.
         pub maneuver_id: String,
@@ -190,7 +202,8 @@ table! {
         /// Cramér-Rao bound, with the uncertainty of the held values; empty unless estimated and
         /// determined by the data. In the column `unit`.
         pub bound: Option<f64>,
-        /// Part of both bounds that comes from the held values, in the column `unit`.
+        /// Part of `bound` and `bound_corrected` that comes from the held values, in the column
+        /// `unit`.
         pub bound_held: Option<f64>,
         /// Part of `bound_corrected` that comes from the errors that remain in the signals, and from the
         /// remaining uncertainty of the surfaces' delays, in the column `unit`; empty where all count as
@@ -237,7 +250,7 @@ impl EstimateRow {
             .filter(|_| self.status == Status::Held)
     }
 
-    /// True for a row of maneuvers estimated together.
+    /// `true` for a row of maneuvers estimated together.
     #[must_use]
     pub fn is_joint(&self) -> bool {
         self.flight_id == JOINT_FLIGHT

@@ -88,8 +88,8 @@ table! {
         pub before: f64,
         /// Expected standard deviation after the flight, in the column `unit`.
         pub after: f64,
-        /// Wanted standard deviation, in the column `unit`; empty where each reduction counts, or none
-        /// does: where the goal is decided already, or no flight can decide it.
+        /// Wanted standard deviation, in the column `unit`. Empty where each reduction counts. Also
+        /// empty where none counts: the goal is decided already, or no flight can decide it.
         pub wanted: Option<f64>,
         /// Mean by the posterior of tonight, in the column `unit`.
         pub value: Option<f64>,

@@ -15,8 +15,8 @@ table! {
         pub start_s: f64 ["s"],
         /// Time from the first sample to the last.
         pub duration_s: f64 ["s"],
-        /// Gusts along the body's forward axis, root mean square; empty for a short flight, as in
-        /// the two columns that follow.
+        /// Gusts along the body's forward axis, root mean square. This and the next two columns are
+        /// empty for a short flight.
         pub gust_u_ft_s: Option<f64> ["ft/s"],
         /// Gusts to the side, root mean square.
         pub gust_v_ft_s: Option<f64> ["ft/s"],
@@ -80,7 +80,7 @@ words! {
 }
 
 impl ChannelVerdict {
-    /// True unless the channel has a fault.
+    /// `true` unless the channel has a fault.
     #[must_use]
     pub fn passed(&self) -> bool {
         !matches!(self, ChannelVerdict::Fault(_))
@@ -124,7 +124,7 @@ words! {
 }
 
 impl CheckVerdict {
-    /// True unless the relation is violated.
+    /// `true` unless the relation is violated.
     #[must_use]
     pub fn passed(self) -> bool {
         matches!(self, CheckVerdict::Ok | CheckVerdict::NotExcited)
@@ -304,8 +304,8 @@ words! {
         NoDelay = "ok; delay not excited",
         /// The flight moves it too little; its errors are those of the other flights.
         FromOthers = "ok; taken from the other flights",
-        /// No error beyond its limit in this flight; an error that all flights have in common is certainly larger than
-        /// ordinary, and has a row in `problems`.
+        /// No error beyond its limit in this flight. An error common to all flights is certainly
+        /// larger than ordinary, and has a row in `problems`.
         WrongInEveryFlight = "wrong in every flight",
         /// The flight moves it too little to determine any error.
         NotExcited = "not excited",
@@ -319,14 +319,14 @@ words! {
 }
 
 impl InstrumentVerdict {
-    /// True unless the instrument has a fault, in this flight or in every flight.
+    /// `true` unless the instrument has a fault, in this flight or in every flight.
     #[must_use]
     pub fn passed(&self) -> bool {
         use InstrumentVerdict::{Fault, WrongInEveryFlight};
         !matches!(self, Fault(_) | WrongInEveryFlight)
     }
 
-    /// True where the flight determines no error of the instrument.
+    /// `true` if the flight determines no error of the instrument.
     #[must_use]
     pub fn is_unknown(&self) -> bool {
         matches!(

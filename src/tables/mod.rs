@@ -2,7 +2,7 @@
 //!
 //! Field names are column names. A value that does not exist is `None`: a null in Parquet, an empty
 //! field in CSV. The row of `maneuvers` is [`crate::maneuver::Maneuver`], that of `unknown`
-//! [`crate::maneuver::Unknown`], that of `problems` [`crate::error::Problem`].
+//! [`crate::maneuver::UnclassifiedExcitation`], that of `problems` [`crate::error::Problem`].
 
 mod bounds_study;
 mod comparison;

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::aero::DerivativeUnit;
 use crate::error::Problem;
-use crate::maneuver::{Maneuver, Unknown};
+use crate::maneuver::{Maneuver, UnclassifiedExcitation};
 use crate::schema::{Cells, Column, Entry, Row, Table, Words, one_line};
 
 const HEAD: &str = "\
@@ -95,7 +95,7 @@ fn sections() -> Vec<Section> {
     fits.columns.extend(PredictedRow::columns(&[]));
     vec![
         Section::of::<Maneuver>(),
-        Section::of::<Unknown>(),
+        Section::of::<UnclassifiedExcitation>(),
         fits,
         Section::of::<EstimateRow>(),
         Section {

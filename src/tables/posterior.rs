@@ -6,9 +6,9 @@ table! {
     /// Posterior of each derivative over the flight condition: the tunnel's table as prior, all
     /// converged maneuvers as evidence.
     ///
-    /// It counts the maneuvers' whole covariances, the exact effect of the values they held, and errors
-    /// that a flight, a class or the campaign has in common. Between the rows it is linear. The
-    /// constant of a sum (`CN_ba = CN_0 + CN_alpha α`) is the sum less the slope's part, with
+    /// It counts the maneuvers' whole covariances and the exact effect of the held values. It also
+    /// counts errors common to a flight, a class or the campaign. Between the rows it is linear.
+    /// The constant of a sum (`CN_ba = CN_0 + CN_alpha α`) is the sum less the slope's part, with
     /// both covariances counted. Constants without a table have no row.
     pub struct PosteriorRow in "posterior" per "derivative and flight condition" {
         /// Name of the derivative in the model, or of a sum.
@@ -88,8 +88,8 @@ table! {
         pub derivative: String,
         /// Knowledge about the derivative before flight.
         pub knowledge: PriorSource,
-        /// Standard deviation of the difference: over the root mean square of the tunnel's table, over
-        /// its stated uncertainty, or over the order of magnitude of the estimates.
+        /// Standard deviation of the difference, divided by the root mean square of the tunnel's
+        /// table, by its stated uncertainty, or by the order of magnitude of the estimates.
         pub size: f64 ["1"],
         /// Angle of attack over which the difference changes.
         pub length_deg: f64 ["deg"],
@@ -112,7 +112,7 @@ table! {
 
 table! {
     /// Lift and drag of each maneuver whose normal and axial force are estimated, from the rows of
-    /// `estimates`: C_L = C_N cos α − C_A sin α, C_D = C_N sin α + C_A cos α.
+    /// `estimates`. C_L = C_N cos α − C_A sin α; C_D = C_N sin α + C_A cos α.
     ///
     /// Row `total` has the coefficients in the mean flight condition. The other rows have their slopes along
     /// a regressor, at that condition; along α the axes turn as well.

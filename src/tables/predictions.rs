@@ -74,13 +74,14 @@ table! {
     ///
     /// A maneuver is predicted with the mean of the derivatives of the others of its class and α,
     /// weighted by their corrected covariances. With `hold: evidence` the mean has all derivatives
-    /// that some other estimates; the tunnel gives the rest. Biases, initial states and, unless
-    /// `share_constants`, constants are the maneuver's own: they are fitted again with the
-    /// derivatives fixed, because they take up the zero errors of the flight's vanes and surfaces.
+    /// that some other estimates; the tunnel gives the rest. Biases and initial states are fitted
+    /// again to the maneuver, with the derivatives fixed. So are constants unless `share_constants`
+    /// is set, because they absorb the zero errors of the flight's vanes and surfaces.
     ///
-    /// Filter error fits these where it estimated the maneuver, with the noise of the maneuver's own fit. The
-    /// computed outputs are those of the table `fit_outputs`, so that both compare: the angle of the air follows
-    /// the vane, and nothing else follows the measurements.
+    /// Filter error fits these where it estimated the maneuver, with the noise of the maneuver's
+    /// own fit. The computed outputs are defined as in the table `fit_outputs`, so that the two can
+    /// be compared: the angle of the air follows the vane, and nothing else follows the
+    /// measurements.
     pub struct AgreementRow in "predictions" per "predicted maneuver and output" {
         /// Maneuver.
         pub maneuver_id: String,

@@ -118,8 +118,8 @@ words! {
 }
 
 table! {
-    /// Proof of match: each maneuver flown again by a six-degree-of-freedom simulator with the recorded
-    /// surfaces and thrust, and how far it stays inside the tolerances of `match.yaml`.
+    /// Proof of match: each maneuver flown again by a six-degree-of-freedom simulator with the
+    /// recorded surfaces and thrust, with its margins to the tolerances of `match.yaml`.
     pub struct MatchRow in "match" per "maneuver, model and tolerance" {
         /// Maneuver.
         pub maneuver_id: String,
@@ -160,9 +160,9 @@ table! {
         pub largest_excess: Option<f64>,
         /// Time of the largest excess on the record's clock.
         pub largest_excess_s: Option<f64> ["s"],
-        /// One less the difference over the tolerance that the required share of samples does not
-        /// exceed: 1 for a perfect match, 0 on the limit, negative beyond. Empty where the simulated
-        /// aircraft departs.
+        /// One less a ratio: the difference over the tolerance that the required share of samples
+        /// does not exceed. 1 for a perfect match, 0 on the limit, negative beyond. Empty where the
+        /// simulated aircraft departs.
         pub margin: Option<f64> ["1"],
         /// Verdict.
         pub verdict: MatchVerdict,

@@ -138,8 +138,8 @@ table! {
         pub mass_slug: f64 ["slug"],
         /// Angle of the path above the horizon.
         pub path_deg: f64 ["deg"],
-        /// Value at the mean of the posterior; empty if undefined, as the time to double of a mode that
-        /// decays or the frequency of a pair of roots that diverges.
+        /// Value at the mean of the posterior. Empty if undefined: the time to double of a mode
+        /// that decays, or the frequency of a pair of roots that diverges.
         pub value: Option<f64>,
         /// Standard deviation; of draws, half the width of their central 68 %.
         pub standard_deviation: Option<f64>,

@@ -18,17 +18,17 @@ table! {
         pub alpha_deg: f64 ["deg"],
         /// Value of the polynomial or spline, in the column `unit`.
         pub value: f64,
-        /// Standard error of the trend, in the column `unit`: from the residuals as they are, with
-        /// the orders not chosen and the lack of fit at the flown angles of attack counted.
+        /// Standard error of the trend, in the column `unit`, from the observed residuals. It
+        /// includes the uncertainty of the order and the lack of fit at the flown angles of attack.
         pub standard_error: f64,
         /// Lower end of the trend's 95 % interval, in the column `unit`: Student's t with the
         /// residuals' degrees of freedom.
         pub lower_95: f64,
         /// Upper end of the trend's 95 % interval, in the column `unit`.
         pub upper_95: f64,
-        /// Lower end of the 95 % interval for one more maneuver's estimate with the median bound, in
-        /// the column `unit`: the trend's error, the deviations of maneuvers of one angle of attack from
-        /// each other, and that bound together.
+        /// Lower end of the 95 % prediction interval for one more maneuver with the median bound,
+        /// in the column `unit`. It contains the trend's error, the scatter of maneuvers at one
+        /// angle of attack, and the bound.
         pub prediction_lower_95: f64,
         /// Upper end of the 95 % interval for one more maneuver's estimate, in the column `unit`.
         pub prediction_upper_95: f64,

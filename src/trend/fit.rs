@@ -34,10 +34,10 @@
 //! # Outliers and intervals
 //!
 //! [`RobustSolution`] limits the influence of an outlier on the trend and on τ. A bound below the
-//! share `BOUND_FLOOR` of the group's median bound is raised to that share, because a bound is
-//! itself uncertain by a factor of a few. The 95 % band is Student's t with n − p degrees of freedom
-//! times the standard error (Hartung and Knapp 2001). The standard error is never smaller than the
-//! one from the bounds alone.
+//! fraction `BOUND_FLOOR` of the group's median bound is raised to that limit, because a bound is
+//! itself uncertain by a factor of a few. The 95 % band is Student's t with n − p degrees of
+//! freedom times the standard error (Hartung and Knapp 2001). The standard error is never smaller
+//! than the one from the bounds alone.
 //!
 //! # Lack of fit
 //!
@@ -159,12 +159,12 @@ impl Trend {
 impl TrendFit {
     /// The fits of every order that the data allow. Points are sorted by α.
     ///
-    /// A fit is allowed if at least two degrees of freedom remain for the residuals, and if it has no
-    /// more coefficients than flown α. With several maneuvers at each flown α, the curve may thus
-    /// pass through the mean at every one, as it must if the derivative bends between them.
-    /// Candidates are polynomials and splines. With knots from the analyst, both go up to the third
-    /// order. Without them the knots are the flown α between the ends: every one or every second one
-    /// with straight lines, every second one with cubics.
+    /// A fit is allowed if at least two degrees of freedom remain for the residuals, and if it has
+    /// no more coefficients than flown α. With several maneuvers at each flown α, the curve may
+    /// thus pass through the mean at every α. It must do so if the derivative bends between the
+    /// flown angles. Candidates are polynomials and splines. With knots from the analyst, both go
+    /// up to the third order. Without them the knots are the flown α between the ends: every one or
+    /// every second one with straight lines, every second one with cubics.
     fn all(points: &[TrendPoint], settings: &Settings, knots_deg: &[f64]) -> Vec<TrendFit> {
         let (Some(first), Some(last)) = (points.first(), points.last()) else {
             return Vec::new();

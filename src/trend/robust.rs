@@ -139,8 +139,8 @@ pub(super) fn inverse_variances(variances: &[f64]) -> DVector<f64> {
     DVector::from_iterator(variances.len(), variances.iter().map(|v| 1.0 / v))
 }
 
-/// Degrees of freedom 1 − h that each residual keeps, with h the leverage of the point: the share
-/// of its own value in the fitted value.
+/// Degrees of freedom 1 − h that each residual keeps. The leverage h of a point is the share of its
+/// value in the fitted value.
 fn residual_freedom(
     design: &DMatrix<f64>,
     weights: &DVector<f64>,

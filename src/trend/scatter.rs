@@ -14,8 +14,9 @@ pub(super) const HUBER: f64 = 1.5;
 pub(super) const HUBER_VARIANCE: f64 = 0.778_465;
 /// Least bound, as a share of the median bound: bounds are uncertain by a factor of a few.
 const BOUND_FLOOR: f64 = 0.25;
-/// Most halvings of the interval of τ². It begins at zero, so a τ² that is 2⁻ⁿ of the upper end needs n
-/// halvings before those of its own digits, 53: these allow n = 147. The search ends earlier at neighbours.
+/// Most halvings of the interval of τ². The interval begins at zero. If τ² is 2⁻ⁿ of the upper end,
+/// it takes n halvings to reach it and 53 for its digits. 200 halvings allow n = 147. The search
+/// ends earlier at neighbours.
 const HALVINGS: usize = 200;
 /// Least number of maneuvers of a class with a scatter of its own; classes with fewer maneuvers
 /// share the scatter of all.

@@ -1,10 +1,10 @@
 //! The wind-tunnel database: derivatives tabulated over angle of attack and, where the tunnel has
 //! them, Mach number and a third variable.
 //!
-//! A table is read along α at the Mach numbers and third values on either side, then across Mach,
-//! then across the third variable, linearly or by a monotone cubic ([`super::interpolation`]).
-//! Beyond its ends a table has the value at the end (clamped) or none (refused), by the settings;
-//! [`WindTunnel::extrapolations`] lists such readings.
+//! A table is interpolated along α at the Mach numbers and third values on either side, then across
+//! Mach, then across the third variable. The interpolation is linear or a monotone cubic
+//! ([`super::interpolation`]). Beyond its ends a table has the value at the end (clamped) or none
+//! (refused), by the settings; [`WindTunnel::extrapolations`] lists such readings.
 
 mod condition;
 mod database;

@@ -9,18 +9,18 @@ use crate::flight::signal;
 use crate::output_error::MOST_PRODUCTS;
 
 /// Checks the derivatives, biases and sums of the model.
-pub(super) fn buildup(config: &Config, source: &Source) -> Result<()> {
-    let buildup = &config.buildup;
-    let derivatives = buildup.derivatives.iter().map(|d| &d.name);
+pub(super) fn aero_model(config: &Config, source: &Source) -> Result<()> {
+    let aero_model = &config.aero_model;
+    let derivatives = aero_model.derivatives.iter().map(|d| &d.name);
     let mut names: Vec<&String> = derivatives
-        .chain(buildup.biases.iter().map(|b| &b.name))
+        .chain(aero_model.biases.iter().map(|b| &b.name))
         .collect();
-    names.extend(buildup.combined.iter().map(|c| &c.name));
+    names.extend(aero_model.combined.iter().map(|c| &c.name));
     names.sort();
     if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
         return Err(source.error(twice[0], format!("`{}` is defined twice", twice[0])));
     }
-    for derivative in &buildup.derivatives {
+    for derivative in &aero_model.derivatives {
         for name in derivative.regressor.signals() {
             if let Some(meant) = of_the_flow(name).filter(|_| !is_given(config, name)) {
                 let what = format!(
@@ -36,10 +36,11 @@ pub(super) fn buildup(config: &Config, source: &Source) -> Result<()> {
         }
     }
     few_products(config, source)?;
-    for combined in &buildup.combined {
+    for combined in &aero_model.combined {
         for part in [&combined.constant, &combined.slope] {
-            if buildup.derivative(part).is_none() {
-                let near = did_you_mean(part, buildup.derivatives.iter().map(|d| d.name.as_str()));
+            if aero_model.derivative(part).is_none() {
+                let near =
+                    did_you_mean(part, aero_model.derivatives.iter().map(|d| d.name.as_str()));
                 return Err(source.error(
                     part,
                     format!("{}: unknown derivative `{part}`{near}", combined.name),
@@ -63,7 +64,7 @@ fn of_the_flow(symbol: &str) -> Option<&'static str> {
 fn few_products(config: &Config, source: &Source) -> Result<()> {
     for axis in [Axis::Longitudinal, Axis::Lateral] {
         let mut products: Vec<&Regressor> = Vec::new();
-        for derivative in config.buildup.derivatives_of(axis) {
+        for derivative in config.aero_model.derivatives_of(axis) {
             let regressor = &derivative.regressor;
             let is_composed = matches!(regressor, Regressor::Product(_) | Regressor::Magnitude(_));
             if is_composed && !products.contains(&regressor) {

@@ -21,8 +21,8 @@ fn of_class(class: &Class, what: &str) -> String {
 
 /// Checks the status of each derivative and bias in a class and its overrides.
 fn statuses(config: &Config, class: &Class, source: &Source) -> Result<()> {
-    let derivatives = config.buildup.derivatives_of(class.axis);
-    let biases = config.buildup.biases_of(class.axis);
+    let derivatives = config.aero_model.derivatives_of(class.axis);
+    let biases = config.aero_model.biases_of(class.axis);
     let known: Vec<&str> = derivatives
         .map(|d| d.name.as_str())
         .chain(biases.map(|b| b.name.as_str()))
@@ -62,7 +62,7 @@ fn all_statuses(class: &Class) -> impl Iterator<Item = (&String, &Status)> {
 
 /// Reason for which a derivative cannot be estimated.
 fn not_estimable(name: &str, config: &Config) -> Option<String> {
-    let derivative = config.buildup.derivative(name)?;
+    let derivative = config.aero_model.derivative(name)?;
     derivative.regressor.has_alpha_rate().then(|| {
         format!(
             "`{name}` is estimated; a derivative along `alpha_dot` is held or inactive, since its rate is the measured one, and \
@@ -74,7 +74,7 @@ fn not_estimable(name: &str, config: &Config) -> Option<String> {
 /// Reason for which a derivative or bias cannot be held: a bias has no prior value, and the tunnel
 /// may lack the derivative.
 fn not_held(name: &str, class: &Class, config: &Config) -> Option<String> {
-    let mut biases = config.buildup.biases_of(class.axis);
+    let mut biases = config.aero_model.biases_of(class.axis);
     if biases.any(|bias| bias.name == name) {
         return Some("a bias is estimated or inactive, not held".to_owned());
     }

@@ -2,7 +2,7 @@
 //! each within that of the next level.
 
 use super::names::known_name;
-use crate::aero::{Axis, Buildup, Coefficient, Derivative};
+use crate::aero::{AeroModel, Axis, Coefficient, Derivative};
 use crate::config::checked::Config;
 use crate::config::source::{Files, Source};
 use crate::error::Result;
@@ -24,14 +24,14 @@ pub(super) fn check(config: &Config, files: &Files) -> Result<()> {
     let (Some(specification), Some(source)) = (&config.qualities, &files.qualities) else {
         return Ok(());
     };
-    let surfaces = config.buildup.derivatives.iter();
+    let surfaces = config.aero_model.derivatives.iter();
     let surfaces: Vec<&str> = surfaces.filter_map(|d| d.regressor.surface()).collect();
     let named = specification.pitch_control.keys();
     for surface in named.chain(specification.feedback.keys()) {
         known_name(source, surface, &surfaces, "surface of the model")?;
     }
-    pitch_control(specification, &config.buildup, source)?;
-    feedback(specification, &config.buildup, source)?;
+    pitch_control(specification, &config.aero_model, source)?;
+    feedback(specification, &config.aero_model, source)?;
     if !(LEAST_DRAWS..=MOST_DRAWS).contains(&specification.draws) {
         let draws = specification.draws;
         let what = format!("`draws` must lie between {LEAST_DRAWS} and {MOST_DRAWS}, not {draws}");
@@ -43,23 +43,30 @@ pub(super) fn check(config: &Config, files: &Files) -> Result<()> {
 
 /// Derivatives of an axis that are of a surface.
 fn moved<'a>(
-    buildup: &'a Buildup,
+    aero_model: &'a AeroModel,
     axis: Axis,
     surface: &'a str,
 ) -> impl Iterator<Item = &'a Derivative> {
-    let derivatives = buildup.derivatives_of(axis);
+    let derivatives = aero_model.derivatives_of(axis);
     derivatives.filter(move |d| d.regressor.signals().any(|name| name == surface))
 }
 
 /// Checks that the pitch control moves the aircraft in pitch.
-fn pitch_control(specification: &Specification, buildup: &Buildup, source: &Source) -> Result<()> {
+fn pitch_control(
+    specification: &Specification,
+    aero_model: &AeroModel,
+    source: &Source,
+) -> Result<()> {
     let error = |name: &str, what: String| Err(source.error_under("pitch_control", name, what));
     if specification.pitch_control.is_empty() {
         let what = "`pitch_control` names no surface; n/α and 1/T_θ2 need one";
         return error("pitch_control", what.to_owned());
     }
     for (surface, gearing) in &specification.pitch_control {
-        if moved(buildup, Axis::Longitudinal, surface).next().is_none() {
+        if moved(aero_model, Axis::Longitudinal, surface)
+            .next()
+            .is_none()
+        {
             let what = format!("`pitch_control`: `{surface}` has no longitudinal derivative");
             return error(surface, what);
         }
@@ -68,7 +75,7 @@ fn pitch_control(specification: &Specification, buildup: &Buildup, source: &Sour
         }
     }
     let pitches = |(surface, gearing): (&String, &f64)| {
-        let mut moved = moved(buildup, Axis::Longitudinal, surface);
+        let mut moved = moved(aero_model, Axis::Longitudinal, surface);
         *gearing != 0.0 && moved.any(|d| d.coefficient == Coefficient::Cm)
     };
     if specification.pitch_control.iter().any(pitches) {
@@ -80,14 +87,14 @@ fn pitch_control(specification: &Specification, buildup: &Buildup, source: &Sour
 }
 
 /// Checks that each gain of the feedback has an effect in the equations of its state.
-fn feedback(specification: &Specification, buildup: &Buildup, source: &Source) -> Result<()> {
+fn feedback(specification: &Specification, aero_model: &AeroModel, source: &Source) -> Result<()> {
     for (surface, gains) in &specification.feedback {
         for (state, gain) in gains {
             let error = |what: String| Err(source.error_under("feedback", state, what));
             let kind = "state that feedback may use";
             known_name(source, state, &FEEDBACK_STATES, kind)?;
             let axis = feedback_axis(state);
-            if moved(buildup, axis, surface).next().is_none() {
+            if moved(aero_model, axis, surface).next().is_none() {
                 return error(format!(
                     "feedback of `{state}` to `{surface}` has no effect: `{surface}` has no {} derivative",
                     axis.name()

@@ -28,7 +28,7 @@ pub(super) fn whole(
 ) -> Result<()> {
     aircraft::geometry(config, &files.aircraft)?;
     aircraft::channels(config, &files.aircraft)?;
-    build_up::buildup(config, &files.model)?;
+    build_up::aero_model(config, &files.model)?;
     for (class, source) in config.classes.iter().zip(&files.classes) {
         classes::class(config, class, source)?;
     }

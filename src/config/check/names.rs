@@ -42,9 +42,9 @@ pub(super) fn known_signal(config: &Config, source: &Source, name: &str, user: &
 /// Refuses a signal that is probably another one misspelt; `user` names what needs it. A recorder may
 /// lack any other signal: `check` lists it with the cost.
 pub(super) fn spelt_signal(config: &Config, source: &Source, name: &str, user: &str) -> Result<()> {
-    match meant(config, name) {
-        Some(meant) => {
-            let near = format!("; did you mean `{meant}`?");
+    match corrected_spelling(config, name) {
+        Some(spelling) => {
+            let near = format!("; did you mean `{spelling}`?");
             Err(no_channel(source, name, user, &near))
         }
         None => Ok(()),
@@ -66,9 +66,10 @@ fn no_channel(source: &Source, name: &str, user: &str, near: &str) -> Error {
     source.error(name, what)
 }
 
-/// Signal that was meant by a misspelt name. A typing error stands in one place of the configuration
-/// and is like a name that is right, or it stands in the channel map, whose signal nothing else uses.
-fn meant<'a>(config: &'a Config, name: &str) -> Option<&'a str> {
+/// Signal whose name is the corrected spelling of `name`. A typing error occurs in one place of the
+/// configuration and resembles a correct name; or it occurs in the channel map, and nothing else
+/// uses the signal.
+fn corrected_spelling<'a>(config: &'a Config, name: &str) -> Option<&'a str> {
     if is_given(config, name) || signal::is_own(name) {
         return None;
     }
@@ -90,7 +91,7 @@ fn meant<'a>(config: &'a Config, name: &str) -> Option<&'a str> {
 /// class.
 fn places(config: &Config) -> Vec<BTreeSet<&str>> {
     let settings = &config.segment;
-    let derivatives = config.buildup.derivatives.iter();
+    let derivatives = config.aero_model.derivatives.iter();
     let of_classes = config.classes.iter().map(|class| {
         let names = class.recognition.signals();
         names.collect()

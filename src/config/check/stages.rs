@@ -70,7 +70,7 @@ fn estimate(config: &Config, source: &Source) -> Result<()> {
                     maneuvers that share derivatives must hold the same";
         return Err(source.error_under("estimate", "joint", what));
     }
-    if config.buildup.lags().next().is_some() && settings.hold == Hold::Evidence {
+    if config.aero_model.along_alpha_rate().next().is_some() && settings.hold == Hold::Evidence {
         let what = "`hold: evidence` frees derivatives along `alpha_dot`, which must stay held: `hold: table` holds them";
         return Err(source.error_under("estimate", "hold", what));
     }
@@ -135,7 +135,7 @@ fn third_variable(config: &Config, source: &Source) -> Result<()> {
 
 /// Checks that a derivative is of each signal that export gives a property.
 fn export(config: &Config, source: &Source) -> Result<()> {
-    let derivatives = &config.buildup.derivatives;
+    let derivatives = &config.aero_model.derivatives;
     let used = || derivatives.iter().flat_map(|d| d.regressor.signals());
     let mut given = config.export.jsbsim_properties.keys();
     let unused = given.find(|signal| !used().any(|s| s == signal.as_str()));

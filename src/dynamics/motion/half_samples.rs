@@ -2,10 +2,10 @@
 
 use pulp::Arch;
 
-/// Interleaves samples with the values half-way between them, of the cubic through the two samples on
-/// either side. A straight line would cut the corners of a sine of angular frequency ω by (ω step)²/12,
-/// and so the effect of a surface; at 10 Hz and 1 Hz that is 3 %. At the ends, and beside a gap, the
-/// value is the mean of its neighbours.
+/// Interleaves samples with the values half-way between them, of the cubic through the two samples
+/// on either side. Linear interpolation would attenuate a sine of angular frequency ω by (ω
+/// step)²/12, and with it the effect of a surface. At 10 samples per second and 1 Hz that is 3 %.
+/// At the ends, and beside a gap, the value is the mean of its neighbours.
 pub fn with_half_samples(values: &[f64]) -> Vec<f64> {
     let mut points = vec![0.0; (2 * values.len()).saturating_sub(1)];
     Arch::new().dispatch(|| {

@@ -1,4 +1,4 @@
-//! Measured motion along a window: the signals of each point in the units of the equations.
+//! Measured motion of a maneuver: the signals of each point in the units of the equations.
 #![expect(
     clippy::inline_always,
     reason = "laid out by vectors for the processor at hand"
@@ -9,7 +9,7 @@ use crate::aircraft::{Aircraft, Position};
 use crate::dynamics::lever::lever;
 use crate::units::{G0_FT_S2, RAD};
 
-/// Measured motion along a window.
+/// Measured motion of a maneuver.
 pub struct MeasuredMotion<'a, G: Fn(f64) -> f64> {
     pub(super) aircraft: &'a Aircraft,
     pub(super) signals: Signals<'a>,
@@ -46,7 +46,7 @@ impl<G: Fn(f64) -> f64> MeasuredMotion<'_, G> {
     }
 }
 
-/// Signals of a window, grouped by use.
+/// Signals of a maneuver, grouped by use.
 pub struct Signals<'a> {
     pub flow: &'a [[f64; 2]],
     pub velocity: &'a [f64],
@@ -75,7 +75,7 @@ impl Signals<'_> {
         let [x_ft, y_ft, z_ft] = self.cg.map(|s| s[i]);
         let cg = Position { x_ft, y_ft, z_ft };
         let [alpha, beta] = self.flow[i];
-        let felt =
+        let lever_effect =
             |i: usize, sensor: Position| lever(i, sensor.arm(cg), rates, accelerations).value;
         let [thrust, rpm_left, rpm_right] = self.engines.map(|s| s[i]);
         let thrust = aircraft.thrust(thrust, cg);
@@ -85,7 +85,7 @@ impl Signals<'_> {
         let mass = self.mass[i];
         // With an accelerometer that does not sense thrust (the print of 2.8), thrust is added
         // here.
-        let unfelt = if aircraft.sensors.thrust_in_ax {
+        let unmeasured_thrust = if aircraft.sensors.thrust_in_ax {
             0.0
         } else {
             thrust.forward_lbf * (1.0 / mass)
@@ -98,9 +98,9 @@ impl Signals<'_> {
             accelerations,
             theta: self.attitude[0][i] * RAD,
             phi: self.attitude[1][i] * RAD,
-            force_x: G0_FT_S2 * ax - felt(0, aircraft.sensors.ax) + unfelt,
-            force_y: G0_FT_S2 * ay - felt(1, aircraft.sensors.ay),
-            force_z: -G0_FT_S2 * an - felt(2, aircraft.sensors.an),
+            force_x: G0_FT_S2 * ax - lever_effect(0, aircraft.sensors.ax) + unmeasured_thrust,
+            force_y: G0_FT_S2 * ay - lever_effect(1, aircraft.sensors.ay),
+            force_z: -G0_FT_S2 * an - lever_effect(2, aircraft.sensors.an),
             gravity: gravity(altitude),
             qbar,
             mass,

@@ -1,4 +1,4 @@
-//! Inversion of the vanes along a window: α and β at the c.g. from the local flow at the vanes.
+//! Inversion of the vanes over a maneuver: α and β at the c.g. from the local flow at the vanes.
 #![expect(
     clippy::inline_always,
     reason = "laid out by vectors for the processor at hand"
@@ -6,7 +6,7 @@
 
 use pulp::{Simd, WithSimd};
 
-use crate::aircraft::{Flow, Position, Sensors};
+use crate::aircraft::{Position, Sensors, VaneFlow};
 use crate::flight::signal;
 use crate::units::RAD;
 
@@ -38,7 +38,7 @@ impl WithSimd for VaneInversion<'_> {
         let mut angles = Vec::with_capacity(self.points);
         let [alpha, beta, velocity, p, q, r, x_ft, y_ft, z_ft] = self.signals;
         for i in 0..self.points {
-            let read = Flow {
+            let read = VaneFlow {
                 alpha: alpha[i] * RAD,
                 beta: beta[i] * RAD,
                 velocity: velocity[i],

@@ -43,7 +43,7 @@ impl<'m, 'a, const NX: usize, E: Equations<NX>> OwnEstimate<'m, 'a, NX, E> {
         let alone = |noise| (member.alone.clone(), noise, None);
         let (fit, noise, cost) = match air {
             Air::Moves(filtered) => (filtered.fit, filtered.noise, Some(filtered.cost)),
-            Air::IsStill => alone(Noise::slight(deviations())),
+            Air::IsStill => alone(Noise::with_small_gusts(deviations())),
             Air::Unknown(_) if member.alone.outcome == Outcome::Unidentifiable => {
                 alone(Noise::starting(deviations()))
             }

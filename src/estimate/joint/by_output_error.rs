@@ -4,7 +4,7 @@ use nalgebra::DVector;
 
 use super::member::{Fitted, Member, is_unshared, mean_of_own_estimates};
 use crate::dynamics::Equations;
-use crate::estimate::calibration_effect::{NOT_COUNTED, gradient_shifts, misreadings};
+use crate::estimate::calibration_effect::{NOT_COUNTED, gradient_shifts, signal_errors};
 use crate::estimate::task::{Task, values_by_name};
 use crate::estimate::whiteness::{lag_one, largest_correlation};
 use crate::output_error::consider::{self, Considered};
@@ -125,7 +125,7 @@ fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
         return;
     };
     let tasks: Vec<_> = parts.iter().map(|part| &part.task).collect();
-    let errors = misreadings(&tasks, &first.prepared.window);
+    let errors = signal_errors(&tasks, &first.prepared.window);
     let mut together = vec![DVector::zeros(joint.names().len()); errors.len()];
     for (i, part) in parts.iter().enumerate() {
         let places = joint.parameters().places(i);

@@ -55,12 +55,12 @@ fn estimate_of_wanted(estimated: &Estimated, wanted: &[&str]) -> Option<mean::Es
     let covariance = estimated.covariance.as_ref()?;
     let (mut places, mut at, mut values) = (Vec::new(), Vec::new(), Vec::new());
     for (place, name) in wanted.iter().enumerate() {
-        let found = covariance
+        let index_and_value = covariance
             .names
             .iter()
             .position(|n| n == name)
             .zip(estimated_value(estimated, name));
-        if let Some((i, value)) = found {
+        if let Some((i, value)) = index_and_value {
             places.push(place);
             at.push(i);
             values.push(value);

@@ -1,15 +1,16 @@
 //! Cross-validation: a maneuver is predicted with derivatives estimated from the others of its class
 //! and angle of attack.
 //!
-//! The others' derivatives are averaged, weighted by their covariances, and fixed. The predicted
-//! maneuver's own biases and initial states are fitted by output error with its own weights. So are,
-//! unless `share_constants` is set, its constants (`CN_0`), which take up the zero errors of the
-//! flight's vanes and surfaces. The remaining difference between measured and computed outputs is
-//! due to the derivatives; Theil's coefficient and R² measure it.
+//! The derivatives of the other maneuvers are averaged, weighted by their covariances, and fixed.
+//! Biases and initial states of the predicted maneuver are fitted by output error with its weights.
+//! So are its constants (`CN_0`) unless `share_constants` is set, because they absorb the zero
+//! errors of the flight's vanes and surfaces. The remaining difference between measured and
+//! computed outputs is due to the derivatives; Theil's coefficient and R² measure it.
 //!
-//! Where filter error estimated the maneuver, it also fits what the prediction leaves free, with the
-//! noise of the maneuver's own fit. A prediction from one sample to the next follows any motion, so the
-//! computed outputs are those along the air's angle, as for the own fit: both compare.
+//! Where filter error estimated the maneuver, it also fits what the prediction leaves free, with
+//! the noise of the maneuver's own fit. A prediction from one sample to the next follows any
+//! motion. The computed outputs are therefore those along the air's angle, as in the maneuver's
+//! fit, so that the two can be compared.
 
 mod mean_of_others;
 
@@ -81,7 +82,7 @@ pub fn predicting_maneuvers(
     let near = |a: &Maneuver, b: &Maneuver| {
         (a.alpha_deg - b.alpha_deg).abs() <= settings.alpha_distance_deg
     };
-    let of = |(i, m): (usize, &Maneuver)| {
+    let others_of = |(i, m): (usize, &Maneuver)| {
         let is_other = |&(j, o): &(usize, &Maneuver)| {
             j != i && o.class == m.class && near(m, o) && is_sound(j)
         };
@@ -94,7 +95,7 @@ pub fn predicting_maneuvers(
                 .collect()
         })
     };
-    maneuvers.iter().enumerate().map(of).collect()
+    maneuvers.iter().enumerate().map(others_of).collect()
 }
 
 /// Predicts one maneuver from others. `own` is its own estimate. A failure is reported in the
@@ -164,8 +165,8 @@ fn predict<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
     ))
 }
 
-/// Model with the derivatives held at the values from the others. The constants stay free unless
-/// they are shared.
+/// Model with the derivatives fixed at the values predicted from the other maneuvers. Constants
+/// stay free unless `share_constants` is set.
 fn with_others_held<'a>(task: &Task, model: &Model<'a>, value: impl Fn(&str) -> f64) -> Model<'a> {
     let prediction = task.context.settings.prediction.as_ref();
     let share_constants = prediction.is_some_and(|settings| settings.share_constants);
@@ -240,8 +241,8 @@ fn predict_by_output_error<const NX: usize, E: Equations<NX>>(
     })
 }
 
-/// Filter error on the maneuver's own constants, biases and initial states at known noise, from those
-/// of output error where it converges.
+/// Fits the maneuver's constants, biases and initial states by filter error with known noise.
+/// Starts from the output-error values if output error converged, otherwise from `start`.
 fn predict_in_gusts<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
     task: &Task,
     prepared: &PreparedCase<NX, E>,
@@ -250,8 +251,8 @@ fn predict_in_gusts<const NX: usize, E: Equations<NX>, const NG: usize, G: InGus
     start: Vec<f64>,
 ) -> Result<Prediction, String> {
     let filter = new_filter::<NX, E, NG, G>(task, prepared, &prepared.window, &prepared.model);
-    let own = SharedParameters::of_one(filter.names());
-    let joint = JointFilter::new(std::slice::from_ref(&filter), &own).with_known_noise();
+    let sharing = SharedParameters::of_one(filter.names());
+    let joint = JointFilter::new(std::slice::from_ref(&filter), &sharing).with_known_noise();
     let start = if by_output_error.cost.is_ok() {
         by_output_error.values.clone()
     } else {

@@ -11,7 +11,7 @@ fn bench_with_axial_force(method: Method) -> Bench {
     bench.settings.method = method;
     // Weights of the noise: with others an output of little use may enlarge a bound.
     bench.settings.weights = Weights::Estimated;
-    bench.buildup.biases.push(Bias {
+    bench.aero_model.biases.push(Bias {
         name: "ax_bias".into(),
         output: Output::Ax,
     });
@@ -151,7 +151,7 @@ fn without_axial_acceleration_and_tunnel_the_axial_force_is_absent() {
 fn a_lag_needs_the_accelerations_that_it_follows_from() {
     let mut bench = bench_with_axial_force(Method::OutputError);
     let lag = crate::aero::Regressor::parse("alpha_dot").unwrap();
-    bench.buildup.derivatives.push(Derivative {
+    bench.aero_model.derivatives.push(Derivative {
         name: "Cm_lag".into(),
         coefficient: crate::aero::Coefficient::Cm,
         regressor: lag,

@@ -7,9 +7,9 @@ use approx::assert_relative_eq;
 
 use super::super::*;
 use crate::aero::wind_tunnel::TunnelPoint;
-use crate::aero::{Axis, Buildup, Coefficient, Derivative, WindTunnel};
+use crate::aero::{AeroModel, Axis, Coefficient, Derivative, WindTunnel};
 use crate::dynamics::Longitudinal;
-use crate::dynamics::motion::{MassProperties, Window};
+use crate::dynamics::motion::{ManeuverSignals, MassProperties};
 use crate::dynamics::tests::aircraft;
 use crate::flight::record::Series;
 use crate::flight::{Mark, Record, signal};
@@ -37,7 +37,7 @@ fn fly(truth: Vec<(Derivative, f64)>, edit: impl Fn(&mut Record)) -> Flown {
         ..Model::default()
     };
     let surfaces = truth.iter().filter_map(|(d, _)| d.regressor.surface());
-    let window = Window::cut(
+    let window = ManeuverSignals::cut(
         &aircraft(),
         &record,
         0..SAMPLES,
@@ -121,11 +121,11 @@ impl Flown {
         };
         let maneuver = super::maneuver("f_t0", 20.0);
         let derivatives = self.truth.iter().map(|(d, _)| d.clone()).collect();
-        let (aircraft, buildup) = (
+        let (aircraft, aero_model) = (
             aircraft(),
-            Buildup {
+            AeroModel {
                 derivatives,
-                ..Buildup::default()
+                ..AeroModel::default()
             },
         );
         let settings = Settings {
@@ -134,7 +134,7 @@ impl Flown {
             tunnel_error_length_deg: f64::INFINITY,
             ..Settings::default()
         };
-        let context = Context::new(&aircraft, &buildup, tunnel, &settings);
+        let context = Context::new(&aircraft, &aero_model, tunnel, &settings);
         super::super::maneuver(&self.record, &maneuver, &class, &context)
     }
 }

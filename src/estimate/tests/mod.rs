@@ -17,9 +17,9 @@ use super::estimated::rejected_fit;
 use super::joint::{self, bins};
 use super::prediction::{self, predicting_maneuvers};
 use super::*;
-use crate::aero::{Axis, Bias, Buildup, Derivative, Output, WindTunnel};
+use crate::aero::{AeroModel, Axis, Bias, Derivative, Output, WindTunnel};
 use crate::aircraft::Aircraft;
-use crate::dynamics::motion::{MassProperties, Window};
+use crate::dynamics::motion::{ManeuverSignals, MassProperties};
 use crate::dynamics::tests::aircraft;
 use crate::dynamics::{Longitudinal, OUTPUTS};
 use crate::flight::record::Series;
@@ -32,7 +32,7 @@ use crate::tables::{EstimateRow, FitRow, Outcome, Participation, PredictionStatu
 /// The aircraft, model, class and settings of the tests.
 struct Bench {
     aircraft: Aircraft,
-    buildup: Buildup,
+    aero_model: AeroModel,
     tunnel: WindTunnel,
     settings: Settings,
     class: Class,
@@ -60,7 +60,7 @@ fn bench() -> Bench {
     };
     Bench {
         aircraft: aircraft(),
-        buildup: Buildup {
+        aero_model: AeroModel {
             derivatives,
             biases,
             combined: vec![],
@@ -75,12 +75,12 @@ impl Bench {
     fn context(&self) -> Context<'_> {
         let Bench {
             aircraft,
-            buildup,
+            aero_model,
             tunnel,
             settings,
             ..
         } = self;
-        Context::new(aircraft, buildup, tunnel, settings)
+        Context::new(aircraft, aero_model, tunnel, settings)
     }
 
     /// Case of a record in which the true derivatives are free, with their values.
@@ -92,7 +92,8 @@ impl Bench {
         };
         let surfaces = ["de_deg", "dpv_deg"];
         let recorded = MassProperties::Recorded;
-        let window = Window::cut(&self.aircraft, record, 0..SAMPLES, surfaces, recorded).unwrap();
+        let window =
+            ManeuverSignals::cut(&self.aircraft, record, 0..SAMPLES, surfaces, recorded).unwrap();
         let case = Case::new(&self.aircraft, &window, nothing_measured(), &model);
         let values = truth.iter().map(|(d, value)| (d.name.clone(), *value));
         (case, values.collect())

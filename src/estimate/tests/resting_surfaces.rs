@@ -6,7 +6,7 @@ use crate::aero::{Coefficient, Regressor};
 /// The bench with a flap in its model and its class.
 fn bench_with_flap() -> Bench {
     let mut bench = bench();
-    bench.buildup.derivatives.push(Derivative {
+    bench.aero_model.derivatives.push(Derivative {
         name: "Cm_dtef".into(),
         coefficient: Coefficient::Cm,
         regressor: Regressor::Surface("dtef_deg".into()),

@@ -15,7 +15,7 @@ use super::export_table::{ExportTable, is_same_breakpoint};
 use super::*;
 use crate::aero::wind_tunnel::TunnelPoint;
 use crate::aero::{
-    Buildup, Coefficient, Condition, Derivative, Regressor, WindTunnel, wind_tunnel,
+    AeroModel, Coefficient, Condition, Derivative, Regressor, WindTunnel, wind_tunnel,
 };
 use crate::config::{Config, Overrides};
 use crate::export::jsbsim::section as section_of;
@@ -87,7 +87,7 @@ impl Flown {
         let config = Config::load(Path::new("pipelines/harv"), Overrides::default()).unwrap();
         let mut posterior = Vec::new();
         for name in ["CN_alpha", "Cm_q", "Cl_p", "CY_dyv"] {
-            let unit = config.buildup.unit_of(name).unwrap().name();
+            let unit = config.aero_model.unit_of(name).unwrap().name();
             for (i, alpha) in ALPHAS.into_iter().enumerate() {
                 let tunnel = config.tunnel.value(name, alpha, 0.3).unwrap().value;
                 let value = 1.2 * tunnel + 0.001 * i as f64;
@@ -110,7 +110,7 @@ impl Flown {
         ExportContents {
             title: "F/A-18 & others",
             aircraft: &self.config.aircraft,
-            buildup: &self.config.buildup,
+            aero_model: &self.config.aero_model,
             tunnel: &self.config.tunnel,
             posterior: &self.posterior,
             correlations: &self.correlations,
@@ -128,7 +128,7 @@ impl Flown {
             ("CA_V", Coefficient::CA, "velocity_ft_s", 1e-5),
             ("Cm_alpha_dot", Coefficient::Cm, "alpha_dot", -4.0),
         ] {
-            self.config.buildup.derivatives.push(Derivative {
+            self.config.aero_model.derivatives.push(Derivative {
                 name: name.into(),
                 coefficient,
                 regressor: Regressor::parse(regressor).unwrap(),
@@ -190,7 +190,7 @@ fn the_posterior_stands_where_it_has_rows_and_the_tunnel_elsewhere() {
     let tables = tables(&flown.contents());
     assert_eq!(
         tables.len(),
-        flown.config.buildup.derivatives.len() + flown.config.buildup.combined.len()
+        flown.config.aero_model.derivatives.len() + flown.config.aero_model.combined.len()
     );
     for table in &tables {
         for (at, cell) in table.points() {
@@ -268,7 +268,7 @@ fn every_format_comes_back_as_the_same_tunnel_to_the_bit() {
             .as_ref()
             .map(|t| t.name.as_str());
         crate::store::table::publish_export(
-            &crate::store::table::Shelf::of(folder.path()),
+            &crate::store::table::TableFolder::of(folder.path()),
             &rows(&tables),
             third,
         )
@@ -371,7 +371,7 @@ fn the_jsbsim_section_gives_the_forces_and_moments_of_the_build_up() {
     let (tables, a) = (tables(&contents), contents.aircraft);
     let section = section_of(&contents, &tables);
     let mut surfaces: Vec<String> = contents
-        .buildup
+        .aero_model
         .derivatives
         .iter()
         .filter_map(|d| d.regressor.surface().map(str::to_owned))
@@ -381,12 +381,12 @@ fn the_jsbsim_section_gives_the_forces_and_moments_of_the_build_up() {
     let deflections: Vec<f64> = (0..surfaces.len()).map(|i| 3.0 - 1.1 * i as f64).collect();
     let names: Vec<String> = surfaces.iter().map(|s| format!("harvest/{s}")).collect();
     // JSBSim reads constant and slope linearly and apart.
-    let buildup = Buildup {
+    let aero_model = AeroModel {
         combined: vec![],
-        ..contents.buildup.clone()
+        ..contents.aero_model.clone()
     };
     let truth = Aerodynamics::new(
-        &buildup,
+        &aero_model,
         database(&tables, &wind_tunnel::Settings::default()),
         &surfaces,
     )

@@ -77,7 +77,7 @@ fn assert_gradient_matches_differences<const NX: usize, E: InGusts<NX>>(noise: &
 
 #[test]
 fn the_gradient_with_noisy_inputs_is_that_of_finite_differences() {
-    let still = Noise::still(OUTPUTS_NOISE);
+    let still = Noise::without_gusts(OUTPUTS_NOISE);
     for noise in [still, light()] {
         assert_gradient_matches_differences::<4, LongitudinalInGusts>(&noise);
         assert_gradient_matches_differences::<6, LateralInGusts>(&noise);
@@ -95,7 +95,7 @@ fn innovations_of_maneuvers<const NX: usize, E: InGusts<NX>>(exact: bool) -> (f6
         if exact {
             recorded.filter = recorded.filter.with_noisy_inputs(NoisyInputs::default());
         }
-        let still = Noise::still(OUTPUTS_NOISE);
+        let still = Noise::without_gusts(OUTPUTS_NOISE);
         let at = recorded.filter.with_noise(&recorded.own, &still);
         let white = recorded.filter.innovations(&at).unwrap().whitened;
         for pair in white.windows(2) {
@@ -133,7 +133,7 @@ fn mean_square_distance<const NX: usize, E: InGusts<NX>>() -> f64 {
     let (mut square, mut count) = (0.0, 0.0);
     for _ in 0..MANEUVERS {
         let recorded = recorded::<NX, E>(&truth, &mut draws);
-        let start = Noise::slight(OUTPUTS_NOISE);
+        let start = Noise::with_small_gusts(OUTPUTS_NOISE);
         let start = recorded.filter.with_noise(&recorded.own, &start);
         let own = SharedParameters::of_one(recorded.filter.names());
         let filter = JointFilter::new(std::slice::from_ref(&recorded.filter), &own);

@@ -123,7 +123,7 @@ fn assert_still_air_is_joint_output_error<
     let filters = [a, b];
     let parameters = sharing(&filters);
     let filter = JointFilter::new(&filters, &parameters);
-    let at = filter.with_noise(&at, &[Noise::still(light().outputs); 2]);
+    let at = filter.with_noise(&at, &[Noise::without_gusts(light().outputs); 2]);
     let response = filter.respond(&at).unwrap();
     let (gradient, information) = (filter.gradient(&response), filter.information(&response));
     assert_eq!(filter.own().names(), joint.names());

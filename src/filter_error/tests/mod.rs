@@ -2,7 +2,7 @@
 
 mod inputs;
 mod joint;
-mod misread;
+mod calibration_gradients;
 
 use std::collections::BTreeMap;
 
@@ -65,7 +65,7 @@ fn prepared<const NX: usize, E: InGusts<NX>>(
     let values = values_by_name(truth);
     let mut own: Vec<f64> = filter.case.starting_values(|name| values[name]);
     own.extend(biases.iter().map(|_| 0.01));
-    own.extend(filter.case.start.iter().take(E::own_states()));
+    own.extend(filter.case.start.iter().take(E::states_in_still_air()));
     Simulated { filter, own }
 }
 
@@ -78,9 +78,9 @@ impl<const NX: usize, E: InGusts<NX>> Simulated<NX, E> {
         )
         .unwrap()
         .l();
-        let first = self.filter.first_noise() - E::own_states();
+        let first = self.filter.first_noise() - E::states_in_still_air();
         let mut x = SVector::<f64, NX>::zeros();
-        for i in 0..E::own_states() {
+        for i in 0..E::states_in_still_air() {
             x[i] = self.own[first + i];
         }
         x = E::decayed(x, 0.0);
@@ -225,7 +225,7 @@ fn assert_still_air_is_output_error<
     let (truth, given) = (truth(E::AXIS), biases(E::AXIS));
     let mut simulated = prepared::<NG, G>(&truth, &given);
     simulated.fly(&light(), &mut Draws(7));
-    let still = Noise::still(light().outputs);
+    let still = Noise::without_gusts(light().outputs);
     let at = simulated.filter.with_noise(&simulated.own, &still);
     let predicted = simulated.filter.respond(&at).unwrap();
     let model = Model {
@@ -299,7 +299,7 @@ fn outputs_along_still_air_are_those_of_output_error() {
     simulated.fly(&light(), &mut Draws(7));
     let at = simulated
         .filter
-        .with_noise(&simulated.own, &Noise::still(light().outputs));
+        .with_noise(&simulated.own, &Noise::without_gusts(light().outputs));
     let along = simulated.filter.outputs_along_air(&at).unwrap();
     let predicted = simulated.filter.respond(&at).unwrap().predicted;
     for (along, predicted) in along.iter().zip(&predicted) {
@@ -317,7 +317,7 @@ fn the_gain_of_the_angle_alone_is_the_limit_of_its_filter() {
     }
     let limit = predicted / (predicted + r);
     assert_relative_eq!(noise.angle_gain(0), limit, max_relative = 1e-12);
-    assert_abs_diff_eq!(Noise::still(noise.outputs).angle_gain(0), 0.0);
+    assert_abs_diff_eq!(Noise::without_gusts(noise.outputs).angle_gain(0), 0.0);
 }
 
 #[test]
@@ -331,7 +331,7 @@ fn rotary_gusts_without_gusts_of_the_angle_are_not_of_the_air() {
     };
     assert!(light().is_of_air(2, step_s) && with_rotary(9.9).is_of_air(2, step_s));
     assert!(!with_rotary(10.1).is_of_air(2, step_s));
-    assert!(!Noise::still(light().outputs).is_of_air(2, step_s));
+    assert!(!Noise::without_gusts(light().outputs).is_of_air(2, step_s));
 }
 
 /// Checks at the true parameters that the innovations are white with the computed covariance.

@@ -21,7 +21,7 @@ impl World {
         let basis = JudgedAircraft {
             model,
             aircraft: &self.config.aircraft,
-            buildup: &self.config.buildup,
+            aero_model: &self.config.aero_model,
             tunnel,
             specification: self.config.qualities.as_ref().unwrap(),
         };
@@ -36,7 +36,7 @@ impl World {
         let posterior = self.model(&evidence(&flown));
         // Without maneuvers the posterior has the mean of its tunnel.
         let truth = &self.shipped.config.tunnel;
-        let of_truth = model(&[], &self.config.buildup, truth, &self.config.model);
+        let of_truth = model(&[], &self.config.aero_model, truth, &self.config.model);
         [
             self.qualities_by(&posterior, &self.config.tunnel, &flown),
             self.qualities_by(&of_truth, truth, &flown),

@@ -1,7 +1,7 @@
 //! Minutes of planned flights, beside those of the paper's list: every class at every ten degrees.
 
 use super::world::{FlownCard, World, evidence};
-use crate::flight_plan::candidate::{Candidate, reach_deg};
+use crate::flight_plan::candidate::{CandidateCard, reach_deg};
 use crate::numerics::mean::finite_mean;
 use crate::numerics::order_statistics::median;
 use crate::tables::PosteriorRow;
@@ -55,7 +55,7 @@ impl World {
     }
 
     /// Time of a flight with these cards.
-    fn minutes(&self, cards: &[Candidate]) -> f64 {
+    fn minutes(&self, cards: &[CandidateCard]) -> f64 {
         let (low, high) = reach_deg(cards.iter());
         let of_cards: f64 = cards.iter().map(|card| card.minutes).sum();
         of_cards + (high - low) * self.budget(0.0).minutes_per_deg
@@ -66,13 +66,13 @@ impl World {
         let all = self.candidates();
         let (mut flown, mut minutes) = (vec![], 0.0);
         for (i, flight) in LIST.iter().enumerate() {
-            let is_listed = |c: &&Candidate| {
+            let is_listed = |c: &&CandidateCard| {
                 let mut points = flight.iter();
                 points.any(|(class, alphas)| {
                     c.card.class == *class && alphas.contains(&c.card.alpha_deg)
                 })
             };
-            let cards: Vec<Candidate> = all.iter().filter(is_listed).cloned().collect();
+            let cards: Vec<CandidateCard> = all.iter().filter(is_listed).cloned().collect();
             minutes += self.minutes(&cards);
             flown.extend(self.fly(&format!("list {i}"), &cards));
         }

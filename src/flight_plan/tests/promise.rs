@@ -2,7 +2,7 @@
 //! fused.
 
 use super::world::{FlownCard, World, deviation, evidence};
-use crate::flight_plan::candidate::Candidate;
+use crate::flight_plan::candidate::CandidateCard;
 use crate::flight_plan::choice::Budget;
 use crate::numerics::order_statistics::{median, quantile};
 
@@ -24,7 +24,7 @@ impl World {
 fn ratios(seed: u64, points: &[(&str, &[f64])], first: &[usize], minutes: f64) -> Vec<f64> {
     let world = World::new(seed, points);
     let all = world.candidates();
-    let cards: Vec<Candidate> = first.iter().map(|&i| all[i].clone()).collect();
+    let cards: Vec<CandidateCard> = first.iter().map(|&i| all[i].clone()).collect();
     let flown = world.fly("a", &cards);
     world.ratios(flown, world.budget(minutes))
 }

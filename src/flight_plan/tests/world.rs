@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::aero::WindTunnel;
 use crate::config::Config;
 use crate::estimate::{Estimated, means};
-use crate::flight_plan::candidate::{Candidate, candidates};
+use crate::flight_plan::candidate::{CandidateCard, candidates};
 use crate::flight_plan::choice::Budget;
 use crate::flight_plan::experience::CampaignHistory;
 use crate::flight_plan::goals::Goal;
@@ -17,7 +17,7 @@ use crate::flight_plan::rehearsal::{RehearsalBasis, derivatives, instruments};
 use crate::lab::campaign::{FlightLimits, SimulatedCampaign, TestPoint, tunnel_rows};
 use crate::lab::simulator::{Instruments, Simulator};
 use crate::maneuver::Maneuver;
-use crate::model::{Evidence, Model, model};
+use crate::model::{ManeuverResults, Model, model};
 use crate::numerics::random::derived_seed;
 use crate::pipeline::estimate_maneuver;
 use crate::proof_of_match::of_posterior;
@@ -64,7 +64,7 @@ impl World {
         }
     }
 
-    pub fn candidates(&self) -> Vec<Candidate> {
+    pub fn candidates(&self) -> Vec<CandidateCard> {
         candidates(&self.shipped.cards, &self.config)
     }
 
@@ -74,8 +74,8 @@ impl World {
     }
 
     /// Flies cards of one flight with the truth, and estimates them.
-    pub fn fly(&self, flight: &str, cards: &[Candidate]) -> Vec<FlownCard> {
-        let fly = |(i, candidate): (usize, &Candidate)| {
+    pub fn fly(&self, flight: &str, cards: &[CandidateCard]) -> Vec<FlownCard> {
+        let fly = |(i, candidate): (usize, &CandidateCard)| {
             let flown = self.shipped.simulator.fly(&candidate.card).unwrap();
             let seed = derived_seed(self.seed, &format!("{flight} {i}"));
             let record = flown.recorded(&self.instruments, seed);
@@ -85,20 +85,20 @@ impl World {
                 ..flown.maneuver
             };
             let mut estimated = estimate_maneuver(&self.config, &record, &maneuver, &[]);
-            estimated.means = means(&record, &maneuver, &self.config.buildup);
+            estimated.means = means(&record, &maneuver, &self.config.aero_model);
             (maneuver, estimated)
         };
         cards.par_iter().enumerate().map(fly).collect()
     }
 
-    pub fn model(&self, evidence: &[Evidence]) -> Model {
+    pub fn model(&self, evidence: &[ManeuverResults]) -> Model {
         let Config {
-            buildup,
+            aero_model,
             tunnel,
             model: settings,
             ..
         } = &self.config;
-        model(evidence, buildup, tunnel, settings)
+        model(evidence, aero_model, tunnel, settings)
     }
 
     /// Plan of the next flight from what was flown.
@@ -114,7 +114,7 @@ impl World {
         let settings = self.shipped.cards.aircraft.clone();
         let derivatives = derivatives(config, posterior, &rows);
         let simulator =
-            Simulator::new(&config.aircraft, &config.buildup, derivatives, settings).unwrap();
+            Simulator::new(&config.aircraft, &config.aero_model, derivatives, settings).unwrap();
         let basis = RehearsalBasis {
             config,
             simulator: &simulator,
@@ -122,7 +122,7 @@ impl World {
             delays: &[],
             limits: &FlightLimits::default(),
         };
-        let rehearse = |candidate: Candidate| {
+        let rehearse = |candidate: CandidateCard| {
             let result = basis.rehearse(&candidate);
             Rehearsal { candidate, result }
         };
@@ -139,7 +139,7 @@ impl World {
                 covariances: &covariances,
                 contributions: &model.rows.contributions,
             },
-            buildup: &config.buildup,
+            aero_model: &config.aero_model,
             tunnel: &config.tunnel,
             settings: &config.model,
             qualities: None,
@@ -150,11 +150,11 @@ impl World {
     }
 
     /// Cards of a plan, each as often as it is flown.
-    pub fn cards(&self, plan: &Plan) -> Vec<Candidate> {
+    pub fn cards(&self, plan: &Plan) -> Vec<CandidateCard> {
         let all = self.candidates();
         let chosen = plan.cards.iter().filter(|row| row.place.is_some());
         let chosen = chosen.flat_map(|row| {
-            let is_it = |c: &&Candidate| {
+            let is_it = |c: &&CandidateCard| {
                 c.card.class == row.class && (c.card.alpha_deg - row.alpha_deg).abs() < 1e-9
             };
             let candidate = all.iter().find(is_it).unwrap().clone();
@@ -173,9 +173,9 @@ pub fn deviation(model: &Model, goal: &NextGoalRow) -> f64 {
     rows.find(is_there).unwrap().standard_deviation
 }
 
-pub fn evidence(flown: &[FlownCard]) -> Vec<Evidence<'_>> {
+pub fn evidence(flown: &[FlownCard]) -> Vec<ManeuverResults<'_>> {
     let own = flown.iter().filter_map(|(maneuver, estimated)| {
-        Some(Evidence {
+        Some(ManeuverResults {
             maneuver,
             estimates: &estimated.estimates,
             combined: &estimated.combined,

@@ -26,8 +26,11 @@ pub struct ChannelPlan<'a> {
 /// that cannot be read.
 ///
 /// # Errors
-/// A problem that refuses the flight: a unit in a file other than the channel map's, a required
-/// channel that is in no file, a signal with two channels, or a required signal without a source.
+/// A problem that refuses the flight:
+/// - a unit in a file differs from the channel map's;
+/// - a required channel is in no file;
+/// - a signal has two channels;
+/// - a required signal has no source.
 pub fn plan_channels<'a>(
     source: &(impl ColumnSource + ?Sized),
     context: &Context<'a>,

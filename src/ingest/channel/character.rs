@@ -1,8 +1,8 @@
-//! Character of a channel over a spell of samples: its update rate, noise and quantisation, and the
-//! length of an unchanged run from which the channel counts as stuck.
+//! Character of a channel over a spell of samples: update rate, noise, quantisation, and the length
+//! from which an unchanged run counts as stuck.
 //!
-//! A spell is a fixed number of samples, so the character of a channel does not depend on the
-//! pieces in which a flight is read. If a spell does not decide, the character of the previous
+//! A spell is a fixed number of samples. The character of a channel therefore does not depend on
+//! the pieces in which a flight is read. If a spell does not decide, the character of the previous
 //! spell stays.
 
 use super::quantisation::quantisation;

@@ -12,8 +12,8 @@ use crate::numerics::sample_count::nearest;
 /// are read and dropped. A column's page holds some ten thousand rows.
 const SEPARATE_ROWS: usize = 1 << 16;
 
-/// Samples of another clock that are read beyond each end of a range, besides those of one step:
-/// one for the neighbour in the interpolation, one for rounding.
+/// Samples of another clock that are read beyond each end of a range, in addition to one step's
+/// samples: one for the interpolation's neighbour, one for rounding.
 const BEYOND_ENDS: f64 = 2.0;
 
 /// One column of a flight's files.
@@ -175,8 +175,8 @@ fn overlapping_samples(clock: &Clock, own: &Clock, range: Range<usize>) -> Range
     first.min(own.samples)..last.min(own.samples)
 }
 
-/// For each of some samples the value recorded nearest to it, moved along the line to its neighbour
-/// by the part of a step between the two.
+/// For each given sample, the value recorded nearest to it. The value is moved along the line to
+/// its neighbour by the fraction of a step between the two.
 struct NearestValues {
     /// The first sample.
     first: usize,

@@ -1,5 +1,6 @@
-//! One channel on its way from the recorder's numbers to a signal: converted, unwrapped, cleaned of
-//! stuck values and spikes, its gaps bridged or left missing, every sample marked.
+//! One channel on its way from the recorder's numbers to a signal. It is converted, unwrapped, and
+//! cleaned of stuck values and spikes. Gaps are bridged or left missing, and every sample is
+//! flagged.
 //!
 //! Samples come in pieces of any length and leave as soon as later samples cannot change them. What
 //! is decided about a sample depends on its surroundings and on the character of its spell, never
@@ -9,7 +10,7 @@ use std::ops::Range;
 
 use super::channel_statistics::{ChannelStatistics, LARGEST};
 use super::character::{Character, SPELL};
-use super::gaps::{Bridge, Reach, bridge_gaps};
+use super::gaps::{Bridge, BridgedGaps, bridge_gaps};
 use super::repeats::long_runs;
 use super::spell_characters::Characters;
 use super::spikes;
@@ -41,7 +42,7 @@ pub struct Conditioner {
     /// Conversion of the recorder's numbers to the signal's unit.
     conversion: Conversion,
     is_flag: bool,
-    reach: Reach,
+    reach: BridgedGaps,
     unwrapper: Option<Unwrapper>,
     /// Converted values from sample `first` on.
     values: Vec<f64>,
@@ -72,7 +73,7 @@ impl Conditioner {
                 ..conversion
             },
             is_flag: channel.unit == FLAG_UNIT,
-            reach: Reach::of(&channel.signal, settings.longest_bridge_s, step_s),
+            reach: BridgedGaps::of(&channel.signal, settings.longest_bridge_s, step_s),
             unwrapper: Unwrapper::of(channel, step_s, LONGEST_PERIOD, settings),
             values: Vec::new(),
             first: 0,

@@ -19,7 +19,7 @@ pub enum Bridge {
 /// a straight line by less than 100 ft, and its Mach number by less than 0.02.
 const SLOW_BRIDGE_S: f64 = 3.0;
 
-/// Signals whose gaps of some seconds are bridged: of a maneuver they change only the gravity, the
+/// Signals whose gaps of some seconds are bridged. In a maneuver they affect only gravity, the
 /// gyroscopic moment, the place in the tunnel tables and the inertia.
 const SLOW: [&str; 12] = [
     s::RPM_LEFT,
@@ -41,7 +41,7 @@ const STEADY: [&str; 3] = [s::VELOCITY, s::QBAR, s::THRUST];
 
 /// Longest gaps of a signal that are bridged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Reach {
+pub struct BridgedGaps {
     /// Samples of any gap.
     longest: usize,
     /// Samples of a gap at an end of the record, over which the nearest value is held.
@@ -50,10 +50,10 @@ pub struct Reach {
     spans_lost_update: bool,
 }
 
-impl Reach {
-    /// Reach for a signal in a record with this step, where any signal's gaps of `longest_bridge_s`
+impl BridgedGaps {
+    /// Gaps of a signal in a record with this step, where any signal's gaps of `longest_bridge_s`
     /// are bridged.
-    pub fn of(signal: &str, longest_bridge_s: f64, step_s: f64) -> Reach {
+    pub fn of(signal: &str, longest_bridge_s: f64, step_s: f64) -> BridgedGaps {
         let usual = whole_steps(longest_bridge_s, step_s);
         let is_slow = SLOW.contains(&signal) && longest_bridge_s > 0.0;
         let spans_lost_update = is_slow || STEADY.contains(&signal) && longest_bridge_s > 0.0;
@@ -62,7 +62,7 @@ impl Reach {
         } else {
             usual
         };
-        Reach {
+        BridgedGaps {
             longest,
             longest_at_end: if spans_lost_update { usual } else { 0 },
             spans_lost_update,
@@ -93,13 +93,13 @@ impl Reach {
 
 /// Bridges the gaps (NaN) within reach in place and returns the flag of every sample.
 ///
-/// A gap at either end of the record has one side only and stays missing, unless it lies between
-/// two values of a slow channel, or is within the reach at an end: then the nearest value is held.
-/// `period` gives the channel's samples per recorded value at a sample: a gap that is no longer than
-/// this lies between two recorded values and is no fault.
+/// A gap at an end of the record has one neighbour only and stays missing, with two exceptions: it
+/// lies between two values of a slow channel, or it is within the reach at an end. It then takes
+/// the neighbour's value. `period` gives the channel's samples per recorded value at a sample. A
+/// gap that is no longer lies between two recorded values and is no fault.
 pub fn bridge_gaps(
     values: &mut [f64],
-    reach: Reach,
+    reach: BridgedGaps,
     bridge: Bridge,
     period: impl Fn(usize) -> usize,
 ) -> Vec<Mark> {
@@ -163,9 +163,9 @@ mod tests {
 
     const GAP: f64 = f64::NAN;
 
-    /// Reach of a rate over a number of samples.
-    fn samples(longest: usize) -> Reach {
-        Reach::of(s::Q, longest as f64, 1.0)
+    /// Gaps of a rate over a number of samples.
+    fn samples(longest: usize) -> BridgedGaps {
+        BridgedGaps::of(s::Q, longest as f64, 1.0)
     }
 
     #[test]
@@ -230,7 +230,7 @@ mod tests {
         }
         let marks = bridge_gaps(
             &mut values,
-            Reach::of(signal, 0.25, 0.025),
+            BridgedGaps::of(signal, 0.25, 0.025),
             Bridge::Line,
             |_| period,
         );
@@ -261,7 +261,7 @@ mod tests {
                 .map(|k| if k % 4 == 0 { f64::from(k) } else { GAP })
                 .collect();
             lost.for_each(|update| values[4 * update] = GAP);
-            let reach = Reach::of(s::BETA_VANE, 0.25, 0.025);
+            let reach = BridgedGaps::of(s::BETA_VANE, 0.25, 0.025);
             bridge_gaps(&mut values[..57], reach, Bridge::Line, |_| 4);
             values[..57].iter().filter(|v| v.is_nan()).count()
         };
@@ -274,7 +274,7 @@ mod tests {
         let missing = |signal: &str, gap: Range<usize>| {
             let mut values: Vec<f64> = (0..400).map(f64::from).collect();
             values[gap].fill(GAP);
-            let reach = Reach::of(signal, 0.25, 0.025);
+            let reach = BridgedGaps::of(signal, 0.25, 0.025);
             let marks = bridge_gaps(&mut values, reach, Bridge::Line, |_| 1);
             assert!(marks.iter().any(|mark| mark.is_fault()));
             values.iter().filter(|v| v.is_nan()).count()
@@ -296,7 +296,7 @@ mod tests {
         let mut values = [1.0, GAP, 3.0];
         bridge_gaps(
             &mut values,
-            Reach::of(s::MACH, 0.0, 0.025),
+            BridgedGaps::of(s::MACH, 0.0, 0.025),
             Bridge::Line,
             |_| 1,
         );

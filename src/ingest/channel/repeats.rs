@@ -25,16 +25,16 @@ const CENTRED_REPEATS: f64 = 1.5;
 const CHANCE: f64 = 1e-12;
 
 /// Largest number of stuck runs in one spell; with more, unchanged values are normal for the
-/// channel. Trade-off: a channel that sticks more often in one spell is kept as recorded; with a larger
-/// number, a channel that rests from time to time would lose its rests.
+/// channel. Trade-off: a channel that sticks more often in one spell is kept as recorded. With a
+/// larger number, a channel that rests from time to time would lose its rests.
 const MOST_RUNS: usize = 3;
 
 /// Ratio of the shortest stuck run to the shortest run that is examined. Runs between the two
 /// lengths mean that the channel is not stuck.
 const SHORTER_RUNS: usize = 3;
 
-/// Least number of samples of a stuck run, at sampling rates at which the configured least time has fewer: three
-/// equal samples are two repeats, which coarse noise makes all the time.
+/// Lower limit of the length of a stuck run, for sampling rates at which the configured time is
+/// shorter. Coarse noise often gives three equal samples.
 const LEAST_RUN: usize = 4;
 
 /// Length of the runs of equal values that a spell shows to be stuck.

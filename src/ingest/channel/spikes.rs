@@ -1,10 +1,10 @@
-//! Single-sample spikes: a sample far off its neighbours, measured by the noise, while the samples
-//! before it and those after it agree about the value between them.
+//! Single-sample spikes: a sample far off its neighbours, relative to the noise, although the
+//! samples before and after it agree about the value between them.
 //!
-//! With `x` the sample, the line through the two samples before it predicts `2 x₋₁ − x₋₂`, the line
-//! through the two after it `2 x₊₁ − x₊₂`, and the neighbours' mean `(x₋₁ + x₊₁)/2`. A spike is off
-//! all three in the same sense. A step, the reversal of a surface at its full rate, or a stick pulse
-//! of two samples is off at most two of them.
+//! Three predictions of a sample `x` are compared: `2 x₋₁ − x₋₂` by the line through the two
+//! samples before it, `2 x₊₁ − x₊₂` by the line through the two after it, and the neighbours' mean
+//! `(x₋₁ + x₊₁)/2`. A spike is off all three in the same sense. A step, the reversal of a surface
+//! at its full rate, or a stick pulse of two samples is off at most two of them.
 
 use std::ops::Range;
 
@@ -27,12 +27,12 @@ const LEAST_ROUNDED: usize = 20;
 /// repair or a conversion moved off the grid.
 const ROUNDING_QUANTILE: f64 = 0.05;
 
-/// Least distance of a spike from each line, as a share of its distance from the mean: the lines
-/// are twice as noisy as the mean.
+/// Smallest distance of a spike from each line, as a fraction of its distance from the mean. The
+/// lines are twice as noisy as the mean.
 const LINES: f64 = 0.75;
 
 /// Largest distance between the two lines' predictions that noise alone may cause, in standard
-/// deviations of the noise; the deviation of the difference is √10 times that of the noise.
+/// deviations of the noise. The standard deviation of the distance is √10 times that of the noise.
 const LINES_NOISE: f64 = 3.0;
 
 /// Stride of the samples from which the noise of a spell is estimated: a quarter of thousands is
@@ -215,7 +215,7 @@ fn rounding(values: &[f64], mut deviations: Vec<f64>) -> f64 {
     }
 }
 
-/// Least difference between the values of a channel, beyond rounding; zero for a channel that is
+/// Smallest difference between the values of a channel, beyond rounding. Zero for a channel that is
 /// constant except for one sample, which may be a spike.
 fn least_difference(values: &[f64], same: f64) -> f64 {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();

@@ -5,12 +5,12 @@ use crate::ingest::settings::Settings;
 use crate::numerics::sample_count::whole_steps;
 use crate::units::{Quantity, Unit};
 
-/// Least jump that is a wrap of a channel whose map states the period, as a share of the period:
-/// nothing turns by half a circle in a sample.
+/// Smallest jump that counts as a wrap if the channel map states the period, as a fraction of the
+/// period. No angle changes by half a circle in one sample.
 const HALF_TURN: f64 = 0.5;
 
-/// Least jump that is a wrap of an angle whose map states no period, as a share of the circle: only
-/// a jump of nearly a whole circle cannot be a fault.
+/// Smallest jump that counts as a wrap if the channel map states no period, as a fraction of the
+/// circle. Only a jump of nearly a whole circle cannot be a fault.
 const WHOLE_TURN: f64 = 0.9;
 
 /// Unwrapping state of one channel, in the recorder's unit.

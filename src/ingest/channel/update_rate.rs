@@ -28,9 +28,10 @@ const WITH_NEIGHBOURS: usize = 3;
 /// Least number of distances without a lost update for each one with it: three of four.
 const UPDATES_PER_LOSS: usize = 3;
 
-/// Share of the distances between recorded samples, or of the changes of a held value, that must
-/// fit a period: frames are lost and clocks slip now and then. Of changes at random half share a phase of the
-/// shortest period, two, so 19 of [`LEAST_CHANGES`] do by chance once in 25,000 spells.
+/// Fraction of the distances between recorded samples, or of the changes of a held value, that must
+/// fit a period. Frames are lost and clocks slip now and then. Of changes at random half share a
+/// phase of the shortest period, two, so 19 of [`LEAST_CHANGES`] do by chance once in 25,000
+/// spells.
 const FITTING_SHARE: f64 = 0.95;
 
 /// Least number of changes of value, or distances, from which a period is inferred.
@@ -146,31 +147,32 @@ fn changes(values: &[f64], first: usize) -> Vec<usize> {
     changes
 }
 
-/// Distance between the finite values of a channel that has few of them: equal for all within one
-/// sample, save lost updates, and more than one. Such is a slow channel in a short record.
+/// Distance between the finite values of a sparse channel. It is more than one sample and, except
+/// for lost updates, equal for all values within one sample. Such is a slow channel in a short
+/// record.
 fn period_of_few(values: &[f64]) -> Option<usize> {
     let distances = distances(values);
     let total: usize = distances.iter().sum();
     let finite = values.iter().filter(|v| v.is_finite()).count();
-    let fit = Fit::of(&distances)?;
-    let agree = fit.all() == total && total + 1 == finite && 2 * fit.exact > total;
-    (fit.period > 1 && total >= FEW_DISTANCES && agree && fit.has_few_losses())
-        .then_some(fit.period)
+    let count = PeriodCount::from_distances(&distances)?;
+    let agree = count.all() == total && total + 1 == finite && 2 * count.exact > total;
+    (count.period > 1 && total >= FEW_DISTANCES && agree && count.has_few_losses())
+        .then_some(count.period)
 }
 
 /// Distance that nearly all finite values have, or a multiple of it where updates are lost, if it is
 /// more than one. If the channel has its own clock, it is one more or less now and then.
 fn period_between_nulls(distances: &[usize]) -> Option<usize> {
     let total: usize = distances.iter().sum();
-    let fit = Fit::of(distances)?;
-    let fits = fit.all() as f64 >= FITTING_SHARE * total as f64 && total >= LEAST_CHANGES;
+    let count = PeriodCount::from_distances(distances)?;
+    let fits = count.all() as f64 >= FITTING_SHARE * total as f64 && total >= LEAST_CHANGES;
     // Beside a full-rate channel's distance of one, two is a lost sample.
     let is_full_rate = 2 * distances.get(1).copied().unwrap_or_default() >= total;
-    (fit.period > 1 && fits && !is_full_rate && fit.has_few_losses()).then_some(fit.period)
+    (count.period > 1 && fits && !is_full_rate && count.has_few_losses()).then_some(count.period)
 }
 
 /// Distances that fit the most frequent one.
-struct Fit {
+struct PeriodCount {
     period: usize,
     /// Number of distances of the period.
     exact: usize,
@@ -180,8 +182,8 @@ struct Fit {
     with_losses: usize,
 }
 
-impl Fit {
-    fn of(distances: &[usize]) -> Option<Fit> {
+impl PeriodCount {
+    fn from_distances(distances: &[usize]) -> Option<PeriodCount> {
         let (period, exact) = distances.iter().enumerate().max_by_key(|(_, n)| **n)?;
         let near = |multiple: usize| -> usize {
             let around = distances.iter().skip(multiple.saturating_sub(1));
@@ -190,7 +192,7 @@ impl Fit {
         let multiples = (2..=MOST_UPDATES).map(|n| n * period);
         // Of a period of a few samples, every distance is near a multiple.
         let is_distinct = period >= SHORTEST_WITH_LOSSES;
-        Some(Fit {
+        Some(PeriodCount {
             period,
             exact: *exact,
             near: near(period),

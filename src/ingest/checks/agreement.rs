@@ -13,8 +13,8 @@ use crate::aircraft::Aircraft;
 use crate::ingest::settings::Checks;
 use crate::tables::{CheckRow, CheckVerdict};
 
-/// Least change of the gusts' velocity at which a relation that gusts excite is checked, ft/s²:
-/// that of turbulence of 1 ft/s, ten times the value that still air seems to have.
+/// Smallest change of the gust velocity at which a relation that gusts excite is checked, ft/s². It
+/// is that of turbulence of 1 ft/s, ten times the apparent value in still air.
 const LEAST_GUST_FT_S2: f64 = 0.75;
 
 /// Error of a relation that biases may cause, as a share of the level above which it counts as

@@ -188,8 +188,8 @@ impl BlockMeans {
         finite.all(|v| (v - first).abs() <= SAME_MEAN * first.abs())
     }
 
-    /// `true` if airspeed, dynamic pressure or Mach number exceed those of a velocity (ft/s) in
-    /// most of the record; one of the three may be dead.
+    /// `true` if airspeed, dynamic pressure or Mach number exceed the value for a velocity (ft/s)
+    /// in most of the record. One of the three may be dead.
     pub fn is_flying_faster_than(&self, velocity_ft_s: f64) -> bool {
         // At sea level: higher up the same pressure takes a higher velocity.
         let sea_level = air(0.0);

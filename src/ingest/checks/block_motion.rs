@@ -5,7 +5,7 @@
 //! angles at the c.g.
 
 use super::block_means::{BlockMeans, SignalMeans};
-use crate::aircraft::{Aircraft, Flow, Position};
+use crate::aircraft::{Aircraft, Position, VaneFlow};
 use crate::earth::{Air, air, gravity_ft_s2};
 use crate::flight::signal;
 use crate::ingest::settings::Checks;
@@ -112,7 +112,7 @@ impl<'a> Motions<'a> {
         }
         let rates = [p / DEG, q / DEG, r / DEG];
         let cg = Position { x_ft, y_ft, z_ft };
-        let at_vanes = Flow {
+        let at_vanes = VaneFlow {
             alpha: alpha_vane / DEG,
             beta: beta_vane / DEG,
             velocity,

@@ -9,7 +9,8 @@ use crate::numerics::order_statistics::{SIGMA_PER_MAD, upper_median};
 /// many as a flight has.
 const GUST_DEVIATIONS: f64 = 3.0;
 
-/// Disturbance of a relation by gusts, in the unit of its sides.
+/// Effect of gusts on one kinematic relation, in the unit of the relation's measured and predicted
+/// side.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Disturbance {
     /// Root mean square of the gusts on the measured side.
@@ -27,9 +28,9 @@ impl Disturbance {
 
     /// Least correlation that a right relation has in gusts, where windows are selected by a level.
     ///
-    /// The measured side is the predicted one, p, and the gust, g. With a mean c of −p g the correlation is
-    /// (p² − c)/(p √(p² − 2 c + g²)), which is least at c = g². Gusts that reach the level select the
-    /// windows in which they do.
+    /// The measured side is the predicted one, p, and the gust, g. With a mean c of −p g the
+    /// correlation is (p² − c)/(p √(p² − 2 c + g²)). It is least at c = g². Gusts that reach the
+    /// level select the windows in which they do.
     pub fn least_correlation(self, predicted_rms: f64, level: f64) -> f64 {
         let gust = if GUST_DEVIATIONS * self.gust > level {
             self.gust.max(level)

@@ -2,10 +2,11 @@
 //! hold.
 //!
 //! A faulty channel fails every relation that contains it, so the failed relations alone name too
-//! many channels. Each channel in them is tried with a reversed sign, with each unit in which it
-//! could have been recorded, and with a conversion done twice. If every relation holds after a
-//! trial, the trial names the channel and the cause. If there is no such trial, the channels that
-//! the failed relations share and no other relation confirms are named without a cause.
+//! many channels. Each channel of the failed relations is tried with a reversed sign, with each
+//! unit in which it could have been recorded, and with a conversion done twice. If every relation
+//! holds after a trial, the trial names the channel and the cause. If there is no such trial, the
+//! channels that the failed relations share and no other relation confirms are named without a
+//! cause.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -19,7 +20,7 @@ use crate::tables::CheckVerdict;
 use crate::units::Unit;
 
 /// Ratio of squared misfits up to which another channel's trial explains the failure as well as the
-/// best trial: by residual noise, equally good explanations differ by less.
+/// best trial. Residual noise makes equally good explanations differ by less.
 const EQUAL_MISFIT: f64 = 3.0;
 
 /// Largest number of independent faults searched for in one flight. Trade-off: each costs a round of trials, and
@@ -197,8 +198,8 @@ impl<'a> Isolation<'a> {
         trials
     }
 
-    /// Recorded channels in a failed relation. The mass is not suspected: it is in one relation
-    /// only, so its fault could not be distinguished from one of the accelerometer in that
+    /// Recorded channels in a failed relation. The mass is not suspected. It occurs in one relation
+    /// only, so that its fault could not be distinguished from one of the accelerometer in that
     /// relation.
     fn suspects(&self, checks: &[Check]) -> Vec<(&'a str, &'a Channel)> {
         let is_suspect = |name: &str| {
@@ -291,7 +292,8 @@ impl Trial<'_> {
     }
 }
 
-/// Factors that could correct a channel, each with the cause that it would have.
+/// Candidate correction factors of a channel (reversed sign, mistaken unit, both), each with the
+/// fault that it would correct.
 fn corrections(channel: &Channel) -> Vec<(f64, String)> {
     let mut corrections = vec![(-1.0, "its sign is reversed".to_owned())];
     let Ok(mapped) = Unit::parse(&channel.unit) else {

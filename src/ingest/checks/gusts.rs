@@ -30,8 +30,8 @@ const DEVIATIONS: f64 = 1.150_349;
 /// Variance of a second difference x₁ − 2 x₂ + x₃ of white noise over the noise's: 1² + 2² + 1².
 const SECOND_DIFFERENCE_VARIANCE: f64 = 6.0;
 
-/// Lag over which gusts lose their correlation, s: 1750 ft, the scale of turbulence above 2000 ft
-/// (MIL-F-8785C), take 2 to 8 s at 900 to 220 ft/s.
+/// Lag over which gusts lose their correlation, s. The scale of turbulence above 2000 ft is 1750 ft
+/// (MIL-F-8785C), which takes 2 to 8 s at 900 to 220 ft/s.
 const LONG_S: f64 = 8.0;
 
 /// Least number of second differences for a variance: its standard deviation is then about half
@@ -76,8 +76,8 @@ impl Gusts {
         gusts
     }
 
-    /// Largest change of the gusts' velocity in a window, root mean square, that the weather
-    /// explains in any axis, ft/s²; zero with fewer than two axes.
+    /// Largest change of the gust velocity in a window that the weather explains in any axis, root
+    /// mean square, ft/s². Zero with fewer than two axes.
     ///
     /// A faulty channel disturbs one or two axes, the weather all axes alike, so the calmest axis
     /// decides.

@@ -1,4 +1,4 @@
-//! Lines through the windows of a relation, measured over predicted.
+//! Line fits of a kinematic relation: measured side against predicted side, one point per window.
 
 use super::windows::WindowPair;
 use crate::numerics::order_statistics::{upper_median, weighted_median};

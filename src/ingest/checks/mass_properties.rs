@@ -33,9 +33,9 @@ const GYRATION: std::ops::Range<f64> = 0.1..0.8;
 /// as much.
 const LEAST_ALPHA_DEG: f64 = 5.0;
 
-/// Normal force coefficient over sin α, per rad, with margins of 2 to 3: aircraft have 2 beyond stall
-/// to 6, those with flaps in landing 10 (Hoerner, *Fluid-Dynamic Lift*). The mass in kg for slug
-/// makes it 14.6 times as large.
+/// Normal force coefficient over sin α, per rad, with margins of 2 to 3. Aircraft have 2 beyond
+/// stall to 6, and 10 with flaps in landing (Hoerner, *Fluid-Dynamic Lift*). The mass in kg for
+/// slug makes it 14.6 times as large.
 const LIFT_PER_SIN_ALPHA: std::ops::Range<f64> = 0.6..24.0;
 
 /// Typical normal force coefficient over sin α, per rad: between 2 beyond stall and 10 with flaps. Only the
@@ -181,8 +181,8 @@ pub fn impossible_gyration(blocks: &BlockMeans, aircraft: &Aircraft) -> Option<I
     })
 }
 
-/// Farthest that an accelerometer is from the centre of gravity along each body axis, spans: with margins of two, as a
-/// slender aircraft is two spans long and some fifth of a span high.
+/// Largest distance of an accelerometer from the centre of gravity along each body axis, in spans,
+/// with a margin. A slender aircraft is about two spans long and a fifth of a span high.
 const FARTHEST_SPANS: [f64; 3] = [3.0, 1.0, 1.0];
 
 /// Finds a centre of gravity outside the aircraft: inches for feet, or another reference point than the sensors'.

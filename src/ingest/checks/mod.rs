@@ -28,4 +28,4 @@ pub(in crate::ingest) use mass_properties::{
     impossible_velocity, lift_curve,
 };
 pub(in crate::ingest) use thermometer::{impossible_temperature, unusable_temperature};
-pub(in crate::ingest) use time_scale::wrong_time;
+pub(in crate::ingest) use time_scale::find_time_scale_fault;

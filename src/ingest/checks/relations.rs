@@ -11,8 +11,8 @@
 //! `v` is relative to the air, so its rate contains the gusts', and `f` the aircraft's response to
 //! them. `f` and what follows from it is the predicted side, which noise must not disturb.
 //!
-//! One relation is not kinematic, because a fighter's lateral acceleration is lost among gusts: the
-//! side force that a gust causes opposes the sideslip that it makes.
+//! One relation is not kinematic, because gusts hide a fighter's lateral acceleration: the side
+//! force of a gust opposes the sideslip of the gust.
 
 use super::block_means::BlockMeans;
 use super::block_motion::BlockMotion;
@@ -45,7 +45,7 @@ pub const BODY_AXES: usize = 3;
 /// Effect of gusts on a relation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum GustEffect {
-    /// Both sides feel the gusts alike, or hardly.
+    /// Gusts disturb both sides alike, or hardly.
     Slight,
     /// Gusts along a body axis disturb the measured side.
     Disturb {
@@ -399,9 +399,9 @@ fn air_data(settings: &Checks) -> Vec<Relation> {
 /// *Airplane Flight Dynamics*: −0.2 to −1.5).
 const TYPICAL_CY_BETA: f64 = -0.6;
 
-/// Largest factor between an aircraft's side force by sideslip and the typical one: the ends of the usual range
-/// are factors of 3 and 2.5 away, the rest is for the error of a slope in gusts. Units of the vane (57) and a
-/// reversed sign lie beyond it.
+/// Largest ratio between an aircraft's side force due to sideslip and the typical value. The usual
+/// range extends to factors of 3 and 2.5; the rest allows for the slope's error in gusts. Units of
+/// the vane (57) and a reversed sign lie beyond it.
 const CY_BETA_FACTOR: f64 = 4.0;
 
 /// Least rate of sideslip, deg/s: twice the apparent rate from an error of 0.2 deg in bank at 400

@@ -8,8 +8,8 @@ use crate::flight::signal;
 /// (MIL-STD-210C: 184 to 331 K).
 const AIR_KELVIN: std::ops::Range<f64> = 174.0..341.0;
 
-/// Largest median change between consecutive blocks of a fifth of a second, K: ten times the change in a dive at
-/// 1,000 ft/s (2 K per 1,000 ft), and far above the noise of a thermometer.
+/// Largest median change between consecutive blocks of 0.2 s, K. It is ten times the change in a
+/// dive at 1,000 ft/s (2 K per 1,000 ft), and far above the noise of a thermometer.
 const LIVELIEST_KELVIN: f64 = 4.0;
 
 /// Change of altitude from which the temperature must change, ft: 6 K of the standard atmosphere. An

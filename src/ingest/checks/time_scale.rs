@@ -1,4 +1,4 @@
-//! Time in a wrong unit or at a wrong rate: every change of the motion is too fast or too slow by
+//! Time in a wrong unit or at a wrong rate. Every change of the motion is too fast or too slow by
 //! one factor, which no single channel explains.
 
 use super::agreement::Check;
@@ -6,8 +6,8 @@ use super::mass_properties::ImpossibleSignal;
 use crate::flight::signal;
 use crate::tables::CheckVerdict;
 
-/// First signals of the relations that compare the change of an attitude with rates, and of those that compare the
-/// change of altitude or speed with the flight path or accelerations.
+/// First signals of two kinds of relations: the change of an attitude against rates, and the change
+/// of altitude or speed against the flight path or accelerations.
 const OF_ATTITUDE: [&str; 3] = [signal::THETA, signal::PHI, signal::PSI];
 const OF_PATH: [&str; 2] = [signal::ALTITUDE, signal::VELOCITY];
 
@@ -35,7 +35,7 @@ const UNITS: [(&str, f64); 5] = [
 ];
 
 /// Finds a time that runs too fast or too slow.
-pub fn wrong_time(checks: &[Check]) -> Option<ImpossibleSignal> {
+pub fn find_time_scale_fault(checks: &[Check]) -> Option<ImpossibleSignal> {
     let slopes = |signals: &[&str]| -> Vec<f64> {
         let of = checks.iter().filter(|check| {
             let first = check.relation.signals.first();

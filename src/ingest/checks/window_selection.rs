@@ -6,13 +6,13 @@ use super::windows::WindowPair;
 use crate::ingest::settings::Checks;
 use crate::numerics::order_statistics::{SIGMA_PER_MAD, upper_median};
 
-/// Number of windows that are selected in a short flight, for relations that select the largest, as
-/// a multiple of the least number for a verdict. They suffice for the slope of a relation whose
+/// Number of windows that a relation selects in a short flight if it selects the largest, as a
+/// multiple of the smallest number for a verdict. They suffice for the slope of a relation whose
 /// noise reaches its level.
 const LEAST_SELECTED: usize = 5;
 
-/// Distance of a window from the line through all windows, in robust standard deviations, above
-/// which the window contains a jump of the record: far beyond noise, gusts and turbulence.
+/// Distance of a window from the line through all windows above which the window contains a jump of
+/// the record, in robust standard deviations. It is far beyond noise, gusts and turbulence.
 const JUMP_DEVIATIONS: f64 = 10.0;
 
 /// Distance of a window, in standard deviations, above which it contains the motion of a control, for a relation

@@ -1,9 +1,10 @@
 //! The pieces of a flight's files merged into sequences: rows in the order of their clock, each
 //! used once.
 //!
-//! A piece that continues after the end of another belongs to its sequence. A piece whose times are
-//! already in a sequence either repeats its rows, which are left out, or comes from a clock that
-//! was started anew, which begins a new sequence. The values of the rows decide.
+//! A piece that continues after the end of another belongs to its sequence. A piece may have times
+//! that are already in a sequence. Either it repeats rows of the sequence, and they are left out;
+//! or the recorder's clock was restarted, and the piece begins a new sequence. The values of the
+//! rows decide.
 
 use super::pieces::{Piece, ScannedFile};
 use crate::ingest::settings::Settings;

@@ -217,8 +217,8 @@ impl PieceScanner {
         }
     }
 
-    /// Removes the last row of the open piece if its time alone was too far ahead: the time of
-    /// `row` then continues the row before it.
+    /// Removes the last row of the open piece if only that row's time was too far ahead. The time
+    /// of `row` then continues the row before it.
     fn remove_outlier(&mut self, row: usize, time: f64) {
         let median = self.median_s.unwrap_or_default();
         let Some(before) = self.before_last else {

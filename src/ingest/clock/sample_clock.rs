@@ -58,8 +58,8 @@ const PHASE_GAIN: f64 = 0.05;
 /// repeats a sample.
 const EARLY: f64 = 0.75;
 
-/// Distance of two clocks, in steps of the slower one, beyond which no value of one is interpolated
-/// to the other: more than the interpolation reaches.
+/// Distance of two clocks, in steps of the slower one, beyond which no value is interpolated from
+/// one to the other. It is more than the interpolation reaches.
 const NEAR_STEPS: f64 = 8.0;
 
 /// Largest scatter of the time stamps, as a share of a step, at which the nearest sample still is
@@ -188,8 +188,8 @@ impl Clock {
         self.start_s + sample as f64 * self.step_s
     }
 
-    /// `true` if another clock has a sample within some steps of this one's span, so that a value
-    /// on it can be interpolated to this clock.
+    /// `true` if another clock has a sample within some steps of this clock's span, so that its
+    /// values can be interpolated to this clock.
     pub(super) fn is_near(&self, other: &Clock) -> bool {
         let margin_s = NEAR_STEPS * self.step_s.max(other.step_s);
         let end_s = |clock: &Clock| clock.time_s(clock.samples) + margin_s;

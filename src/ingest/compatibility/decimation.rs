@@ -6,8 +6,8 @@ use crate::flight::{Mark, Record};
 use crate::numerics::mean::mean;
 use crate::output_error::surface_noise::white_variance;
 
-/// Samples of the record that are averaged into one sample of a window, alike for all channels: at least
-/// 25 a second remain, which resolve the motion of an aircraft.
+/// Samples of the record that are averaged into one sample of a window, alike for all channels. At
+/// least 25 a second remain, which resolve the motion of an aircraft.
 pub fn decimation(step_s: f64) -> usize {
     const SLOWEST_STEP_S: f64 = 0.04;
     // The step is measured: at 50 and at 100 Hz the ratio is a whole number but for the clock's error.
@@ -41,9 +41,9 @@ fn samples_over<'r>(
     Some((values, marks))
 }
 
-/// Measured values of a signal over a range; NaN where a sample was repaired or not recorded. Beside a
-/// measured value of a slow channel the samples on the line to the next are averaged with it, so that
-/// the mean is that at the middle.
+/// Measured values of a signal over a range; NaN where a sample was repaired or not recorded. A
+/// measured value of a slow channel is averaged with the samples on the line to the next value, so
+/// that the mean is the value at the middle.
 pub fn decimate_measured(
     record: &Record,
     name: &str,
@@ -67,9 +67,9 @@ pub fn decimate_measured(
         .collect()
 }
 
-/// Variance of white noise with the power of a signal's own noise, for each sample of the record;
-/// zero for a signal that is not recorded. The noise of a slow channel's sample lasts until the
-/// next one.
+/// Variance of white noise with the power of a signal's noise, for each sample of the record. Zero
+/// for a signal that is not recorded. The noise of a slow channel's sample lasts until the next
+/// one.
 pub fn white_level(record: &Record, name: &str, range: &Range<usize>) -> f64 {
     let Some((values, marks)) = samples_over(record, name, range) else {
         return 0.0;

@@ -7,16 +7,16 @@
 //! - φ̇ = p' + tan θ (q' sin φ + r' cos φ), θ̇ = q' cos φ − r' sin φ, ψ̇ = (q' sin φ + r' cos φ)/cos θ, with ω' = ω − n
 //! - ḣ = u sin θ − v sin φ cos θ − w cos φ cos θ
 //!
-//! An accelerometer on an arm r also feels ω̇ × r. So that no rate is differentiated, each velocity
-//! component of the state is that at the sensor of the component, `s_i` = (v + ω × `r_i`)_i, whose
-//! rate has no ω̇.
+//! An accelerometer on an arm r also measures ω̇ × r. Each velocity component of the state is the
+//! velocity at that component's sensor, `s_i` = (v + ω × `r_i`)_i. Its rate contains no ω̇, so that
+//! no body rate is differentiated.
 
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::parameters::{INPUTS, OUTPUTS, input, output};
-use crate::aircraft::{Aircraft, Flow, Position};
+use crate::aircraft::{Aircraft, Position, VaneFlow};
 use crate::dynamics::lever;
 use crate::earth::{Air, air, air_gradients};
 use crate::numerics::trig::sin_cos;
@@ -176,15 +176,18 @@ pub fn rate_slopes(x: &State, input: &Inputs, terms: &MeasuredTerms) -> RateSlop
     };
     for i in 0..3 {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-        // −(ω + Ω) × v along v and along ω, which also moves v; what is zero is left out.
+        // Slopes of −(ω + Ω) × v along v, and along ω, which also changes v; zeros are left out.
         out.by_state[(i, j)] = turning[k];
         out.by_state[(i, k)] = -turning[j];
-        let moved = |along: usize, of: usize| velocity_by_rates[(of, along)];
+        let velocity_by_rate = |rate: usize, component: usize| velocity_by_rates[(component, rate)];
         let swing = lever(i, terms.arms[i], [omega.x, omega.y, omega.z], [0.0; 3]);
-        out.by_input[(i, i)] =
-            turning[k] * moved(i, j) - turning[j] * moved(i, k) - swing.by_rates[i];
-        out.by_input[(i, j)] = -velocity[k] - turning[j] * moved(j, k) - swing.by_rates[j];
-        out.by_input[(i, k)] = velocity[j] + turning[k] * moved(k, j) - swing.by_rates[k];
+        out.by_input[(i, i)] = turning[k] * velocity_by_rate(i, j)
+            - turning[j] * velocity_by_rate(i, k)
+            - swing.by_rates[i];
+        out.by_input[(i, j)] =
+            -velocity[k] - turning[j] * velocity_by_rate(j, k) - swing.by_rates[j];
+        out.by_input[(i, k)] =
+            velocity[j] + turning[k] * velocity_by_rate(k, j) - swing.by_rates[k];
         out.by_input[(i, input::FORWARD + i)] = 1.0;
     }
     let by_phi = Vector3::new(0.0, g * ct * cp, -g * ct * sp);
@@ -284,8 +287,8 @@ fn air_at(altitude_ft: f64, temperature_ratio: f64) -> Air {
 
 /// Flow of a velocity in body axes.
 #[inline(always)]
-fn flow(v: Vector3<f64>, speed: f64, omega: Vector3<f64>) -> Flow {
-    Flow {
+fn flow(v: Vector3<f64>, speed: f64, omega: Vector3<f64>) -> VaneFlow {
+    VaneFlow {
         alpha: v.z.atan2(v.x),
         beta: (v.y / speed).clamp(-1.0, 1.0).asin(),
         velocity: speed,
@@ -304,31 +307,20 @@ pub fn reading_slopes(
     let omega = body_rates(input);
     let (v, v_by_rates) = velocity_at_cg(x, omega, terms);
     let speed = v.norm();
-    let across2 = v.x * v.x + v.z * v.z;
-    let unit = v / speed;
-    let flow = flow(v, speed, omega);
-    let alpha_by = Vector3::new(-v.z, 0.0, v.x) / across2;
-    let beta_by = (Vector3::y() - unit * unit.y) / (speed * flow.beta.cos());
     let air = AirWithSlopes::at(x[state::ALTITUDE], terms.temperature_ratio);
     let mut by_velocity = SMatrix::<f64, OUTPUTS, 3>::zeros();
     let mut by_rates = SMatrix::<f64, OUTPUTS, 3>::zeros();
-    let vanes = [
-        aircraft.sensors.alpha_reading(&flow, terms.cg),
-        aircraft.sensors.beta_reading(&flow, terms.cg),
-    ];
-    for (o, vane) in vanes.iter().enumerate() {
-        // A reading depends on the ratio of rates and velocity, so its slope along the velocity
-        // follows from those along the rates.
-        let rates: Vector3<f64> = vane.by_rates.into();
-        let by =
-            alpha_by * vane.by_alpha + beta_by * vane.by_beta - unit * (rates.dot(&omega) / speed);
-        by_velocity.set_row(o, &(by * DEG).transpose());
-        by_rates.set_row(o, &(rates * DEG).transpose());
+    let vanes = vane_slopes(aircraft, v, omega, terms);
+    for (o, (by_v, by_omega)) in vanes.into_iter().enumerate() {
+        by_velocity.set_row(o, &(by_v * DEG).transpose());
+        by_rates.set_row(o, &(by_omega * DEG).transpose());
     }
-    let pressures = [1.0, air.density * speed, 1.0 / air.sound];
+    // V, q̄ = ½ ρ V² and M = V/a depend on the size of the velocity alone.
+    let unit = v / speed;
+    let by_speed = [1.0, air.density * speed, 1.0 / air.sound];
     let pressure_outputs = [output::AIRSPEED, output::QBAR, output::MACH];
-    for (o, factor) in pressure_outputs.into_iter().zip(pressures) {
-        by_velocity.set_row(o, &(unit * factor).transpose());
+    for (o, slope) in pressure_outputs.into_iter().zip(by_speed) {
+        by_velocity.set_row(o, &(unit * slope).transpose());
     }
     let mut by_state = SMatrix::<f64, OUTPUTS, STATES>::zeros();
     by_state
@@ -342,6 +334,35 @@ pub fn reading_slopes(
     by_state[(output::QBAR, state::ALTITUDE)] = 0.5 * air.density_slope * speed * speed;
     by_state[(output::MACH, state::ALTITUDE)] = -speed * air.sound_slope / (air.sound * air.sound);
     ReadingSlopes { by_state, by_rates }
+}
+
+/// Slopes of the readings of the α and β vanes, rad: along the velocity, and along the body rates at
+/// constant velocity.
+///
+/// A reading depends on the ratio of rates and velocity, so that its slope along the speed follows
+/// from those along the rates: −(ω · ∂/∂ω)/V.
+#[inline(always)]
+fn vane_slopes(
+    aircraft: &Aircraft,
+    v: Vector3<f64>,
+    omega: Vector3<f64>,
+    terms: &MeasuredTerms,
+) -> [(Vector3<f64>, Vector3<f64>); 2] {
+    let speed = v.norm();
+    let unit = v / speed;
+    let flow = flow(v, speed, omega);
+    let alpha_by_velocity = Vector3::new(-v.z, 0.0, v.x) / (v.x * v.x + v.z * v.z);
+    let beta_by_velocity = (Vector3::y() - unit * unit.y) / (speed * flow.beta.cos());
+    let vanes = [
+        aircraft.sensors.alpha_reading(&flow, terms.cg),
+        aircraft.sensors.beta_reading(&flow, terms.cg),
+    ];
+    vanes.map(|vane| {
+        let by_rates: Vector3<f64> = vane.by_rates.into();
+        let by_velocity = alpha_by_velocity * vane.by_alpha + beta_by_velocity * vane.by_beta
+            - unit * (by_rates.dot(&omega) / speed);
+        (by_velocity, by_rates)
+    })
 }
 
 /// Air at an altitude with its slopes per ft.

@@ -15,12 +15,12 @@ use crate::numerics::student;
 /// Relative error of the equations themselves: the accuracy of gravity, arms and positions.
 pub const MODEL_SCALE: f64 = 0.002;
 
-/// Share of a vane's unexplained motion that correlates with the explained motion, and with its
-/// rate. The aircraft turns into a gust, at once and with a delay: these shares look like errors of
-/// scale and like delays.
+/// Assumed fraction of a vane's residual that correlates with the fitted motion, and with its rate.
+/// The aircraft turns into a gust at once and with a delay. The correlated part therefore resembles
+/// a scale error and a delay.
 const GUST_RESPONSE: f64 = 0.5;
 
-/// Outputs that feel the gusts into which the aircraft turns.
+/// Outputs that measure the gusts into which the aircraft turns.
 const VANES: [&str; 2] = [signal::ALPHA_VANE, signal::BETA_VANE];
 
 /// Standard deviations of the shared parameters.
@@ -36,8 +36,8 @@ pub struct ErrorBounds {
 }
 
 impl JointState<'_> {
-    /// Standard deviations of the shared parameters: of the information or of the scatter between
-    /// windows, whichever is larger, with the effects of gusts and of the equations' own error.
+    /// Standard deviations of the shared parameters: by the information or by the scatter between
+    /// windows, whichever is larger. The effects of gusts and of the equations' error are added.
     pub fn bounds(&self, windows: &[Window]) -> Option<ErrorBounds> {
         let inverse = self.inverse(&self.evidence_information())?;
         let jackknife = self.jackknife();
@@ -56,9 +56,10 @@ impl JointState<'_> {
         })
     }
 
-    /// Moves of the estimates by a unit error of each parameter, a column for each: C H, with the information H
-    /// of the data and the covariance C = (H + P⁻¹)⁻¹, `inverse`. The parameter absorbs its own error but for
-    /// the part that its prior holds back, and only this part moves the others.
+    /// Change of the estimates by a unit error of each parameter, one column per parameter: C H. H
+    /// is the information of the data, and C = (H + P⁻¹)⁻¹ the covariance (`inverse`). The
+    /// parameter absorbs its own error but for the part that its prior holds back, and only this
+    /// part moves the others.
     pub fn moves_by_errors(&self, inverse: &DMatrix<f64>) -> DMatrix<f64> {
         inverse * self.evidence_information()
     }

@@ -10,13 +10,14 @@ use super::parameters::{KINDS, Kind, SIGNALS, is_observable, place};
 use super::settings::{Action, Compatibility, OnFault};
 use crate::tables::InstrumentError;
 
-/// Error of the equations in a bias, as a share of an ordinary bias: 10⁻⁴ g of an accelerometer, the size of
-/// gravity's anomalies, which normal gravity leaves out. Smaller: all flights would share an error that their
-/// bounds do not contain. Larger: common errors of many flights would be found less often.
+/// Error of the equations in a bias, as a fraction of an ordinary bias. For an accelerometer it is
+/// 10⁻⁴ g, the size of the gravity anomalies, which normal gravity leaves out. Smaller: all flights
+/// would share an error that their bounds do not contain. Larger: common errors of many flights
+/// would be found less often.
 const MODEL_BIAS: f64 = 0.01;
 
-/// Error of the clock in a delay, s: recorders state times to the millisecond, and a tenth of an ordinary delay
-/// changes no verdict on one flight.
+/// Error of the clock in a delay, s. Recorders state times to the millisecond, and a tenth of an
+/// ordinary delay changes no verdict on one flight.
 const MODEL_DELAY_S: f64 = 0.001;
 
 /// Largest bound of an estimated parameter, as a share of its prior. About half of the information

@@ -27,11 +27,12 @@ struct Sizes {
     scale: [f64; 2],
 }
 
-// Sources. Where no better one is stated, a size is that of usual flight-test instrumentation, and the analyst
-// who has a calibration states it: `instruments: <signal>: ordinary` and `fault` of aircraft.yaml. An ordinary
-// size is the standard deviation of a prior. Too small, it draws a real error towards zero and its remainder into
-// other instruments; too large, errors that the flight does not determine have wide bounds and are less often
-// corrected. The size of a fault decides from where an instrument is named, not what is estimated.
+// Sources. The default sizes are those of usual flight-test instrumentation. An analyst who has a
+// calibration states its sizes: `instruments: <signal>: ordinary` and `fault` of aircraft.yaml. An
+// ordinary size is the standard deviation of a prior. Too small a size pulls a real error towards
+// zero and its remainder into other instruments. Too large a size widens the bounds of errors that
+// the flight does not determine, and fewer are corrected. The size of a fault decides from where an
+// instrument is named, not what is estimated.
 
 /// Rate gyros, deg/s. Usual instrumentation; 0.1 deg/s is the sixfold of a last bit of 12 over ±30 deg/s.
 const GYRO: Sizes = Sizes {
@@ -55,8 +56,8 @@ const AIRSPEED: Sizes = Sizes {
     bias: [3.0, 20.0],
     scale: [0.01, 0.05],
 };
-/// Altitude, ft. The error of static pressure that 14 CFR 25.1325 allows, 30 ft per 100 kt, at 330 kt; the scale
-/// is that of a day whose temperature is 1 % (3 K) from the standard atmosphere.
+/// Altitude, ft. Bias: the static-pressure error that 14 CFR 25.1325 allows (30 ft per 100 kt) at
+/// 330 kt. Scale: the error on a day 1 % (3 K) off the standard atmosphere.
 const ALTITUDE: Sizes = Sizes {
     bias: [100.0, 1000.0],
     scale: [0.01, 0.05],

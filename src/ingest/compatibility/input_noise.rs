@@ -1,9 +1,9 @@
 //! Uncertainty of a window's parameters from the noise of its inputs.
 //!
-//! The rates and accelerations (the *inputs*) drive the equations of motion, so their white noise is
-//! integrated. The reconstructed outputs then drift along a random walk. A fit over one short window
-//! mistakes the drift for biases and scale errors, and the information of the outputs alone would
-//! promise too small bounds.
+//! The rates and accelerations (the *inputs*) drive the equations of motion, so their white noise
+//! is integrated. The reconstructed outputs then drift along a random walk. A fit over one short
+//! window mistakes the drift for biases and scale errors. The information of the outputs alone
+//! would give too small bounds.
 //!
 //! # Symbols
 //!
@@ -149,8 +149,9 @@ fn block_length(window: &Window) -> usize {
     (BLOCK_S / window.step_s).round().max(1.0) as usize
 }
 
-/// Sums of Sᵀ R⁻¹ C Φ over each block of samples, side by side: rows for the window's own and the shared
-/// parameters, a column for each initial state. A node stands for the samples around it.
+/// Sums of Sᵀ R⁻¹ C Φ over each block of samples, side by side. The rows are the window's
+/// parameters and the shared ones, the columns the initial states. A node stands for the samples
+/// around it.
 fn block_products(
     window: &Window,
     linearised: &LinearisedWindow,
@@ -192,8 +193,8 @@ fn add_scaled(sums: &mut [f64], values: &[f64], factor: f64) {
     }
 }
 
-/// Changes of the initial state that act like the noise of a block, for each block and input:
-/// Φ(t, 0)⁻¹ B(t) h σ √N at the block's middle t. σ is the noise's standard deviation, N the number of
+/// Changes of the initial state with the effect of a block's noise, for each block and input: Φ(t,
+/// 0)⁻¹ B(t) h σ √N at the block's middle t. σ is the noise's standard deviation, N the number of
 /// samples. `None` if Φ is singular.
 fn moves_of_start(window: &Window, linearised: &LinearisedWindow) -> Option<Vec<DMatrix<f64>>> {
     let (length, spacing) = (block_length(window), window.samples_per_node());

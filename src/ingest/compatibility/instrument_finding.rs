@@ -136,8 +136,9 @@ impl InstrumentFinding {
         ))
     }
 
-    /// Position that explains the delay of a vane. The flow at a distance x ahead of the c.g. is α − q x/V,
-    /// and in a pitching motion with q ≈ α̇ that is α(t − x/V); likewise β + r x/V with r ≈ −β̇.
+    /// Position that explains the delay of a vane. A vane at a distance x ahead of the c.g. reads α
+    /// − q x/V. In a pitching motion q ≈ α̇, so the reading is about α(t − x/V). Likewise β + r x/V
+    /// with r ≈ −β̇.
     fn vane_position(&self) -> Option<String> {
         let is_vane = matches!(self.signal, signal::ALPHA_VANE | signal::BETA_VANE);
         let delay = self.estimates[Kind::Delay as usize].filter(|e| e.fault && is_vane)?;

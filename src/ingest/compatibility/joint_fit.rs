@@ -1,12 +1,12 @@
 //! Joint output-error fit of a flight's windows: each has its own initial state and wind, and all
 //! share the instruments' errors.
 //!
-//! The prior states that instruments are ordinary or, rarely, wrong by any amount: P = size², and
-//! size² + θ² (Cauchy's distribution by reweighting) for an error that is surely larger than
-//! ordinary. An error that several instruments could explain thus goes to one. After the
-//! reweighting, the error that the data alone put most surely beyond the ordinary is freed of its
-//! prior, until no such error is left. An error that comes out as large as a fault, but is less
-//! certain, gets the ordinary prior again.
+//! The prior assumes that instruments are ordinary, or rarely wrong by any amount. Its variance is
+//! P = size². For an error surely larger than ordinary it is size² + θ²: a Cauchy prior by
+//! reweighting. An error that several instruments could explain thus goes to one. After the
+//! reweighting, the fit frees errors of their priors one by one. It takes the error that the data
+//! alone put most surely beyond the ordinary, until no such error is left. An error that comes out
+//! as large as a fault, but is less certain, gets the ordinary prior again.
 
 use rayon::prelude::*;
 
@@ -34,8 +34,8 @@ const LEAST_ROUNDS: usize = WIDE_ROUNDS + 1;
 /// widens.
 const SURELY: f64 = 3.0;
 
-/// Number of bounds above which a parameter is freed of its prior at the end: more than for
-/// widening, since no other parameters are widened with it.
+/// Number of bounds above which a parameter is freed of its prior at the end. It is larger than for
+/// widening, because no other parameters are widened with the freed one.
 const FREED: f64 = 4.0;
 
 /// Number of ordinary sizes below which no parameter is freed.

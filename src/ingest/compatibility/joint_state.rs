@@ -26,8 +26,8 @@ const LEAST_RISE: f64 = 0.01;
 /// taken: the estimates are computed to first order about the parameters, and contain it.
 pub const SETTLED: f64 = 0.1;
 
-/// Largest move of a parameter, as a share of its bound, for which the sensitivities remain usable:
-/// they change with the motion, which a move of two bounds hardly changes.
+/// Largest move of a parameter, as a fraction of its bound, for which the sensitivities remain
+/// usable. They change with the motion, and a move of two bounds hardly changes the motion.
 const LINEAR: f64 = 2.0;
 
 /// Standard deviation of the delays' weighted mean, s: a tenth of the error of the equations'
@@ -84,9 +84,9 @@ impl JointState<'_> {
             .fold(zero, |sum, window| sum + window.information())
     }
 
-    /// Takes a step, and a second one where the first has left the range of the sensitivities, then
-    /// estimates R anew: more steps would converge for weights that change anyway. Returns the largest
-    /// move of the first step over its bound.
+    /// Takes a step, and a second one if the first left the linear range of the sensitivities. Then
+    /// estimates R again. Further steps would converge with weights that change anyway. Returns the
+    /// largest move of the first step over its bound.
     pub fn settle(&mut self) -> Option<f64> {
         let largest = self.step()?;
         if largest > LINEAR {

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::equations::{MeasuredTerms, State};
-use crate::aircraft::{Aircraft, Flow, Position};
+use crate::aircraft::{Aircraft, Position, VaneFlow};
 use crate::earth::{air, gravity_ft_s2};
 use crate::flight::{Record, signal as s};
 use crate::units::DEG;
@@ -143,7 +143,7 @@ pub fn measured_state(
         return State::zeros();
     };
     let rates = [at(s::P) / DEG, at(s::Q) / DEG, at(s::R) / DEG];
-    let read = Flow {
+    let read = VaneFlow {
         alpha: at(s::ALPHA_VANE) / DEG,
         beta: at(s::BETA_VANE) / DEG,
         velocity: at(s::VELOCITY),

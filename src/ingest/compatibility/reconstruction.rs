@@ -12,8 +12,8 @@
 //! Two grids of time are used:
 //!
 //! - *Points*, a twentieth of a second apart, to which Runge-Kutta steps integrate the states.
-//!   Within a step an input is a parabola: through its values at both points, and with the mean of
-//!   its samples, so that its integral is exact. Readings between points are interpolated.
+//!   Within a step an input is a parabola through its values at the two points, with the mean of
+//!   its samples. Its integral is therefore exact. Readings between points are interpolated.
 //! - *Nodes*, every second point, at which sensitivities are computed from the linearised equations.
 //!   They change as slowly as the aircraft moves.
 //!
@@ -293,8 +293,8 @@ impl Linearisation<'_> {
         end
     }
 
-    /// Sensitivities of the readings at a node: through the states, through the body rates that a
-    /// reading contains, and along the output's own bias, scale and delay.
+    /// Sensitivities of the readings at a node: through the states, through the body rates in a
+    /// reading, and to the bias, scale and delay of the output.
     #[inline(always)]
     fn reading_rows<S: Simd>(&self, simd: S, node: usize, s: &Sensitivities) -> [Row; OUTPUTS] {
         let Trajectory {
@@ -463,8 +463,8 @@ impl CorrectedInputs {
         by_error
     }
 
-    /// Means of these slopes over the two steps from a point, together `length_s` long, by Simpson's
-    /// rule for the scale; the mean slope in time is the rise over the time.
+    /// Means of these slopes over the two steps from a point, together `length_s` long. The scale's
+    /// mean is by Simpson's rule; the mean slope in time is the rise over the time.
     #[inline(always)]
     fn mean_by_error(&self, point: usize, length_s: f64) -> ByError {
         let values = &self.values[2 * point..2 * point + 5];
@@ -480,8 +480,8 @@ impl CorrectedInputs {
     }
 }
 
-/// Mean of a signal between its second sample and its last but one, by the trapezoidal rule with
-/// Gregory's correction for the slopes at both ends. It is exact for cubics.
+/// Mean of a signal between its second and its last but one sample, by the trapezoidal rule with
+/// Gregory's correction for the slopes at the ends. It is exact for cubics.
 fn mean_over_step(samples: &[f64]) -> f64 {
     let last = samples.len() - 2;
     let sum: f64 = samples[1..=last].iter().sum();

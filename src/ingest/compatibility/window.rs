@@ -15,8 +15,8 @@ use crate::flight::interpolation_kernel::WIDTH;
 use crate::numerics::sample_count::nearest;
 use crate::units::DEG;
 
-/// Step of the integration from point to point, s: a twentieth of the period of motions at 1 Hz, faster
-/// than which an aircraft hardly turns.
+/// Step of the integration from point to point, s: a twentieth of the period at 1 Hz. An aircraft
+/// hardly turns faster than that.
 const POINT_STEP_S: f64 = 0.05;
 
 /// Data of a window: samples of inputs with a margin on both sides, outputs, and measured terms.

@@ -35,14 +35,15 @@ const READ_BY: [usize; STATES] = [
 ];
 
 /// Standard deviations about the assumed value of an initial state that no instrument reads, ft/s,
-/// rad and ft: wide, so that the other outputs decide what they can.
+/// rad and ft. They are wide, so that the other outputs determine what they can.
 const UNREAD_START: [f64; STATES] = [100.0, 100.0, 100.0, 1.0, 1.0, 1.0, 5_000.0];
 
 /// Inputs of the fit that are common to all windows.
 pub struct FitContext<'a> {
     pub aircraft: &'a Aircraft,
     pub settings: &'a Compatibility,
-    /// Samples at either end of a window that are not compared: a delay does not reach beyond them.
+    /// Samples excluded from the comparison at either end of a window, so that a delayed output
+    /// needs no sample outside the window.
     pub margin: usize,
 }
 
@@ -280,7 +281,8 @@ impl<'a> WindowFit<'a> {
     }
 }
 
-/// Sums of squares of an output.
+/// Sums of squares of one output over a window: residuals, motion about its mean, and rate of the
+/// motion.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Squares {
     pub residuals: f64,
@@ -331,8 +333,9 @@ fn reduced_information(
 /// Standard deviations of chance by which a sum of squares must exceed that of white noise.
 const CHANCE: f64 = 3.0;
 
-/// Sum of squares without white noise, which does not continue from sample to sample, and without
-/// the excess by chance: the sum of v(k) v(k + 1) has a variance of N s⁴.
+/// Sum of squares of the part that continues from sample to sample, without white noise. White
+/// noise of variance s² exceeds its expectation by chance: the sum of v(k) v(k + 1) has the
+/// variance N s⁴.
 fn slow_squares(values: &[f64]) -> f64 {
     let noise = values
         .windows(2)

@@ -1,8 +1,8 @@
 //! Sums of a window over its samples, output by output: residuals, gradient and information.
 //!
-//! Readings are known at points and sensitivities at nodes, and interpolated between them. So the
-//! gradient Σ s v over the samples is one over the nodes, with each residual distributed over the
-//! nodes around it by the weights of the interpolation.
+//! Readings are known at points and sensitivities at nodes, and interpolated between them. The
+//! gradient Σ s v over the samples is therefore a sum over the nodes. Each residual is distributed
+//! over the nodes around it by the weights of the interpolation.
 
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 

@@ -231,8 +231,8 @@ fn constants(draft: &Draft) -> String {
     }
 }
 
-/// Usual errors of an instrument: uncertainty after calibration, ordinary error and fault, each with bias
-/// and scale error in percent; empty where the signal has none.
+/// Usual errors of an instrument: uncertainty after calibration, ordinary error and fault. Each has
+/// a bias and a scale error in percent, and is empty if the signal has none.
 struct UsualErrors {
     signals: &'static [&'static str],
     uncertainty: &'static str,
@@ -306,8 +306,8 @@ const OF_SURFACES: UsualErrors = UsualErrors {
     fault: "",
 };
 
-/// Errors of mass and inertias that are given as constants: half of the fuel that is burnt in a flight of training or test,
-/// and what an estimate from the type's data leaves.
+/// Errors of mass and inertias that are given as constants. Mass: half of the fuel burnt in a
+/// training or test flight. Inertias: the error of an estimate from type data.
 const OF_CONSTANTS: [(&str, UsualErrors); 4] = [
     (signal::MASS, of_constant("scale_pct: 3")),
     (signal::IX, of_constant("scale_pct: 5")),

@@ -6,7 +6,7 @@ use super::contents::Draft;
 use super::model::{basic, bias, biased, of_surface};
 use crate::aero::Axis;
 use crate::inspection::findings::Channel;
-use crate::inspection::inputs::{Acts, InputColumn};
+use crate::inspection::inputs::{ControlAxis, InputColumn};
 use crate::inspection::vocabulary::Input;
 
 /// Least number of steps of an input that make a maneuver: a doublet has three.
@@ -31,8 +31,8 @@ pub struct DraftClass {
 pub fn classes(draft: &Draft) -> Vec<DraftClass> {
     let of_surfaces = Inputs::of(draft, Input::is_surface);
     let of_pilot = Inputs::of(draft, |kind| !kind.is_surface());
-    let acts = [Acts::Pitch, Acts::Roll, Acts::Yaw];
-    let of_pilot_all = acts.map(|acts| of_pilot.of_axis(acts)).concat();
+    let axes = [ControlAxis::Pitch, ControlAxis::Roll, ControlAxis::Yaw];
+    let of_pilot_all = axes.map(|axis| of_pilot.of_axis(axis)).concat();
     let mut classes = of_surfaces.classes(FlownBy::Surfaces, &of_pilot_all);
     classes.extend(of_pilot.classes(FlownBy::Pilot, &[]));
     classes
@@ -70,8 +70,8 @@ impl<'a> Inputs<'a> {
 
     /// Inputs of an axis that step: the main one first, where there is one, then flaps, vanes and the
     /// like. Beside main ones that only follow feedback the others are no maneuver of the axis.
-    fn of_axis(&self, acts: Acts) -> Vec<String> {
-        let of_axis = self.inputs.iter().filter(|(_, input)| input.acts == acts);
+    fn of_axis(&self, axis: ControlAxis) -> Vec<String> {
+        let of_axis = self.inputs.iter().filter(|(_, input)| input.axis == axis);
         let (main, others): (Vec<_>, Vec<_>) =
             of_axis.partition(|(_, input)| input.kind != Input::OtherSurface);
         let steps = |(channel, _): &&&(&Channel, &InputColumn)| channel.step.is_some();
@@ -85,8 +85,8 @@ impl<'a> Inputs<'a> {
     /// Pitch, roll, yaw, and roll with yaw. The first input of each axis must step, the others may; `others` must rest in
     /// all of them.
     fn classes(&self, by: FlownBy, others: &[String]) -> Vec<DraftClass> {
-        let [pitch, roll, yaw] =
-            [Acts::Pitch, Acts::Roll, Acts::Yaw].map(|acts| self.of_axis(acts));
+        let [pitch, roll, yaw] = [ControlAxis::Pitch, ControlAxis::Roll, ControlAxis::Yaw]
+            .map(|axis| self.of_axis(axis));
         let class = |name: &str, axis: Axis, steps: &[&Vec<String>], rests: &[&Vec<String>]| {
             let first = |signals: &&Vec<String>| signals.first().cloned();
             let all_step = steps.iter().all(|signals| !signals.is_empty());

@@ -1,7 +1,7 @@
 //! Contents of a draft, and the form of texts in YAML.
 
 use crate::inspection::findings::{Channel, Inspection, Role};
-use crate::inspection::inputs::{Acts, InputColumn};
+use crate::inspection::inputs::{ControlAxis, InputColumn};
 
 /// Word in place of a value that the analyst must give. The configuration lists all of them.
 pub const OPEN: &str = "FILL_IN";
@@ -40,10 +40,10 @@ impl Draft<'_> {
     /// Surfaces that move and act on the longitudinal or on the lateral axis.
     #[must_use]
     pub fn surfaces(&self, is_longitudinal: bool) -> Vec<(&Channel, &InputColumn)> {
-        let of_axis = |acts: Acts| (acts == Acts::Pitch) == is_longitudinal;
+        let of_axis = |axis: ControlAxis| (axis == ControlAxis::Pitch) == is_longitudinal;
         let inputs = self.inputs();
         inputs
-            .filter(|(_, input)| input.kind.is_surface() && of_axis(input.acts))
+            .filter(|(_, input)| input.kind.is_surface() && of_axis(input.axis))
             .collect()
     }
 

@@ -1,5 +1,5 @@
-//! Draft of a pipeline from the findings of an inspection: the YAML files of its folder, with an
-//! open question for each value that no recording contains.
+//! Draft of a pipeline from the findings of an inspection: the YAML files of the pipeline's folder.
+//! Each value that no recording contains is an open question.
 
 mod aircraft;
 mod classes;

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::coverage::{MeasuredPoint, TrueAndEstimated};
 use super::recordings::Realisation;
-use crate::aero::{Buildup, Regressor, WindTunnel};
+use crate::aero::{AeroModel, Regressor, WindTunnel};
 use crate::numerics::normal::NORMAL_95;
 use crate::numerics::order_statistics::median;
 use crate::tables::ConditionRow;
@@ -16,7 +16,7 @@ pub const ALL_CLASSES: &str = "all";
 /// which separates constants from slopes.
 #[derive(Clone, Copy)]
 pub struct Scales<'a> {
-    pub buildup: &'a Buildup,
+    pub aero_model: &'a AeroModel,
     /// Tables of the true derivatives.
     pub truth: &'a WindTunnel,
 }
@@ -82,7 +82,7 @@ impl Scales<'_> {
     /// `true` for a derivative without a regressor: its size depends on the choice of the axes, not
     /// on the maneuver.
     fn is_constant(&self, derivative: &str) -> bool {
-        let mut derivatives = self.buildup.derivatives.iter();
+        let mut derivatives = self.aero_model.derivatives.iter();
         derivatives.any(|d| d.name == derivative && d.regressor == Regressor::Constant)
     }
 }

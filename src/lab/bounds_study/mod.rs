@@ -63,7 +63,7 @@ pub fn run(
     }
     study.vary_starts(campaign, &points, progress);
     progress.end();
-    let shelf = table::Shelf::of(out);
+    let shelf = table::TableFolder::of(out);
     table::publish(&shelf, &study.conditions)?;
     table::publish(&shelf, &study.coverage)?;
     table::publish(&shelf, &study.starts)?;
@@ -115,7 +115,7 @@ impl BoundsStudy {
             progress.advance(&point.card.flight_id);
         }
         let scales = Scales {
-            buildup: &campaign.config.buildup,
+            aero_model: &campaign.config.aero_model,
             truth: &campaign.config.tunnel,
         };
         let rows = condition_rows::condition_rows(&condition.name, &measured, scales);
@@ -124,8 +124,8 @@ impl BoundsStudy {
         self.coverage.extend(rows);
     }
 
-    /// Estimates maneuvers under the conditions that the theory assumes, from other starting
-    /// values.
+    /// Repeats the estimation of simulated records from other starting values. The records meet the
+    /// assumptions of the theory (`assumed_condition`).
     fn vary_starts(
         &mut self,
         campaign: &SimulatedCampaign,
@@ -141,8 +141,8 @@ impl BoundsStudy {
         for point in points {
             let starts = StudyManeuver::new(campaign, point.class, &point.card, &condition)
                 .and_then(|maneuver| {
-                    let buildup = &campaign.config.buildup;
-                    starts::starts(&maneuver, buildup, count, point.seed(campaign))
+                    let aero_model = &campaign.config.aero_model;
+                    starts::starts(&maneuver, aero_model, count, point.seed(campaign))
                 });
             match starts {
                 Ok(rows) => self.starts.extend(rows),

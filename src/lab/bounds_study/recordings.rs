@@ -128,7 +128,7 @@ impl<'a> StudyManeuver<'a> {
         let truth = true_tables(&flown.truth);
         let context = Context {
             start,
-            ..Context::new(&config.aircraft, &config.buildup, &truth, &self.settings)
+            ..Context::new(&config.aircraft, &config.aero_model, &truth, &self.settings)
         };
         estimate::maneuver(&record, &flown.maneuver, self.class, &context)
     }

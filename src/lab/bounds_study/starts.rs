@@ -1,11 +1,11 @@
-//! Dependence of the minimum on the starting values: each record is estimated by output error from the true
-//! values, from twice and half of them, and from ineffective surfaces. Filter error does not start from
-//! tabulated values.
+//! Dependence of the minimum on the starting values. Each record is estimated by output error from
+//! the true values, from twice and half the true values, and from ineffective surfaces. Filter
+//! error does not start from tabulated values.
 
 use rayon::prelude::*;
 
 use super::recordings::{StudyManeuver, true_tables};
-use crate::aero::{Buildup, WindTunnel};
+use crate::aero::{AeroModel, WindTunnel};
 use crate::error::Problem;
 use crate::estimate::{Estimated, Method, Start};
 use crate::lab::simulator::{FlownManeuver, TrueDerivative};
@@ -18,9 +18,13 @@ use crate::tables::{EstimateRow, StartRow, StartVariant, StartingValues};
 const SAME_MINIMUM: f64 = 0.1;
 
 /// Tunnel tables with these values.
-fn start_tables(variant: StartVariant, truth: &[TrueDerivative], buildup: &Buildup) -> WindTunnel {
+fn start_tables(
+    variant: StartVariant,
+    truth: &[TrueDerivative],
+    aero_model: &AeroModel,
+) -> WindTunnel {
     let is_surface = |name: &str| {
-        buildup
+        aero_model
             .derivatives
             .iter()
             .any(|d| d.name == name && d.regressor.surface().is_some())
@@ -56,7 +60,7 @@ struct ReachedMinimum {
 /// The maneuver cannot be flown.
 pub fn starts(
     maneuver: &StudyManeuver,
-    buildup: &Buildup,
+    aero_model: &AeroModel,
     realisations: usize,
     seed: u64,
 ) -> Result<Vec<StartRow>, Problem> {
@@ -65,7 +69,7 @@ pub fn starts(
     maneuver.settings.start = Start::WindTunnel;
     maneuver.settings.method = Method::OutputError;
     let row = |values: StartVariant| {
-        let start = start_tables(values, &flown.truth, buildup);
+        let start = start_tables(values, &flown.truth, aero_model);
         let reached = reached(&maneuver, &flown, &start, realisations, seed);
         StartRow {
             class: maneuver.class.name.clone(),

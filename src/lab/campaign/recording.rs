@@ -117,7 +117,8 @@ fn every(rate_hz: f64, slow: &super::cards::SlowColumns) -> Result<usize, String
     Ok(every)
 }
 
-/// Content of a column of the channel map: a signal of the simulator, or the formula of the card.
+/// Content of a recorded column: the simulator's signal in the channel's unit, or the formula that
+/// the recorder card gives for it.
 fn content(
     card: &RecorderCard,
     channels: &BTreeMap<String, Channel>,

@@ -48,7 +48,7 @@ impl SimulatedCampaign {
             ..Overrides::default()
         };
         let config = Config::load(&folder, overrides)?;
-        let truth = config::tunnel_rows(&truth, &config.buildup, config.tunnel.settings())?;
+        let truth = config::tunnel_rows(&truth, &config.aero_model, config.tunnel.settings())?;
         let truth = truth.into_iter().map(|(_, row)| row).collect();
         let simulator = read.simulator(&config, config.tunnel.clone())?;
         let names = signals(cards, &simulator);

@@ -37,7 +37,7 @@ impl TestCards {
     /// value.
     pub fn simulator(&self, config: &Config, derivatives: WindTunnel) -> Result<Simulator> {
         let settings = self.cards.aircraft.clone();
-        Simulator::new(&config.aircraft, &config.buildup, derivatives, settings)
+        Simulator::new(&config.aircraft, &config.aero_model, derivatives, settings)
             .map_err(|message| self.source.error("aircraft", message))
     }
 

@@ -95,7 +95,7 @@ fn derivative_rows<'a>(
         .iter()
         .map(|t| row(&t.derivative, t.unit, t.value))
         .collect();
-    for combined in &campaign.config.buildup.combined {
+    for combined in &campaign.config.aero_model.combined {
         if let Some((constant, slope)) = value(&combined.constant).zip(value(&combined.slope)) {
             let sum = constant + slope * maneuver.alpha_deg;
             rows.push(row(&combined.name, "-", sum));

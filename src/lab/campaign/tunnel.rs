@@ -11,12 +11,12 @@ use crate::store::files::TunnelRow;
 /// each point. Combined sums follow from the erroneous values.
 pub fn rows(campaign: &SimulatedCampaign) -> Vec<TunnelRow> {
     let errors = &campaign.cards.wind_tunnel;
-    let buildup = &campaign.config.buildup;
+    let aero_model = &campaign.config.aero_model;
     let mut rows = Vec::new();
-    for derivative in &buildup.derivatives {
+    for derivative in &aero_model.derivatives {
         rows.extend(measured(campaign, errors, &derivative.name));
     }
-    for combined in &buildup.combined {
+    for combined in &aero_model.combined {
         rows.extend(combined_sums(&rows, combined));
     }
     rows.retain(|row| !errors.leave_out.contains(&row.derivative));

@@ -5,7 +5,7 @@
 
 use nalgebra::Vector3;
 
-use crate::aero::{Buildup, Coefficient, Combined, Derivative, Regressor, WindTunnel};
+use crate::aero::{AeroModel, Coefficient, Combined, Derivative, Regressor, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::flight::signal;
 use crate::numerics::cubic_curve::CubicCurve;
@@ -15,7 +15,7 @@ use crate::units::DEG;
 /// The build-up with the tables of the true derivatives.
 #[derive(Clone, Debug)]
 pub struct Aerodynamics {
-    buildup: Buildup,
+    aero_model: AeroModel,
     /// Names of the simulated surfaces.
     surfaces: Vec<String>,
     truth: WindTunnel,
@@ -37,11 +37,11 @@ impl Aerodynamics {
     /// # Errors
     /// A derivative has no true value, or its surface is not simulated.
     pub fn new(
-        buildup: &Buildup,
+        aero_model: &AeroModel,
         truth: WindTunnel,
         surfaces: &[String],
     ) -> Result<Aerodynamics, String> {
-        for derivative in &buildup.derivatives {
+        for derivative in &aero_model.derivatives {
             if !truth.has(&derivative.name) {
                 return Err(format!("the truth has no value of {}", derivative.name));
             }
@@ -52,7 +52,7 @@ impl Aerodynamics {
                 return Err(format!("{}: `surfaces` has no `{name}`", derivative.name));
             }
         }
-        let place = |name: &str| buildup.derivatives.iter().position(|d| d.name == name);
+        let place = |name: &str| aero_model.derivatives.iter().position(|d| d.name == name);
         let sum = |sum: &Combined| {
             Some(TabulatedSum {
                 constant: place(&sum.constant)?,
@@ -61,9 +61,9 @@ impl Aerodynamics {
             })
         };
         Ok(Aerodynamics {
-            buildup: buildup.clone(),
+            aero_model: aero_model.clone(),
             surfaces: surfaces.to_vec(),
-            sums: buildup.combined.iter().filter_map(sum).collect(),
+            sums: aero_model.combined.iter().filter_map(sum).collect(),
             truth,
         })
     }
@@ -71,16 +71,17 @@ impl Aerodynamics {
     /// Derivatives in the order of [`Aerodynamics::values`].
     #[must_use]
     pub fn derivatives(&self) -> &[Derivative] {
-        &self.buildup.derivatives
+        &self.aero_model.derivatives
     }
 
     /// Values of the derivatives at an angle of attack, deg, and a Mach number.
     ///
-    /// Between the points of its table a derivative is linear. A sum of constant and slope times α is the cubic through
-    /// its points with the tabulated slopes, so that the slope is the coefficient's derivative along α.
+    /// Between the points of its table a derivative is linear. A sum of constant and slope times α
+    /// is the cubic through its points with the tabulated slopes. The slope is thus the
+    /// coefficient's derivative along α.
     #[must_use]
     pub fn values(&self, alpha_deg: f64, mach: f64) -> Vec<f64> {
-        let places = 0..self.buildup.derivatives.len();
+        let places = 0..self.aero_model.derivatives.len();
         let mut values: Vec<f64> = places.map(|i| self.tabulated(i, alpha_deg, mach)).collect();
         for sum in &self.sums {
             let (at, along) = self.sum(sum, alpha_deg, mach);
@@ -105,15 +106,15 @@ impl Aerodynamics {
 
     /// Value of a derivative by its place.
     fn tabulated(&self, derivative: usize, alpha_deg: f64, mach: f64) -> f64 {
-        let name = &self.buildup.derivatives[derivative].name;
+        let name = &self.aero_model.derivatives[derivative].name;
         let value = self.truth.value(name, alpha_deg, mach);
         value.map_or(0.0, |v| v.value)
     }
 
-    /// True if the loads depend on the rate of the angle of attack.
+    /// `true` if the loads depend on the rate of the angle of attack.
     #[must_use]
     pub fn have_lag(&self) -> bool {
-        self.buildup.lags().next().is_some()
+        self.aero_model.along_alpha_rate().next().is_some()
     }
 
     /// Force, lbf, and moment about the c.g., ft lbf, in body axes, at rates relative to the air, and at a
@@ -149,7 +150,7 @@ impl Aerodynamics {
             Regressor::Surface(name) | Regressor::Vane(name) => signal(name),
             _ => 1.0,
         };
-        for (derivative, value) in self.buildup.derivatives.iter().zip(values) {
+        for (derivative, value) in self.aero_model.derivatives.iter().zip(values) {
             let vane = matches!(derivative.regressor, Regressor::Vane(_));
             let regressor = derivative.regressor.value(&part);
             let term = value * regressor * if vane { 1.0 } else { area };

@@ -13,11 +13,11 @@ pub struct GustPath {
     pub count: usize,
 }
 
-/// Velocity and rotation of the air over the ground in body axes. The aerodynamics feel the
+/// Velocity and rotation of the air over the ground in body axes. The aerodynamics depend on the
 /// velocities and rates of the aircraft less these; gyros and attitudes do not.
 ///
-/// The air turns as a rigid body about the c.g. does whose velocity has the gradients of the gusts:
-/// `p_g` = ∂w/∂y, `q_g` = −∂w/∂x, `r_g` = ∂v/∂x, with x forward, y right and w down.
+/// The air near the c.g. rotates like a rigid body with the gust gradients: `p_g` = ∂w/∂y, `q_g` =
+/// −∂w/∂x, `r_g` = ∂v/∂x (x forward, y right, w down).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Gust {
     /// u, v, w, ft/s.

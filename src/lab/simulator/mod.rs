@@ -24,7 +24,7 @@ pub mod trim;
 pub mod control;
 mod flight;
 
-use crate::aero::{Buildup, WindTunnel};
+use crate::aero::{AeroModel, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::error::{Problem, ProblemStage};
 
@@ -52,13 +52,13 @@ impl Simulator {
     /// not simulated.
     pub fn new(
         aircraft: &Aircraft,
-        buildup: &Buildup,
+        aero_model: &AeroModel,
         truth: WindTunnel,
         settings: Settings,
     ) -> Result<Simulator, String> {
         let settings = settings.checked()?;
         let aerodynamics =
-            aerodynamics::Aerodynamics::new(buildup, truth, &settings.surface_names)?;
+            aerodynamics::Aerodynamics::new(aero_model, truth, &settings.surface_names)?;
         Ok(Simulator {
             plant: plant::Plant {
                 aircraft: aircraft.clone(),

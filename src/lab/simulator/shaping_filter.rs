@@ -2,8 +2,8 @@
 //! discretised exactly.
 //!
 //! ẋ = A x + b n, y = C x with white noise n of unit intensity. Over a step Δt,
-//! `x_{k+1}` = Φ `x_k` + `w_k` with Φ = e^(AΔt) and cov w = Q = ∫₀^Δt e^(As) b bᵀ e^(Aᵀs) ds
-//! (Van Loan 1978); the stationary covariance satisfies P = Φ P Φᵀ + Q.
+//! `x_{k+1}` = Φ `x_k` + `w_k` with Φ = e^(AΔt) and cov w = Q = ∫₀^Δt e^(As) b bᵀ e^(Aᵀs) ds (Van
+//! Loan 1978). The stationary covariance satisfies P = Φ P Φᵀ + Q.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 

@@ -211,7 +211,7 @@ fn the_equations_of_simulator_and_estimator_agree_to_twelve_digits() {
 fn the_true_slopes_over_alpha_are_the_derivatives_of_the_coefficients() {
     let campaign = shipped_campaign();
     let aerodynamics = &campaign.simulator.plant.aerodynamics;
-    let sums = &campaign.config.buildup.combined;
+    let sums = &campaign.config.aero_model.combined;
     assert!(!sums.is_empty());
     let value = |name: &str, alpha_deg: f64| {
         let mut derivatives = aerodynamics.derivatives().iter();
@@ -487,7 +487,12 @@ fn estimated(campaign: &SimulatedCampaign, flown: &FlownManeuver) -> Estimated {
         method: Method::OutputError,
         ..config.estimate.clone()
     };
-    let context = Context::new(&config.aircraft, &config.buildup, &config.tunnel, &settings);
+    let context = Context::new(
+        &config.aircraft,
+        &config.aero_model,
+        &config.tunnel,
+        &settings,
+    );
     estimate::maneuver(
         &flown.record,
         &flown.maneuver,
@@ -585,7 +590,7 @@ const LAG: [(&str, Coefficient, f64); 2] = [
 pub(crate) fn with_lag(mut campaign: SimulatedCampaign) -> SimulatedCampaign {
     let config = &mut campaign.config;
     for (name, coefficient, value) in LAG {
-        config.buildup.derivatives.push(Derivative {
+        config.aero_model.derivatives.push(Derivative {
             name: name.into(),
             coefficient,
             regressor: Regressor::AlphaRate,
@@ -601,7 +606,7 @@ pub(crate) fn with_lag(mut campaign: SimulatedCampaign) -> SimulatedCampaign {
     let settings = campaign.simulator.settings().clone();
     let truth = config.tunnel.clamped();
     campaign.simulator =
-        Simulator::new(&config.aircraft, &config.buildup, truth, settings).unwrap();
+        Simulator::new(&config.aircraft, &config.aero_model, truth, settings).unwrap();
     campaign
 }
 
@@ -627,7 +632,7 @@ fn a_held_lag_is_no_part_of_the_damping_in_pitch() {
     // Without the lag in its model, the damping has most of it.
     campaign
         .config
-        .buildup
+        .aero_model
         .derivatives
         .retain(|d| d.regressor != Regressor::AlphaRate);
     let both = value("Cm_q") + value("Cm_alpha_dot");
@@ -689,7 +694,7 @@ fn delays_of_a_recorder_s_buses_are_found_within_their_bounds() {
     let config = &campaign.config;
     let basis = AircraftModel {
         aircraft: &config.aircraft,
-        buildup: &config.buildup,
+        aero_model: &config.aero_model,
         tunnel: &config.tunnel,
     };
     let fly = |(class, alpha_deg)| {

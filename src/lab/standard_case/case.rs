@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 use super::case_file::{self, CaseFile, bias};
 use crate::aero::{Bias, Derivative};
 use crate::aircraft::Aircraft;
-use crate::dynamics::motion::{MassProperties, Window};
+use crate::dynamics::motion::{ManeuverSignals, MassProperties};
 use crate::dynamics::{Longitudinal, OUTPUTS};
 use crate::error::{Error, Result};
 use crate::flight::Record;
@@ -79,7 +79,7 @@ pub fn load(path: &Path) -> Result<StandardCase> {
 
 /// One estimate of a standard case.
 pub(super) struct StandardEstimate {
-    window: Window,
+    window: ManeuverSignals,
     case: Case<3, Longitudinal>,
     pub fit: Fit,
     /// Inverse of the information matrix.
@@ -153,10 +153,10 @@ impl StandardCase {
     ///
     /// # Errors
     /// The message for a signal that the record lacks.
-    pub fn window(&self) -> Result<Window, String> {
+    pub fn window(&self) -> Result<ManeuverSignals, String> {
         let derivatives = self.free.iter().chain(self.held.iter().map(|(d, _)| d));
         let surfaces = derivatives.flat_map(|d| d.regressor.signals());
-        let window = Window::cut(
+        let window = ManeuverSignals::cut(
             &self.aircraft,
             &self.record,
             0..self.record.samples,
@@ -179,7 +179,7 @@ impl StandardCase {
 
     /// Prepares the maneuver for the iteration.
     #[must_use]
-    pub fn case(&self, window: &Window) -> Case<3, Longitudinal> {
+    pub fn case(&self, window: &ManeuverSignals) -> Case<3, Longitudinal> {
         let measurements = self.file.measurements(&self.record);
         let mut case = Case::new(&self.aircraft, window, measurements, &self.model());
         case.start_from_mean_of(self.file.x0_samples);

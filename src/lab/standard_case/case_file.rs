@@ -104,7 +104,7 @@ pub(super) fn bias(name: &str) -> Option<Bias> {
 }
 
 /// Parses the name of a derivative: the coefficient followed by `0`, `a`, `q` or the column of a
-/// surface, which ends in `v` for a thrust-vectoring vane.
+/// surface. The column of a thrust-vectoring vane ends in `v`.
 ///
 /// # Errors
 /// The message for a name without a longitudinal coefficient.

@@ -3,10 +3,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::aero::wind_tunnel::TunnelPoint;
-use crate::aero::{Buildup, Coefficient, Combined, Derivative, Regressor, WindTunnel};
+use crate::aero::{AeroModel, Coefficient, Combined, Derivative, Regressor, WindTunnel};
 use crate::estimate::Covariance;
 use crate::maneuver::{Maneuver, Status};
-use crate::model::{Evidence, Model, Settings, model};
+use crate::model::{ManeuverResults, Model, Settings, model};
 use crate::output_error::error_effect::{ErrorEffect, SharedError};
 use crate::tables::EstimateRow;
 
@@ -23,14 +23,14 @@ pub struct Flown {
     pub covariance: Covariance,
 }
 
-pub fn buildup() -> Buildup {
+pub fn aero_model() -> AeroModel {
     let regressors = [Regressor::Constant, Regressor::Alpha, Regressor::PitchRate];
     let derivative = |(name, regressor): (&str, Regressor)| Derivative {
         name: name.into(),
         coefficient: Coefficient::CN,
         regressor,
     };
-    Buildup {
+    AeroModel {
         derivatives: NAMES.into_iter().zip(regressors).map(derivative).collect(),
         biases: vec![],
         combined: vec![Combined {
@@ -114,8 +114,8 @@ impl Flown {
         self
     }
 
-    pub fn evidence(&self) -> Evidence<'_> {
-        Evidence {
+    pub fn evidence(&self) -> ManeuverResults<'_> {
+        ManeuverResults {
             maneuver: &self.maneuver,
             estimates: &self.estimates,
             combined: &self.combined,
@@ -141,8 +141,8 @@ pub fn exact() -> Settings {
 }
 
 pub fn posterior(flown: &[Flown], tunnel: &WindTunnel, settings: &Settings) -> Model {
-    let evidence: Vec<Evidence> = flown.iter().map(Flown::evidence).collect();
-    model(&evidence, &buildup(), tunnel, settings)
+    let evidence: Vec<ManeuverResults> = flown.iter().map(Flown::evidence).collect();
+    model(&evidence, &aero_model(), tunnel, settings)
 }
 
 /// Value and standard deviation of a derivative at an angle of attack.

@@ -2,7 +2,7 @@
 
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 
-use super::fixture::{Flown, at, buildup, diagonal, exact, posterior, tunnel};
+use super::fixture::{Flown, aero_model, at, diagonal, exact, posterior, tunnel};
 use super::parts::{campaign, data, scales};
 use crate::model::Settings;
 use crate::model::other_flights::OtherFlights;
@@ -35,7 +35,8 @@ fn rows(flown: &[Flown]) -> Vec<EstimateRow> {
     let evidence = flown[0].evidence();
     let with = model.with_held(&evidence);
     let own = flown[0].estimates.iter();
-    own.map(|row| with.row(row, &buildup().combined)).collect()
+    own.map(|row| with.row(row, &aero_model().combined))
+        .collect()
 }
 
 #[test]

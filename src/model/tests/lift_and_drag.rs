@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use approx::assert_relative_eq;
 use nalgebra::{DMatrix, DVector};
 
-use crate::aero::{Buildup, Coefficient, Derivative, Regressor};
+use crate::aero::{AeroModel, Coefficient, Derivative, Regressor};
 use crate::dynamics::tests::aircraft;
 use crate::estimate::Covariance;
 use crate::maneuver::{Maneuver, Means, Status};
 use crate::model::lift_and_drag::PublishedManeuver;
-use crate::model::{Evidence, Model};
+use crate::model::{ManeuverResults, Model};
 use crate::output_error::error_effect::{ErrorEffect, SharedError};
 use crate::tables::{EstimateRow, LiftAndDragRow};
 
@@ -29,7 +29,7 @@ const MODEL: [(&str, &str, f64); 8] = [
 const ALPHA_DEG: f64 = 20.0;
 const DE_DEG: f64 = -5.0;
 
-fn buildup() -> Buildup {
+fn aero_model() -> AeroModel {
     let derivative = |(name, regressor, _): &(&str, &str, f64)| Derivative {
         name: (*name).into(),
         coefficient: if name.starts_with("CN") {
@@ -39,9 +39,9 @@ fn buildup() -> Buildup {
         },
         regressor: Regressor::parse(regressor).unwrap(),
     };
-    Buildup {
+    AeroModel {
         derivatives: MODEL.iter().map(derivative).collect(),
-        ..Buildup::default()
+        ..AeroModel::default()
     }
 }
 
@@ -71,7 +71,7 @@ fn rows(corrected: &DMatrix<f64>, effects: Vec<ErrorEffect>) -> Vec<LiftAndDragR
         corrected: corrected.as_slice().to_vec(),
         shared_errors: effects,
     };
-    let evidence = Evidence {
+    let evidence = ManeuverResults {
         maneuver: &maneuver,
         estimates: &estimates,
         combined: &[],
@@ -86,7 +86,7 @@ fn rows(corrected: &DMatrix<f64>, effects: Vec<ErrorEffect>) -> Vec<LiftAndDragR
         estimates: &estimates,
         means: &means,
         aircraft: &aircraft(),
-        buildup: &buildup(),
+        aero_model: &aero_model(),
     };
     Model::default().lift_and_drag(&flown, false)
 }

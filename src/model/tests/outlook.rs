@@ -3,9 +3,9 @@
 use approx::assert_relative_eq;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::fixture::{Flown, at, buildup, diagonal, exact, posterior, tunnel};
+use super::fixture::{Flown, aero_model, at, diagonal, exact, posterior, tunnel};
 use crate::aero::{Axis, Condition};
-use crate::model::{Evidence, Model, Outlook, OutlookPoint, PointQuantity, Settings};
+use crate::model::{ManeuverResults, Model, Outlook, OutlookPoint, PointQuantity, Settings};
 use crate::output_error::error_effect::SharedError;
 
 /// A maneuver that estimates slope and damping and holds nothing, with a bias of its flight, whose
@@ -53,10 +53,10 @@ fn outlook_on(
     flown: &[Flown],
     planned: &[Flown],
 ) -> Outlook {
-    let flown: Vec<Evidence> = flown.iter().map(Flown::evidence).collect();
-    let planned: Vec<Evidence> = planned.iter().map(Flown::evidence).collect();
-    let (buildup, tunnel) = (buildup(), tunnel(None));
-    let basis = (&buildup, &tunnel);
+    let flown: Vec<ManeuverResults> = flown.iter().map(Flown::evidence).collect();
+    let planned: Vec<ManeuverResults> = planned.iter().map(Flown::evidence).collect();
+    let (aero_model, tunnel) = (aero_model(), tunnel(None));
+    let basis = (&aero_model, &tunnel);
     model
         .outlook((&flown, &planned), points, basis, &settings())
         .remove(0)

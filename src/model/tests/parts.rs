@@ -3,19 +3,19 @@
 use approx::assert_relative_eq;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::fixture::{Flown, NAMES, buildup, diagonal, exact, maneuver, posterior, tunnel};
+use super::fixture::{Flown, NAMES, aero_model, diagonal, exact, maneuver, posterior, tunnel};
 use crate::aero::wind_tunnel::{self, Third};
 use crate::aero::{Coefficient, Condition, WindTunnel};
 use crate::maneuver::Maneuver;
 use crate::model::coefficient::Data;
 use crate::model::observed_differences::ObservedDifferences;
 use crate::model::open_scales::add_open_scales;
-use crate::model::posterior::{LeavingOut, gaussian, information, of_differences};
+use crate::model::posterior::{LeaveOneOut, gaussian, information, of_differences};
 use crate::model::scale_prior::Scale;
 use crate::model::scales::{logarithms_of, most_probable, negative_log_posterior, scales_of};
 use crate::model::term::{PosteriorTerm, TermSources};
 use crate::model::unknowns::root_of_differences;
-use crate::model::{Evidence, Settings};
+use crate::model::{ManeuverResults, Settings};
 use crate::numerics::random::RandomStream;
 use crate::numerics::root::EXACT;
 use crate::output_error::error_effect::SharedError;
@@ -48,10 +48,10 @@ pub fn campaign() -> Vec<Flown> {
 
 /// Terms and data of a campaign.
 pub fn data(flown: &[Flown], settings: &Settings) -> (Vec<PosteriorTerm>, Data) {
-    let evidence: Vec<Evidence> = flown.iter().map(Flown::evidence).collect();
-    let (buildup, tunnel) = (buildup(), tunnel(None));
+    let evidence: Vec<ManeuverResults> = flown.iter().map(Flown::evidence).collect();
+    let (aero_model, tunnel) = (aero_model(), tunnel(None));
     let basis = TermSources {
-        buildup: &buildup,
+        aero_model: &aero_model,
         tunnel: &tunnel,
         settings,
     };
@@ -301,7 +301,7 @@ fn what_is_left_out_is_predicted_as_if_it_had_not_been_there() {
         &information(&data.flights, &weights, data.unknowns.count),
     )
     .unwrap();
-    let leaving_out = LeavingOut::new(&data.flights[1], &weights, &whole).unwrap();
+    let leaving_out = LeaveOneOut::new(&data.flights[1], &weights, &whole).unwrap();
     let left = leaving_out.flight().unwrap();
     // The flight: the others are fitted anew.
     let mut others = data.flights.clone();

@@ -1,10 +1,10 @@
 //! Changes from one published night to the next, with their causes: maneuvers, their derivatives,
 //! trends, verdicts and instruments.
 //!
-//! A number has moved if it differs by more than its uncertainty: the corrected bound of an
-//! estimate, or the standard error of a trend, in each case the larger one of both nights. Smaller
-//! differences are noise and are not listed. The information that the posterior gained is given in
-//! nats.
+//! A number has moved if it differs by more than its uncertainty. The uncertainty is the corrected
+//! bound of an estimate or the standard error of a trend: the larger value of the two nights.
+//! Smaller differences are noise and are not listed. The information that the posterior gained is
+//! given in nats.
 
 mod causes;
 mod contradictions;

@@ -1,6 +1,6 @@
 //! Noise of one output as an autoregressive process.
 //!
-//! The noise v at sample k follows from the samples before it and white noise e, with the
+//! The noise v at sample k depends on the earlier samples and on white noise e, with the
 //! coefficients a_j: v_k + Σ a_j v_{k−j} = e_k.
 //!
 //! The process is fitted to autocovariances by the recursion of Levinson and Durbin. Its order has

@@ -95,13 +95,14 @@ impl BlockSeries {
         }
     }
 
-    /// Series extended to more parameters; `places` has the index of each own parameter.
+    /// Series over `parameters` parameters: the sensitivity to parameter `j` of this series moves
+    /// to column `places[j]`, and the other columns are zero.
     #[must_use]
-    pub fn widened(&self, places: &[usize], parameters: usize) -> BlockSeries {
+    pub fn with_parameters(&self, places: &[usize], parameters: usize) -> BlockSeries {
         let mut sensitivities = AlignedMatrix::zeros(self.blocks(), parameters);
         let rows = self.sensitivities.rows().zip(sensitivities.rows_mut());
-        for (own, wide) in rows {
-            widen_row(own, places, wide);
+        for (row, wide) in rows {
+            widen_row(row, places, wide);
         }
         BlockSeries {
             sensitivities,
@@ -162,17 +163,21 @@ impl BlockSeries {
     }
 }
 
-fn widen_row(own: &[f64], places: &[usize], wide: &mut [f64]) {
-    for (&place, s) in places.iter().zip(own) {
+fn widen_row(row: &[f64], places: &[usize], wide: &mut [f64]) {
+    for (&place, s) in places.iter().zip(row) {
         wide[place] = *s;
     }
 }
 
-fn widen_square(own: &AlignedMatrix, places: &[usize], parameters: usize) -> AlignedMatrix {
+fn widen_square(square: &AlignedMatrix, places: &[usize], parameters: usize) -> AlignedMatrix {
     let mut wide = AlignedMatrix::zeros(parameters, parameters);
     let width = wide.width();
-    for (own, &row) in own.rows().zip(places) {
-        widen_row(own, places, &mut wide.values_mut()[row * width..][..width]);
+    for (row, &place) in square.rows().zip(places) {
+        widen_row(
+            row,
+            places,
+            &mut wide.values_mut()[place * width..][..width],
+        );
     }
     wide
 }

@@ -1,5 +1,5 @@
-//! Data that the bounds (1.7) need besides the likelihood: residuals with their sensitivities in
-//! blocks, and the noise of signals that the equations take as exact.
+//! Data that the bounds (1.7) need in addition to the likelihood: residuals with their
+//! sensitivities in blocks, and the noise of signals that the equations take as exact.
 
 use nalgebra::DMatrix;
 
@@ -73,14 +73,14 @@ impl<const NX: usize, E: Equations<NX>> Bounded for Joint<'_, NX, E> {
     fn series(&self, response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> Vec<BlockSeries> {
         let members = self.members.iter().zip(response);
         members
-            .flat_map(|(m, r)| m.widened(&m.case.series(r, weights), self.names().len()))
+            .flat_map(|(m, r)| m.with_parameters(&m.case.series(r, weights), self.names().len()))
             .collect()
     }
 
     fn white_covariance(&self, response: &Vec<Response>, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {
         let mut sum = DMatrix::zeros(self.names().len(), self.names().len());
-        for (member, own) in self.members.iter().zip(response) {
-            member.add(&member.case.white_covariance(own, weights), &mut sum);
+        for (member, response) in self.members.iter().zip(response) {
+            member.add(&member.case.white_covariance(response, weights), &mut sum);
         }
         sum
     }
@@ -93,11 +93,12 @@ impl<const NX: usize, E: Equations<NX>> Bounded for Joint<'_, NX, E> {
     ) -> (Vec<BlockSeries>, DMatrix<f64>) {
         let n = self.names().len();
         let (mut all, mut sum) = (Vec::new(), DMatrix::zeros(n, n));
-        for (member, own) in self.members.iter().zip(response) {
-            let (series, inputs) = member
-                .case
-                .noisy(&member.parameters(parameters), own, weights);
-            all.extend(member.widened(&series, n));
+        for (member, response) in self.members.iter().zip(response) {
+            let (series, inputs) =
+                member
+                    .case
+                    .noisy(&member.parameters(parameters), response, weights);
+            all.extend(member.with_parameters(&series, n));
             member.add(&inputs, &mut sum);
         }
         (all, sum)
@@ -105,10 +106,10 @@ impl<const NX: usize, E: Equations<NX>> Bounded for Joint<'_, NX, E> {
 }
 
 impl<const NX: usize, E: Equations<NX>> JointMember<'_, NX, E> {
-    fn widened(&self, series: &[BlockSeries], parameters: usize) -> Vec<BlockSeries> {
+    fn with_parameters(&self, series: &[BlockSeries], parameters: usize) -> Vec<BlockSeries> {
         series
             .iter()
-            .map(|own| own.widened(&self.places, parameters))
+            .map(|series| series.with_parameters(&self.places, parameters))
             .collect()
     }
 }

@@ -4,15 +4,15 @@
 //!
 //! Let S be the sensitivities, W the weights, v the residuals and H = Σ Sᵀ W S the information
 //! matrix. The estimates solve Σ Sᵀ W v = 0. An error of one standard deviation changes the
-//! residuals at the same parameters to v′, so the estimates change by H⁻¹ Σ Sᵀ W (v′ − v), to first
-//! order in the error. A surface's scale error or bias is equivalent to its derivatives in error,
-//! so v′ − v follows from sensitivities. For other errors it is integrated.
+//! residuals from v to v′ at unchanged parameters. To first order the estimates change by H⁻¹ Σ Sᵀ
+//! W (v′ − v). A surface's scale error or bias is equivalent to its derivatives in error, so v′ − v
+//! follows from sensitivities. For other errors it is integrated.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::aero::{Coefficient, Derivative, Regressor};
 use crate::aircraft::Aircraft;
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{Equations, OUTPUTS};
 use crate::numerics::symmetric::inverse;
 use crate::output_error::case::{Case, InitialState, Model};
@@ -38,7 +38,7 @@ settings! {
 
 /// One error of one signal.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Misreading<'a> {
+pub struct SignalError<'a> {
     pub signal: &'a str,
     pub scale: f64,
     /// Bias, in the signal's unit.
@@ -47,11 +47,11 @@ pub struct Misreading<'a> {
     pub delay_s: f64,
 }
 
-impl<'a> Misreading<'a> {
+impl<'a> SignalError<'a> {
     /// Delay of a surface.
     #[must_use]
-    pub fn late(signal: &'a str, delay_s: f64) -> Misreading<'a> {
-        Misreading {
+    pub fn delay(signal: &'a str, delay_s: f64) -> SignalError<'a> {
+        SignalError {
             signal,
             scale: 0.0,
             bias: 0.0,
@@ -73,30 +73,30 @@ impl<'a> Misreading<'a> {
         ErrorEffect::new(error, deviation, change)
     }
 
-    /// Window as an instrument with the error would have recorded it.
+    /// Signals as an instrument with the error would have recorded it.
     #[must_use]
-    pub fn of_window(&self, window: &Window) -> Window {
-        let misread = window.misread(self.signal, self.scale, self.bias);
+    pub fn apply_to(&self, window: &ManeuverSignals) -> ManeuverSignals {
+        let in_error = window.with_error(self.signal, self.scale, self.bias);
         if self.delay_s == 0.0 {
-            return misread;
+            return in_error;
         }
-        misread.late(self.signal, self.delay_s)
+        in_error.delayed(self.signal, self.delay_s)
     }
 }
 
 impl Calibration {
     /// Independent errors of one standard deviation each.
-    pub fn misreadings<'a>(
+    pub fn signal_errors<'a>(
         &self,
         signal: &'a str,
-    ) -> impl Iterator<Item = Misreading<'a>> + use<'a> {
-        let scale = Misreading {
+    ) -> impl Iterator<Item = SignalError<'a>> + use<'a> {
+        let scale = SignalError {
             signal,
             scale: self.scale_pct / 100.0,
             bias: 0.0,
             delay_s: 0.0,
         };
-        let bias = Misreading {
+        let bias = SignalError {
             signal,
             scale: 0.0,
             bias: self.bias,
@@ -112,7 +112,7 @@ impl Calibration {
 #[derive(Debug)]
 pub struct FittedManeuver<'a, const NX: usize, E: Equations<NX>> {
     pub aircraft: &'a Aircraft,
-    pub window: &'a Window,
+    pub window: &'a ManeuverSignals,
     pub model: &'a Model<'a>,
     pub case: &'a Case<NX, E>,
     pub values: &'a [f64],
@@ -124,7 +124,7 @@ impl<const NX: usize, E: Equations<NX>> FittedManeuver<'_, NX, E> {
     ///
     /// # Errors
     /// [`Diverged`] when the integration with an error leaves its bounds.
-    pub fn gradient_shifts(&self, errors: &[Misreading]) -> Result<Vec<DVector<f64>>, Diverged> {
+    pub fn gradient_shifts(&self, errors: &[SignalError]) -> Result<Vec<DVector<f64>>, Diverged> {
         let held = self.all_held();
         let exact = self.computed(self.window, &held)?;
         let sensitivities = self.case.sensitivities(self.values)?;
@@ -148,24 +148,24 @@ impl<const NX: usize, E: Equations<NX>> FittedManeuver<'_, NX, E> {
 
     fn gradient_shift(
         &self,
-        error: &Misreading,
+        error: &SignalError,
         held: &[(&Derivative, f64)],
         exact: &[[f64; OUTPUTS]],
         sensitivities: &Sensitivities,
     ) -> Result<DVector<f64>, Diverged> {
-        let misread = error.of_window(self.window);
-        let computed = self.computed(&misread, held)?;
+        let in_error = error.apply_to(self.window);
+        let computed = self.computed(&in_error, held)?;
         let misread_outputs = E::AXIS.outputs().map(|o| o.signal() == error.signal);
         let measurements = &self.case.measurements;
         let mut lanes = vec![0.0; sensitivities.width];
-        for (k, (misread, exact)) in computed.iter().zip(exact).enumerate() {
+        for (k, (in_error, exact)) in computed.iter().zip(exact).enumerate() {
             for o in (0..OUTPUTS).filter(|&o| measurements.used[k][o]) {
                 let measured = if misread_outputs[o] {
                     error.scale * measurements.values[k][o] + error.bias
                 } else {
                     0.0
                 };
-                let factor = self.weights[o] * (measured - (misread[o] - exact[o]));
+                let factor = self.weights[o] * (measured - (in_error[o] - exact[o]));
                 for (sum, s) in lanes.iter_mut().zip(sensitivities.row(k, o)) {
                     *sum += factor * s;
                 }
@@ -189,7 +189,7 @@ impl<const NX: usize, E: Equations<NX>> FittedManeuver<'_, NX, E> {
     /// Outputs of a window at the values of the fit, without the biases.
     fn computed(
         &self,
-        window: &Window,
+        window: &ManeuverSignals,
         held: &[(&Derivative, f64)],
     ) -> Result<Vec<[f64; OUTPUTS]>, Diverged> {
         let model = Model {
@@ -276,10 +276,10 @@ impl<'a> SurfaceErrors<'a> {
         })
     }
 
-    fn gradient_shift(&self, error: &Misreading) -> DVector<f64> {
+    fn gradient_shift(&self, error: &SignalError) -> DVector<f64> {
         let mut shift = DVector::zeros(self.places.len());
-        let own = self.derivatives.iter();
-        for (derivative, value) in own.filter(|(d, _)| is_along(d, error.signal)) {
+        let derivatives = self.derivatives.iter();
+        for (derivative, value) in derivatives.filter(|(d, _)| is_along(d, error.signal)) {
             let constant = constant_name(derivative.coefficient, &derivative.regressor);
             self.subtract_column(&derivative.name, error.scale * value, &mut shift);
             self.subtract_column(&constant, error.bias * value, &mut shift);
@@ -337,7 +337,7 @@ fn constant_name(coefficient: Coefficient, regressor: &Regressor) -> String {
 /// ([`FittedManeuver::gradient_shifts`]).
 pub fn add_calibration_errors<D: Likelihood>(
     data: &D,
-    errors: &[Misreading],
+    errors: &[SignalError],
     gradient_shifts: &[DVector<f64>],
     fit: &mut Fit<D::Response>,
 ) {

@@ -21,8 +21,9 @@
 //!
 //! R C Sᵀ + S Cᵀ R − S K Sᵀ.
 //!
-//! R is found in rounds: the absorbed part for the present R is added to the covariance of the
-//! residuals, and an autoregressive process is fitted to the sum, until R settles.
+//! R is found by iteration. Each round adds the absorbed part, computed with the present R, to the
+//! residuals' covariance. It fits an autoregressive process to the sum. The rounds end when R has
+//! settled.
 //!
 //! # Cost
 //!
@@ -49,8 +50,8 @@ const SETTLED: f64 = 0.01;
 /// Change of the absorbed variance, as a share of the variance, below which settled white noise is
 /// not computed again. A bound is accurate to some hundredths only.
 const UNCHANGED: f64 = 1e-3;
-/// Least share of the noise variance that remains in the residuals for which white noise is found
-/// in one round: the residuals' variance is divided by the share.
+/// Smallest fraction of the noise variance that remains in the residuals for which white noise is
+/// found in one round, by dividing the residuals' variance by the fraction.
 const MOSTLY_LEFT: f64 = 0.95;
 
 /// Estimated noise of each output, in the order of the outputs.
@@ -75,7 +76,7 @@ pub struct CovarianceEstimate {
 impl CovarianceEstimate {
     /// Covariance widened by Student's t, so that ±1.96 standard errors are an interval of 95 %.
     #[must_use]
-    pub fn widened(mut self) -> DMatrix<f64> {
+    pub fn widened_by_student_t(mut self) -> DMatrix<f64> {
         for (j, degrees_of_freedom) in self.degrees_of_freedom.iter().enumerate() {
             let factor = student::widening_95(*degrees_of_freedom);
             self.covariance.row_mut(j).scale_mut(factor);
@@ -309,28 +310,32 @@ impl<'a> NoiseIteration<'a> {
         } else {
             1.0
         };
-        let both = absorbed.iter().zip(&self.pairs).zip(&self.observed);
-        let whole: Vec<f64> = both
+        let by_lag = absorbed.iter().zip(&self.pairs).zip(&self.observed);
+        let whole: Vec<f64> = by_lag
             .map(|((absorbed, pairs), observed)| observed + stronger * absorbed / pairs)
             .collect();
         let expected = stronger * self.slow.long_run_variance();
         self.set_noise(&whole);
-        let found = self.slow.long_run_variance();
-        self.settled = (expected - found).abs() <= SETTLED * found;
+        let fitted = self.slow.long_run_variance();
+        self.settled = (expected - fitted).abs() <= SETTLED * fitted;
     }
 
     /// Absorbed part R C Sᵀ + S Cᵀ R − S K Sᵀ, summed over all pairs of blocks at each lag.
+    ///
+    /// With X = R C − ½ S K the part is X Sᵀ + S Xᵀ. For white noise R is a number, and the two
+    /// products are equal.
     fn absorbed_autocovariance(&mut self, covariance: &AlignedMatrix) -> Vec<f64> {
         let (series, lags) = (self.series, self.series.lags());
         let (sums, length) = (&series.sensitivities, series.block_length);
         let factor = self.slow.innovation / length;
         let mut inner = covariance.clone().scaled_by(-0.5 / (length * length));
-        if let Some(mut half) = self.process_times_changes.take() {
-            half.add_product(sums, &inner.scaled_by(1.0 / factor));
-            let before = half.lagged_products(sums, lags);
-            let after = sums.lagged_products(&half, lags);
-            let both = before.iter().zip(after);
-            both.map(|(before, after)| factor * (before + after))
+        if let Some(mut x) = self.process_times_changes.take() {
+            x.add_product(sums, &inner.scaled_by(1.0 / factor));
+            let x_with_s = x.lagged_products(sums, lags);
+            let s_with_x = sums.lagged_products(&x, lags);
+            let by_lag = x_with_s.iter().zip(s_with_x);
+            by_lag
+                .map(|(x_with_s, s_with_x)| factor * (x_with_s + s_with_x))
                 .collect()
         } else {
             inner.add_scaled(self.inverse, factor * series.weight);
@@ -451,7 +456,7 @@ mod tests {
             max_relative = 0.02
         );
         assert_relative_eq!(estimate.degrees_of_freedom[0], 8.0, max_relative = 1e-9);
-        let longer = estimate.clone().widened()[(0, 0)] / estimate.covariance[(0, 0)];
+        let longer = estimate.clone().widened_by_student_t()[(0, 0)] / estimate.covariance[(0, 0)];
         assert_relative_eq!(longer.sqrt(), 2.306 / 1.960, max_relative = 1e-3);
     }
 
@@ -529,7 +534,7 @@ mod tests {
             let estimate = estimate_mean(&values, &vec![true; samples]);
             let within = |variance: f64| u32::from(mean.abs() < 1.96 * variance.sqrt());
             normal += within(estimate.covariance[(0, 0)]);
-            student += within(estimate.widened()[(0, 0)]);
+            student += within(estimate.widened_by_student_t()[(0, 0)]);
         }
         let (normal, student) = (
             f64::from(normal) / f64::from(draws),

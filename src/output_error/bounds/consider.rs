@@ -1,8 +1,8 @@
 //! "Consider" covariance: effect of the uncertainty of held values on the estimates.
 //!
-//! Let S_f and S_h be the sensitivities to free parameters and to held values, W the weights, H the
-//! information on the free parameters, and P the covariance of the held values. The covariance is G
-//! P Gᵀ with G = −H⁻¹ Σ S_fᵀ W S_h.
+//! Let S_f and S_h be the sensitivities to free parameters and to held values, and W the weights.
+//! Let H be the information on the free parameters, and P the covariance of the held values. The
+//! covariance is G P Gᵀ with G = −H⁻¹ Σ S_fᵀ W S_h.
 
 use std::collections::BTreeMap;
 
@@ -82,7 +82,7 @@ pub fn consider_together<const NX: usize, E: Equations<NX>, R>(
     fit.covariance_held = Some(held);
 }
 
-/// Shifts of `n` estimates with one standard deviation of each held value; `None` if the
+/// Shifts of `n` estimates due to one standard deviation of each held value. `None` if the
 /// integration with the held values free diverges or the information has no inverse.
 fn shifts<const NX: usize, E: Equations<NX>>(
     members: &[Considered<NX, E>],

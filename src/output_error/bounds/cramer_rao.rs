@@ -1,4 +1,5 @@
-//! Cramér-Rao bounds (1.6, 1.7) in a form that holds for any weights.
+//! Cramér-Rao bounds (1.6, 1.7) of output error, in a form that holds for any weights. Those of
+//! filter error are in `filter_error::bounds`.
 //!
 //! Let S be the sensitivities, W the weights, H = Σ Sᵀ W S the information matrix and R̂ the
 //! covariance of the residuals. The covariance of the estimates is H⁻¹ [Σ Sᵀ W R̂ W S] H⁻¹. It
@@ -32,7 +33,7 @@ pub fn bounds<D: Bounded>(inverse: &DMatrix<f64>, data: &D, fit: &Fit<D::Respons
     let white = data.white_covariance(&fit.response, &fit.weights);
     let covariance = estimates_covariance(&inverse, &white);
     let (series, inputs) = data.noisy(&fit.values, &fit.response, &fit.weights);
-    let residuals = coloured::covariance(&inverse, &series).widened();
+    let residuals = coloured::covariance(&inverse, &series).widened_by_student_t();
     let corrected =
         raise_variances(residuals, &covariance) + estimates_covariance(&inverse, &inputs);
     Bounds {

@@ -91,15 +91,16 @@ impl VarianceEstimates {
 
     /// Degrees of freedom of each variance; infinite for an exact one.
     pub fn degrees_of_freedom(&self) -> Vec<f64> {
-        let both = self.variances.iter().zip(&self.uncertainties);
-        both.map(|(variance, uncertainty)| {
-            if *uncertainty > 0.0 {
-                2.0 * variance * variance / uncertainty
-            } else {
-                f64::INFINITY
-            }
-        })
-        .collect()
+        let pairs = self.variances.iter().zip(&self.uncertainties);
+        pairs
+            .map(|(variance, uncertainty)| {
+                if *uncertainty > 0.0 {
+                    2.0 * variance * variance / uncertainty
+                } else {
+                    f64::INFINITY
+                }
+            })
+            .collect()
     }
 }
 

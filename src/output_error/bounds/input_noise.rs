@@ -3,10 +3,10 @@
 //! integrated to slow errors. Derivatives follow these, but they are hardly visible in the
 //! residuals beside the sensors' own noise.
 //!
-//! An error of one surface sample changes the gradient Σ Sᵀ W v of the cost directly through the
-//! outputs, and indirectly through the later states. Let S be the sensitivities, W the weights and
-//! v the residuals. An adjoint λ = ∂(gradient)/∂(state), integrated backwards, contains both
-//! effects. If g_k is the change of the gradient with the surface at sample k, white noise of
+//! An error of one surface sample changes the gradient Σ Sᵀ W v of the cost in two ways: directly
+//! through the outputs, and indirectly through the later states. Let S be the sensitivities, W the
+//! weights and v the residuals. An adjoint λ = ∂(gradient)/∂(state), integrated backwards, contains
+//! both effects. Let g_k be the change of the gradient with the surface at sample k. White noise of
 //! variance σ² adds σ² Σ_k g_k g_kᵀ to the gradient's covariance. Surfaces act through three
 //! coefficients, so three vectors g per sample suffice for any number of surfaces.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
@@ -78,6 +78,14 @@ struct BlockSlopes<const NX: usize> {
     state_by_coefficient: SMatrix<f64, NX, COEFFICIENTS>,
 }
 
+/// Let a be the adjoint at the end of a block, Ψ the slope of the state over half a block
+/// (`half_block`), C and D the slopes of the weighted outputs along states and coefficients, B the
+/// slope of the next state along a coefficient, y the block's sums of sensitivities, and w the
+/// share of one sample. Each block has
+///
+/// - the part Ψᵀ a from the later blocks, and Cᵀ y from its own outputs, both in its middle;
+/// - the adjoint Ψᵀ (Ψᵀ a + Cᵀ y) at its start;
+/// - the change Bᵀ (Ψᵀ a + ½ Cᵀ y) + w Dᵀ y of the gradient with each coefficient.
 impl<const NX: usize, E: Equations<NX>> WithSimd for Adjoint<'_, NX, E> {
     type Output = ();
 
@@ -93,60 +101,65 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Adjoint<'_, NX, E> {
         let blocks = self.case.samples().div_ceil(block_length);
         for b in (0..blocks).rev() {
             let samples = block_length.min(self.case.samples() - b * block_length);
-            let middle = b * block_length + samples / 2;
-            let at = self.slopes(middle, samples);
-            let root = cholesky_root(&self.coefficient_noise(middle));
+            let middle_sample = b * block_length + samples / 2;
+            let slopes = self.slopes(middle_sample, samples);
+            let root = cholesky_root(&self.coefficient_noise(middle_sample));
             // A sample has this share of its output's sums, and the block's samples together the
             // root of their number.
             let mut share = [0.0; OUTPUTS];
             for (share, series) in share.iter_mut().zip(self.series) {
                 *share = 1.0 / (series.counts[b].max(1.0) * samples as f64).sqrt();
             }
-            let all = (samples as f64).sqrt();
+            let root_of_samples = (samples as f64).sqrt();
             let row = b % CHUNK * COEFFICIENTS * width;
             for lane in (0..width).step_by(S::F64_LANES) {
                 let mut by_coefficient = [simd.splat_f64s(0.0); COEFFICIENTS];
-                let (mut later, mut now) = ([simd.splat_f64s(0.0); NX], [simd.splat_f64s(0.0); NX]);
+                let (mut from_later_blocks, mut from_outputs) =
+                    ([simd.splat_f64s(0.0); NX], [simd.splat_f64s(0.0); NX]);
                 let mut sums = [simd.splat_f64s(0.0); OUTPUTS];
                 for (sums, series) in sums.iter_mut().zip(self.series) {
                     *sums = load::<S>(series.sensitivities.values(), b * width + lane);
                 }
                 for &(o, i) in E::OUTPUTS_BY_STATE {
-                    let slope = simd.splat_f64s(at.outputs_by_state[(o, i)]);
-                    now[i] = simd.mul_add_f64s(slope, sums[o], now[i]);
+                    let slope = simd.splat_f64s(slopes.outputs_by_state[(o, i)]);
+                    from_outputs[i] = simd.mul_add_f64s(slope, sums[o], from_outputs[i]);
                 }
                 for &(o, c) in E::OUTPUTS_BY_COEFFICIENT {
-                    let slope = simd.splat_f64s(share[o] * at.outputs_by_coefficient[(o, c)]);
+                    let slope = simd.splat_f64s(share[o] * slopes.outputs_by_coefficient[(o, c)]);
                     by_coefficient[c] = simd.mul_add_f64s(slope, sums[o], by_coefficient[c]);
                 }
                 for j in 0..NX {
                     let s = load::<S>(adjoint, j * width + lane);
                     for i in 0..NX {
-                        let slope = simd.splat_f64s(at.half_block[(j, i)]);
-                        later[i] = simd.mul_add_f64s(slope, s, later[i]);
+                        let slope = simd.splat_f64s(slopes.half_block[(j, i)]);
+                        from_later_blocks[i] = simd.mul_add_f64s(slope, s, from_later_blocks[i]);
                     }
                 }
-                let mut before = [simd.splat_f64s(0.0); NX];
+                let mut at_block_start = [simd.splat_f64s(0.0); NX];
                 for i in 0..NX {
                     // On average half of the block comes after a deflection in it.
-                    let left = simd.mul_add_f64s(simd.splat_f64s(0.5), now[i], later[i]);
+                    let remaining = simd.mul_add_f64s(
+                        simd.splat_f64s(0.5),
+                        from_outputs[i],
+                        from_later_blocks[i],
+                    );
                     for c in 0..COEFFICIENTS {
-                        let slope = simd.splat_f64s(at.state_by_coefficient[(i, c)]);
-                        by_coefficient[c] = simd.mul_add_f64s(slope, left, by_coefficient[c]);
+                        let slope = simd.splat_f64s(slopes.state_by_coefficient[(i, c)]);
+                        by_coefficient[c] = simd.mul_add_f64s(slope, remaining, by_coefficient[c]);
                     }
-                    let middle = simd.add_f64s(later[i], now[i]);
+                    let at_middle = simd.add_f64s(from_later_blocks[i], from_outputs[i]);
                     for j in 0..NX {
-                        let slope = simd.splat_f64s(at.half_block[(i, j)]);
-                        before[j] = simd.mul_add_f64s(slope, middle, before[j]);
+                        let slope = simd.splat_f64s(slopes.half_block[(i, j)]);
+                        at_block_start[j] = simd.mul_add_f64s(slope, at_middle, at_block_start[j]);
                     }
                 }
                 for i in 0..NX {
-                    store::<S>(adjoint, i * width + lane, before[i]);
+                    store::<S>(adjoint, i * width + lane, at_block_start[i]);
                 }
                 for c in 0..COEFFICIENTS {
                     let mut change = simd.splat_f64s(0.0);
                     for d in c..COEFFICIENTS {
-                        let factor = simd.splat_f64s(all * root[d][c]);
+                        let factor = simd.splat_f64s(root_of_samples * root[d][c]);
                         change = simd.mul_add_f64s(factor, by_coefficient[d], change);
                     }
                     store::<S>(rows, row + c * width + lane, change);

@@ -25,10 +25,10 @@
 //! # Regressors
 //!
 //! Usually each surface has one derivative in each of the three coefficients. Their regressor is
-//! the same column, so all groups read one row of shared columns, if the columns of all
-//! coefficients fit into the widest group. A slot without a derivative is computed and ignored. In
-//! a *dense* layout each group has a row of its own, with zero in the slots without a derivative;
-//! parameters without a regressor take these slots.
+//! the same column. All groups read one row of shared columns if the columns of all coefficients
+//! fit into the widest group. A slot without a derivative is computed and ignored. In a *dense*
+//! layout each group has its own row, with zero in the slots without a derivative. Parameters
+//! without a regressor take these slots.
 
 use std::collections::BTreeSet;
 use std::ops::Range;

@@ -26,7 +26,7 @@ use self::layout::LaneLayout;
 use self::noisy_inputs::NoisyInputs;
 use self::regressors::{PreparedMotion, RegressorColumns};
 use crate::aircraft::Aircraft;
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
 
 pub use self::model::{InitialState, Model};
@@ -39,7 +39,7 @@ pub struct Measurements {
 }
 
 impl Measurements {
-    /// Returns true if a sample of an output counts.
+    /// `true` if a sample of an output counts.
     #[must_use]
     pub fn have(&self, output: usize) -> bool {
         self.used.iter().any(|used| used[output])
@@ -79,7 +79,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     #[must_use]
     pub fn new(
         aircraft: &Aircraft,
-        window: &Window,
+        window: &ManeuverSignals,
         measurements: Measurements,
         model: &Model,
     ) -> Self {
@@ -90,7 +90,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     /// Prepares the same maneuver with another model. `window` may have other surfaces than the
     /// window of this case, but the same motion.
     #[must_use]
-    pub fn with_model(&self, aircraft: &Aircraft, window: &Window, model: &Model) -> Self {
+    pub fn with_model(&self, aircraft: &Aircraft, window: &ManeuverSignals, model: &Model) -> Self {
         let measurements = self.measurements.clone();
         Case::of_motion(
             Arc::clone(&self.motion),
@@ -107,7 +107,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     pub fn as_recorded(
         &self,
         aircraft: &Aircraft,
-        windows: [&Window; 2],
+        windows: [&ManeuverSignals; 2],
         measurements: Measurements,
         model: &Model,
     ) -> Self {
@@ -123,7 +123,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     fn of_motion(
         motion: Arc<PreparedMotion<NX, E>>,
         aircraft: &Aircraft,
-        window: &Window,
+        window: &ManeuverSignals,
         measurements: Measurements,
         model: &Model,
     ) -> Self {

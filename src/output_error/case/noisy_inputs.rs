@@ -11,7 +11,7 @@ pub struct NoisyInputs {
 }
 
 impl NoisyInputs {
-    /// True if no input has noise.
+    /// `true` if no input has noise.
     #[must_use]
     pub fn are_exact(&self) -> bool {
         self.surfaces.is_empty() && self.pressure_variance == 0.0

@@ -9,9 +9,9 @@ use super::surface_noise::white_variance;
 use crate::flight::{Mark, Record, signal};
 use crate::numerics::mean::mean;
 
-/// Variance of white noise that has the same effect on slow motion as the noise of a slow dynamic
-/// pressure, relative to the square of the dynamic pressure. Zero for a dynamic pressure recorded
-/// at full rate.
+/// Variance of white noise with the same effect on slow motion as the noise of a slow dynamic
+/// pressure. It is relative to the square of the dynamic pressure. Zero for a dynamic pressure
+/// recorded at full rate.
 ///
 /// If every nth sample is recorded, and the others are interpolated linearly, each recorded value
 /// counts n times in a sum over the samples. Its variance σ² adds n² σ² to the variance of the sum.

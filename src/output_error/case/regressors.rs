@@ -10,7 +10,7 @@ use super::build_up::BuildUpTerm;
 use super::chunking::{WIDEST_STRIDE, ZERO_POINTS};
 use crate::aero::{Derivative, Regressor};
 use crate::aircraft::Aircraft;
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{COEFFICIENTS, Equations, Longitudinal, Motion};
 use crate::flight::signal;
 use crate::units::DEG;
@@ -34,17 +34,17 @@ pub(crate) struct PreparedMotion<const NX: usize, E: Equations<NX>> {
 }
 
 impl<const NX: usize, E: Equations<NX>> PreparedMotion<NX, E> {
-    pub fn new(aircraft: &Aircraft, window: &Window) -> Self {
+    pub fn new(aircraft: &Aircraft, window: &ManeuverSignals) -> Self {
         Self::prepare(aircraft, window, true)
     }
 
     /// Motion for passes alone. Only equation error reads the implied coefficients, which take as long as
     /// the rest.
-    pub fn for_passes(aircraft: &Aircraft, window: &Window) -> Self {
+    pub fn for_passes(aircraft: &Aircraft, window: &ManeuverSignals) -> Self {
         Self::prepare(aircraft, window, false)
     }
 
-    fn prepare(aircraft: &Aircraft, window: &Window, with_implied: bool) -> Self {
+    fn prepare(aircraft: &Aircraft, window: &ManeuverSignals, with_implied: bool) -> Self {
         let (points, samples) = (window.len(), window.samples);
         let implied = if with_implied { samples } else { 0 };
         let mut prepared = PreparedMotion {
@@ -72,7 +72,7 @@ impl<const NX: usize, E: Equations<NX>> PreparedMotion<NX, E> {
 /// Preparation point by point, compiled for the processor at hand.
 struct Preparation<'a, const NX: usize, E: Equations<NX>> {
     aircraft: &'a Aircraft,
-    window: &'a Window,
+    window: &'a ManeuverSignals,
     with_implied: bool,
     prepared: &'a mut PreparedMotion<NX, E>,
 }
@@ -113,14 +113,14 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Preparation<'_, NX, E> {
 /// Distinct columns of regressors, collected term by term.
 pub(super) struct RegressorColumns<'a, const NX: usize, E: Equations<NX>> {
     aircraft: &'a Aircraft,
-    window: &'a Window,
+    window: &'a ManeuverSignals,
     /// One derivative that has each column.
     derivatives: Vec<&'a Derivative>,
     equations: PhantomData<E>,
 }
 
 impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
-    pub fn new(aircraft: &'a Aircraft, window: &'a Window) -> Self {
+    pub fn new(aircraft: &'a Aircraft, window: &'a ManeuverSignals) -> Self {
         RegressorColumns {
             aircraft,
             window,

@@ -5,7 +5,7 @@ use pulp::Arch;
 use super::model::Model;
 use crate::aero::{Derivative, Regressor};
 use crate::aircraft::Aircraft;
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::flight::signal;
 use crate::numerics::differences;
 use crate::numerics::order_statistics::upper_median_of_magnitudes;
@@ -37,7 +37,11 @@ pub(crate) enum DerivativeValue {
 
 /// Surfaces of a model that have noise in a window.
 #[must_use]
-pub fn noisy_surfaces(aircraft: &Aircraft, window: &Window, model: &Model) -> Vec<NoisySurface> {
+pub fn noisy_surfaces(
+    aircraft: &Aircraft,
+    window: &ManeuverSignals,
+    model: &Model,
+) -> Vec<NoisySurface> {
     let free = model.free_in_order().into_iter().enumerate();
     let mut derivatives: Vec<(&Derivative, DerivativeValue)> =
         free.map(|(j, d)| (d, DerivativeValue::Free(j))).collect();
@@ -69,7 +73,7 @@ pub fn noisy_surfaces(aircraft: &Aircraft, window: &Window, model: &Model) -> Ve
 impl DeflectionEffect {
     fn new(
         aircraft: &Aircraft,
-        window: &Window,
+        window: &ManeuverSignals,
         derivative: &Derivative,
         value: DerivativeValue,
     ) -> DeflectionEffect {

@@ -9,8 +9,8 @@
 //!   determined direction and this one;
 //! - variance proportion of j in k: `(v_jk²/λ_k) / Σ_l v_jl²/λ_l`.
 //!
-//! A direction of high index that makes more than half of the variance of two or more parameters
-//! names a group that the data hardly separate.
+//! A direction of high index may make more than half of the variance of two or more parameters.
+//! These parameters are a group that the data hardly separate.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 

@@ -3,11 +3,11 @@
 //!
 //! An estimated parameter j has the variance `V_j` from noise; a held one has the variance `u_j²`
 //! of its tunnel value. Holding it changes the covariance of all others by `g (u_j² − V_j) gᵀ`.
-//! With weights that are the inverse of the noise's variances, holding lowers the mean square error
-//! of every other parameter exactly if `u_j² < V_j`, and raises it otherwise (Toro-Vizcarrondo and
-//! Wallace 1968). So the ratio `√V_j / u_j` decides: hold above one. `V_j` is the corrected
-//! variance `H_F⁻¹ M_F H_F⁻¹` for the free set F. Information matrix H and gradient covariance M of
-//! all parameters give it for every F without another fit.
+//! Assume weights equal to the inverse noise variances. Holding then lowers the mean square error
+//! of every other parameter if and only if `u_j² < V_j` (Toro-Vizcarrondo and Wallace 1968). So the
+//! ratio `√V_j / u_j` decides: hold above one. `V_j` is the corrected variance `H_F⁻¹ M_F H_F⁻¹`
+//! for the free set F. Information matrix H and gradient covariance M of all parameters give it for
+//! every F without another fit.
 //!
 //! Errors of values that are already held do not count in `V_j`: a free parameter absorbs them and
 //! spares the others. If these errors counted, each held value would cause the next parameter to be

@@ -1,10 +1,10 @@
-//! The kernel: one pass over a maneuver gives outputs, sensitivities, and the sums of the cost (1.2),
-//! its gradient (1.4) and the Gauss-Newton second gradient (1.5).
+//! The kernel: one pass over a maneuver. It gives outputs, sensitivities, and the sums of the cost
+//! (1.2), its gradient (1.4) and the Gauss-Newton second gradient (1.5).
 //!
-//! [`reference`] is the same pass in plain scalar code, to be read first. The fast pass goes chunk by
-//! chunk: [`chunk`] has the build-up at a chunk's points, [`trajectory`] integrates the states,
-//! [`propagators`] turns each step into matrices, [`pass`] propagates all sensitivities with them,
-//! and [`normal_equations`] adds the sums up. [`response`] is what a caller sees.
+//! [`reference`] is the same pass in plain scalar code, to be read first. The fast pass goes chunk
+//! by chunk. [`chunk`] has the build-up at a chunk's points, [`trajectory`] integrates the states,
+//! and [`propagators`] turns each step into matrices. [`pass`] propagates all sensitivities with
+//! these matrices, and [`normal_equations`] adds up the sums. [`response`] is what a caller sees.
 
 pub(crate) mod chunk;
 pub(crate) mod normal_equations;

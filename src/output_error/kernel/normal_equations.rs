@@ -252,9 +252,9 @@ impl Sink for NormalAccumulator<'_> {
 }
 
 impl NormalSums {
-    /// Writes residual and one into the rows of a chunk's samples that count, and clears the other
-    /// rows. `residual` returns the residual of a sample and output, or `None` if the sample does
-    /// not count.
+    /// Writes the residual and the number 1 into their lanes of every row that counts, and clears
+    /// all other rows. `residual` returns the residual of a sample and output, or `None` if the
+    /// sample does not count.
     #[inline(always)]
     pub fn complete_rows(
         &mut self,

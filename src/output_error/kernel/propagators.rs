@@ -117,8 +117,8 @@ impl<const NX: usize> Propagators<NX> {
                 let reach = simd.splat_f64s(reaches[stage]);
                 for i in 0..NX {
                     for j in 0..NX {
-                        let own = simd.splat_f64s(if i == j { weights[stage] } else { 0.0 });
-                        m[i][j] = simd.mul_add_f64s(reach, product[i][j], own);
+                        let diagonal = simd.splat_f64s(if i == j { weights[stage] } else { 0.0 });
+                        m[i][j] = simd.mul_add_f64s(reach, product[i][j], diagonal);
                     }
                 }
                 product = times_a(simd, &m, history, stage, at);

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use crate::aero::{Derivative, Regressor};
 use crate::aircraft::Aircraft;
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{COEFFICIENTS, Equations, Longitudinal, Motion, OUTPUTS};
 use crate::numerics::runge_kutta::{self, POINT};
 use crate::output_error::case::{Case, InitialState, Measurements, Model};
@@ -20,7 +20,7 @@ use crate::units::DEG;
 #[derive(Debug)]
 pub struct Reference<'a, const NX: usize, E: Equations<NX>> {
     aircraft: &'a Aircraft,
-    window: &'a Window,
+    window: &'a ManeuverSignals,
     measurements: &'a Measurements,
     /// Measured motion at samples and halves between them.
     motion: Vec<Motion>,
@@ -67,7 +67,7 @@ impl<'a, const NX: usize, E: Equations<NX>> Reference<'a, NX, E> {
     #[must_use]
     pub fn new(
         aircraft: &'a Aircraft,
-        window: &'a Window,
+        window: &'a ManeuverSignals,
         model: &'a Model<'a>,
         case: &'a Case<NX, E>,
     ) -> Self {

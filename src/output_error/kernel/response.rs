@@ -155,7 +155,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         self.run_pass(parameters, stride, outputs, &mut accumulator)
     }
 
-    /// Returns `true` if coarse steps are longer than the sampling interval.
+    /// `true` if coarse steps are longer than the sampling interval.
     #[must_use]
     pub fn has_coarse(&self) -> bool {
         self.coarse_stride() > 1

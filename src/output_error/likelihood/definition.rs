@@ -18,7 +18,7 @@ pub trait Likelihood {
     /// Allocates a response.
     fn response(&self) -> Self::Response;
 
-    /// Returns true if a coarse response is less work than a whole one.
+    /// `true` if a coarse response is less work than a whole one.
     fn has_coarse(&self) -> bool;
 
     /// Computes the response to these parameters.

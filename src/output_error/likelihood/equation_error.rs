@@ -12,6 +12,9 @@
 //! are slopes of local straight lines through the rates: accelerations averaged by a short window.
 //! All other terms are averaged by the same window, so that the equation still holds.
 //!
+//! Least squares in time ([`regress_coefficient`]) gives the starting values where the regression
+//! has no result.
+//!
 //! Noise of the regressors remains: it attenuates derivatives by its share of the regressor's
 //! variance inside the band.
 
@@ -43,8 +46,8 @@ const LONGEST_BRIDGE_S: f64 = 0.1;
 const STILL: f64 = 1e-9;
 
 /// Starting values with the derivatives from equation error: by [`regression`], with the constant
-/// from the mean; if that has no result, by least squares in time. Derivatives that the data do not
-/// determine stay near `prior`, as do biases and initial states.
+/// from the mean. Without a result of the regression, by least squares in time. Derivatives that
+/// the data do not determine stay near `prior`, as do biases and initial states.
 #[must_use]
 pub fn start<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>, prior: &[f64]) -> Vec<f64> {
     start_from(case, prior, &regression(case, case, &BTreeMap::new()))
@@ -77,8 +80,8 @@ pub fn start_from<const NX: usize, E: Equations<NX>>(
     values
 }
 
-/// Returns true if the measured motion implies a coefficient: a moment, or a force whose accelerometer
-/// is recorded.
+/// `true` if the measured motion implies a coefficient: a moment, or a force whose accelerometer is
+/// recorded.
 fn is_measured<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>, coefficient: usize) -> bool {
     let Some(accelerometer) = E::AXIS.coefficients()[coefficient].accelerometer() else {
         return true;
@@ -87,7 +90,8 @@ fn is_measured<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>, coefficien
     output.is_some_and(|output| case.measurements.have(output))
 }
 
-/// Shifts the constant of a coefficient so that its mean is the implied one.
+/// Shifts the constant so that the mean of the coefficient's build-up equals the mean implied by
+/// the measured accelerations.
 fn shift_constant<const NX: usize, E: Equations<NX>>(
     case: &Case<NX, E>,
     coefficient: usize,
@@ -112,7 +116,7 @@ fn shift_constant<const NX: usize, E: Equations<NX>>(
     values[constant] += error / count as f64;
 }
 
-/// Returns true if a free derivative is the constant of its coefficient: its regressor is one.
+/// `true` if a free derivative is the constant of its coefficient: its regressor is one.
 fn is_constant<const NX: usize, E: Equations<NX>>(case: &Case<NX, E>, derivative: usize) -> bool {
     let term = case.terms[derivative];
     let column = case.columns[term.column].iter();

@@ -1,6 +1,6 @@
-//! The likelihood of the measured outputs: cost (1.2) with its gradients ([`cost`]), the iteration to
-//! its minimum ([`newton_raphson`], 1.3), start values ([`equation_error`]), and several maneuvers as
-//! one ([`joint`]).
+//! The likelihood of the measured outputs. It has the cost (1.2) with its gradients ([`cost`]), the
+//! iteration to the minimum ([`newton_raphson`], 1.3), start values ([`equation_error`]), and
+//! several maneuvers as one ([`joint`]).
 
 pub mod cost;
 pub mod definition;

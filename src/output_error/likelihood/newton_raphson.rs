@@ -33,7 +33,7 @@ settings! {
 }
 
 /// First damping after a full step fails, relative to the unit diagonal of the scaled information
-/// matrix: about the smallest eigenvalue of a poorly conditioned maneuver.
+/// matrix. It is about the smallest eigenvalue of a poorly conditioned maneuver.
 const FIRST_DAMPING: f64 = 1e-8;
 /// Damping at which no step lowers the cost.
 const MOST_DAMPING: f64 = 1e9;

@@ -40,8 +40,8 @@ pub(super) struct SpectralEquations<'a> {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct WhittleRegression {
     pub values: DVector<f64>,
-    /// Larger of the covariance by the spectrum and the one by the residuals themselves (HC3),
-    /// widened by Student's t: ±1.96 standard errors are an interval of 95 %.
+    /// Larger of two covariances: by the spectrum, and by the residuals themselves (HC3). It is
+    /// widened by Student's t, so that ±1.96 standard errors are an interval of 95 %.
     pub covariance: DMatrix<f64>,
     /// Inverse of the weighted normal matrix.
     inverse: DMatrix<f64>,

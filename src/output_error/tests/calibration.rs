@@ -3,7 +3,7 @@
 use approx::assert_relative_eq;
 use nalgebra::DVector;
 
-use super::super::calibration_errors::{Calibration, FittedManeuver, Misreading};
+use super::super::calibration_errors::{Calibration, FittedManeuver, SignalError};
 use super::super::cost;
 use super::super::likelihood::information::Identification;
 use super::*;
@@ -19,7 +19,7 @@ fn model(truth: &[(Derivative, f64)]) -> Model<'_> {
 /// Maneuver without noise at its true parameters, with its window.
 struct Exact<const NX: usize, E: Equations<NX>> {
     truth: Vec<(Derivative, f64)>,
-    window: Window,
+    window: ManeuverSignals,
     case: Case<NX, E>,
     parameters: Vec<f64>,
     response: crate::output_error::Response,
@@ -42,7 +42,7 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
     }
 
     /// Predicted change of the estimates.
-    fn predicted(&self, error: &Misreading) -> DVector<f64> {
+    fn predicted(&self, error: &SignalError) -> DVector<f64> {
         let model = model(&self.truth);
         let fitted = FittedManeuver {
             aircraft: &aircraft(),
@@ -63,7 +63,7 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
     }
 
     /// Change of the estimates when the record has the error.
-    fn moved(&self, error: &Misreading) -> DVector<f64> {
+    fn moved(&self, error: &SignalError) -> DVector<f64> {
         let mut measurements = self.case.measurements.clone();
         for (o, output) in E::AXIS
             .outputs()
@@ -77,7 +77,7 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
                 .iter_mut()
                 .for_each(|z| z[o] += error.scale * z[o] + error.bias);
         }
-        let window = error.of_window(&self.window);
+        let window = error.apply_to(&self.window);
         let case = Case::<NX, E>::new(&aircraft(), &window, measurements, &model(&self.truth));
         let settings = Settings {
             tolerance: 1e-13,
@@ -97,13 +97,13 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
     fn assert_predictions_hold(&self, signals: &[(&str, f64)]) {
         for (signal, bias) in signals {
             for error in [
-                Misreading {
+                SignalError {
                     signal,
                     scale: 1e-3,
                     bias: 0.0,
                     delay_s: 0.0,
                 },
-                Misreading {
+                SignalError {
                     signal,
                     scale: 0.0,
                     bias: *bias,
@@ -116,7 +116,7 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
     }
 
     /// Compares predicted and actual changes, in units of each parameter's bound.
-    fn assert_prediction_holds(&self, error: &Misreading) {
+    fn assert_prediction_holds(&self, error: &SignalError) {
         let sums = cost::sums(&self.response, &TABLE);
         let scale = symmetric::scale(&sums.information);
         let (predicted, moved) = (self.predicted(error), self.moved(error));
@@ -162,17 +162,17 @@ fn predicted_effects_of_input_and_output_errors_match_the_estimates() {
 #[test]
 fn predicted_effects_of_late_surfaces_match_the_estimates() {
     let longitudinal = Exact::<3, Longitudinal>::new();
-    longitudinal.assert_prediction_holds(&Misreading::late("de_deg", 5e-5));
-    longitudinal.assert_prediction_holds(&Misreading::late("dpv_deg", -5e-5));
+    longitudinal.assert_prediction_holds(&SignalError::delay("de_deg", 5e-5));
+    longitudinal.assert_prediction_holds(&SignalError::delay("dpv_deg", -5e-5));
     let lateral = Exact::<4, Lateral>::new();
-    lateral.assert_prediction_holds(&Misreading::late("da_deg", 5e-5));
-    lateral.assert_prediction_holds(&Misreading::late("dyv_deg", 5e-5));
+    lateral.assert_prediction_holds(&SignalError::delay("da_deg", 5e-5));
+    lateral.assert_prediction_holds(&SignalError::delay("dyv_deg", 5e-5));
 }
 
 #[test]
 fn a_scale_error_of_a_surface_changes_its_own_derivatives_only() {
     let exact = Exact::<3, Longitudinal>::new();
-    let shift = exact.predicted(&Misreading {
+    let shift = exact.predicted(&SignalError {
         signal: "de_deg",
         scale: 1e-4,
         bias: 0.0,
@@ -198,15 +198,15 @@ fn a_scale_error_of_a_surface_changes_its_own_derivatives_only() {
 
 #[test]
 fn exact_calibration_has_no_errors() {
-    assert_eq!(Calibration::default().misreadings("q_deg_s").count(), 0);
+    assert_eq!(Calibration::default().signal_errors("q_deg_s").count(), 0);
     let both = Calibration {
         bias: 0.1,
         scale_pct: 2.0,
     };
-    let errors: Vec<Misreading> = both.misreadings("q_deg_s").collect();
+    let errors: Vec<SignalError> = both.signal_errors("q_deg_s").collect();
     assert_eq!(
         errors[0],
-        Misreading {
+        SignalError {
             signal: "q_deg_s",
             scale: 0.02,
             bias: 0.0,
@@ -215,7 +215,7 @@ fn exact_calibration_has_no_errors() {
     );
     assert_eq!(
         errors[1],
-        Misreading {
+        SignalError {
             signal: "q_deg_s",
             scale: 0.0,
             bias: 0.1,

@@ -46,7 +46,7 @@ fn case_of(
     measurements: Measurements,
 ) -> Case<3, Longitudinal> {
     let surfaces = ["de_deg", "dpv_deg"];
-    let window = Window::cut(
+    let window = ManeuverSignals::cut(
         &aircraft(),
         record,
         0..SAMPLES,

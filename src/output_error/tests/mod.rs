@@ -15,7 +15,7 @@ use super::estimation::{Weights, estimate};
 use super::newton_raphson::Settings;
 use super::{Case, Fit, InitialState, Measurements, Model, Outcome, consider, cost};
 use crate::aero::{Axis, Bias, Coefficient, Derivative, Regressor};
-use crate::dynamics::motion::{MassProperties, Window};
+use crate::dynamics::motion::{ManeuverSignals, MassProperties};
 use crate::dynamics::tests::aircraft;
 use crate::dynamics::{Equations, Lateral, Longitudinal, OUTPUTS};
 use crate::flight::record::Series;
@@ -184,13 +184,13 @@ pub(crate) fn with_noisy_surfaces(sd_deg: f64, noise: &mut Noise) -> Record {
     record
 }
 
-pub(crate) fn window() -> Window {
+pub(crate) fn window() -> ManeuverSignals {
     window_of(&record())
 }
 
-pub(crate) fn window_of(record: &Record) -> Window {
+pub(crate) fn window_of(record: &Record) -> ManeuverSignals {
     let mass = MassProperties::Recorded;
-    Window::cut(&aircraft(), record, 0..SAMPLES, SURFACES, mass).unwrap()
+    ManeuverSignals::cut(&aircraft(), record, 0..SAMPLES, SURFACES, mass).unwrap()
 }
 
 pub(crate) fn nothing_measured() -> Measurements {
@@ -549,7 +549,7 @@ fn a_surface_that_never_moves_is_named() {
     };
     record.signals.insert("ghost_deg".into(), still);
     let surfaces = ["dr_deg", "da_deg", "dyv_deg", "ghost_deg"];
-    let window = Window::cut(
+    let window = ManeuverSignals::cut(
         &aircraft(),
         &record,
         0..SAMPLES,

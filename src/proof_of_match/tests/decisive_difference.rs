@@ -26,7 +26,7 @@ fn decisive(
     let mean = truth(&flown, "", 1.0);
     let basis = ProofInputs {
         aircraft: &shipped().config.aircraft,
-        buildup: &shipped().config.buildup,
+        aero_model: &shipped().config.aero_model,
         models: &[(model, database)],
         posterior: &mean,
         tunnel: &shipped().config.tunnel,
@@ -142,14 +142,14 @@ fn a_dutch_roll_that_is_wrong_decides_with_its_difference_in_tolerances() {
         test.all_of
             .retain(|r| r.one_of[0].quantity == MatchedQuantity::DutchRollPeriod);
     }
-    let means = estimate::means(&flown.record, &flown.maneuver, &config.buildup).unwrap();
+    let means = estimate::means(&flown.record, &flown.maneuver, &config.aero_model).unwrap();
     let own = estimated(&flown, &["Cn_beta", "Cn_r"], 1.0);
     let record = noisy(&flown, 1);
     let mean = truth(&flown, "", 1.0);
     let decisive = |database: WindTunnel, own| {
         let basis = ProofInputs {
             aircraft: &config.aircraft,
-            buildup: &config.buildup,
+            aero_model: &config.aero_model,
             models: &[(ModelSource::Tunnel, database)],
             posterior: &mean,
             tunnel: &config.tunnel,

@@ -12,8 +12,8 @@ use crate::tables::MatchedQuantity;
 /// Equations of a maneuver that estimates some derivatives at the truth, with errors of so many per cent.
 fn modes(flown: &FlownManeuver, names: &[&str], error_pct: f64) -> LateralModes {
     let config = &shipped().config;
-    let means = estimate::means(&flown.record, &flown.maneuver, &config.buildup).unwrap();
-    let model = (&config.aircraft, &config.buildup, &config.tunnel);
+    let means = estimate::means(&flown.record, &flown.maneuver, &config.aero_model).unwrap();
+    let model = (&config.aircraft, &config.aero_model, &config.tunnel);
     let own = estimated(flown, names, error_pct);
     LateralModes::new(model, (&flown.maneuver, &means), &own).unwrap()
 }
@@ -70,7 +70,7 @@ fn repeat_flights_have_to_first_order_the_moments_of_drawn_ones() {
         .iter()
         .map(|name| {
             let place = config
-                .buildup
+                .aero_model
                 .derivatives
                 .iter()
                 .position(|d| d.name == *name);

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use nalgebra::{DMatrix, DVector};
 
 use crate::aero::wind_tunnel::{self, TunnelPoint};
-use crate::aero::{Buildup, Condition, WindTunnel};
+use crate::aero::{AeroModel, Condition, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::flight::Record;
 use crate::lab::campaign::SimulatedCampaign;
@@ -122,7 +122,7 @@ pub fn proof_with(
     let models = [(ModelSource::Tunnel, database)];
     let basis = ProofInputs {
         aircraft: &shipped().config.aircraft,
-        buildup: &shipped().config.buildup,
+        aero_model: &shipped().config.aero_model,
         models: &models,
         posterior,
         tunnel: &shipped().config.tunnel,
@@ -145,8 +145,8 @@ pub fn verdict(flown: &FlownManeuver, record: &Record, database: WindTunnel) -> 
 
 /// A maneuver as recorded.
 pub fn recording(flown: &FlownManeuver, record: &Record, aircraft: &Aircraft) -> ManeuverRecording {
-    let buildup = &shipped().config.buildup;
-    ManeuverRecording::new(record, &flown.maneuver, (aircraft, buildup), 1.0).unwrap()
+    let aero_model = &shipped().config.aero_model;
+    ManeuverRecording::new(record, &flown.maneuver, (aircraft, aero_model), 1.0).unwrap()
 }
 
 /// A maneuver with the aircraft of a database.
@@ -161,11 +161,11 @@ pub fn simulation<'a>(
         mach: flown.maneuver.mach,
         third: None,
     };
-    let buildup: &Buildup = &shipped().config.buildup;
-    let table = DerivativeTable::new(buildup, tunnel, tunnel, &condition);
+    let aero_model: &AeroModel = &shipped().config.aero_model;
+    let table = DerivativeTable::new(aero_model, tunnel, tunnel, &condition);
     Simulation {
         aircraft,
         recording,
-        aerodynamics: Aerodynamics::new(aircraft, buildup, table),
+        aerodynamics: Aerodynamics::new(aircraft, aero_model, table),
     }
 }

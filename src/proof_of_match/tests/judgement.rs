@@ -108,7 +108,7 @@ fn surfaces_that_rest_after_the_last_input_are_open_loop() {
     for (name, series) in &mut record.signals {
         if shipped()
             .config
-            .buildup
+            .aero_model
             .derivatives
             .iter()
             .any(|d| d.regressor.surface() == Some(name))

@@ -16,12 +16,12 @@ const ALPHA: usize = 0;
 #[test]
 fn a_lag_is_flown_again() {
     let campaign = with_lag(shipped_campaign());
-    let (aircraft, buildup) = (&campaign.config.aircraft, &campaign.config.buildup);
+    let (aircraft, aero_model) = (&campaign.config.aircraft, &campaign.config.aero_model);
     let card = campaign.card("PPSS", 15.0).unwrap();
     let flown: FlownManeuver = campaign.simulator.fly(&card).unwrap();
     let recorded = (&flown.record, &flown.maneuver);
     let recording =
-        ManeuverRecording::new(recorded.0, recorded.1, (aircraft, buildup), 1.0).unwrap();
+        ManeuverRecording::new(recorded.0, recorded.1, (aircraft, aero_model), 1.0).unwrap();
     let condition = Condition {
         alpha_deg: flown.maneuver.alpha_deg,
         mach: flown.maneuver.mach,
@@ -29,15 +29,15 @@ fn a_lag_is_flown_again() {
     };
     let largest_difference = |factor: f64| {
         let model = database(&flown, |own| {
-            let derivative = buildup.derivative(&own.derivative).unwrap();
+            let derivative = aero_model.derivative(&own.derivative).unwrap();
             let is_lag = derivative.regressor == Regressor::AlphaRate;
             own.value * if is_lag { factor } else { 1.0 }
         });
-        let table = DerivativeTable::new(buildup, &model, &model, &condition);
+        let table = DerivativeTable::new(aero_model, &model, &model, &condition);
         let simulation = Simulation {
             aircraft,
             recording: &recording,
-            aerodynamics: Aerodynamics::new(aircraft, buildup, table),
+            aerodynamics: Aerodynamics::new(aircraft, aero_model, table),
         };
         let start = start::matched(&simulation).start;
         let run = simulation.fly(&start, recording.samples, 1);

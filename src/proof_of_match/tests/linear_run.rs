@@ -3,7 +3,7 @@
 use approx::assert_relative_eq;
 
 use super::fixture::{flown, recording, shipped, simulation};
-use crate::aero::{Buildup, Condition, Regressor, WindTunnel};
+use crate::aero::{AeroModel, Condition, Regressor, WindTunnel};
 use crate::lab::simulator::FlownManeuver;
 use crate::lab::simulator::tests::{shipped_campaign, with_lag};
 use crate::proof_of_match::aerodynamics::Aerodynamics;
@@ -28,7 +28,7 @@ fn deviation(parameter: Parameter) -> f64 {
 /// Run with one parameter changed.
 fn moved(
     (simulation, start): (&Simulation, &Start),
-    buildup: &Buildup,
+    aero_model: &AeroModel,
     parameter: Parameter,
     by: f64,
 ) -> FreeRun {
@@ -36,7 +36,7 @@ fn moved(
     match parameter {
         Parameter::Start(place) => start = start.with_change(place, by),
         Parameter::Derivative(place) => {
-            let regressor = &buildup.derivatives[place].regressor;
+            let regressor = &aero_model.derivatives[place].regressor;
             simulation.aerodynamics.table.raise(place, regressor, by);
         }
     }
@@ -44,9 +44,9 @@ fn moved(
 }
 
 /// Compares the slopes along all parameters with central differences of free runs.
-fn compare(simulation: &Simulation, buildup: &Buildup) {
+fn compare(simulation: &Simulation, aero_model: &AeroModel) {
     let start = start::matched(simulation).start;
-    let derivatives = buildup.derivatives.iter().enumerate();
+    let derivatives = aero_model.derivatives.iter().enumerate();
     let moving = derivatives.filter(|(_, d)| d.regressor != Regressor::Constant);
     let parameters: Vec<Parameter> = moving
         .map(|(place, _)| Parameter::Derivative(place))
@@ -56,7 +56,8 @@ fn compare(simulation: &Simulation, buildup: &Buildup) {
     assert_eq!(linear.run, simulation.fly(&start, STEPS.0, STEPS.1));
     for (parameter, slopes) in parameters.iter().zip(&linear.slopes) {
         let by = deviation(*parameter);
-        let [up, down] = [by, -by].map(|by| moved((simulation, &start), buildup, *parameter, by));
+        let [up, down] =
+            [by, -by].map(|by| moved((simulation, &start), aero_model, *parameter, by));
         for (output, slopes) in slopes.iter().enumerate() {
             let largest = slopes.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
             for (k, slope) in slopes.iter().enumerate() {
@@ -80,29 +81,29 @@ fn slopes_are_those_of_free_runs_with_small_deviations() {
         let config = &shipped().config;
         let recording = recording(&flown, &flown.record, &config.aircraft);
         let simulation = simulation(&flown, &config.aircraft, &recording, &config.tunnel);
-        compare(&simulation, &config.buildup);
+        compare(&simulation, &config.aero_model);
     }
 }
 
 #[test]
 fn slopes_of_an_aircraft_with_a_lag_are_those_of_free_runs() {
     let campaign = with_lag(shipped_campaign());
-    let (aircraft, buildup) = (&campaign.config.aircraft, &campaign.config.buildup);
+    let (aircraft, aero_model) = (&campaign.config.aircraft, &campaign.config.aero_model);
     let card = campaign.card("PPSS", 15.0).unwrap();
     let flown: FlownManeuver = campaign.simulator.fly(&card).unwrap();
     let (record, maneuver) = (&flown.record, &flown.maneuver);
-    let recording = ManeuverRecording::new(record, maneuver, (aircraft, buildup), 1.0).unwrap();
+    let recording = ManeuverRecording::new(record, maneuver, (aircraft, aero_model), 1.0).unwrap();
     let condition = Condition {
         alpha_deg: maneuver.alpha_deg,
         mach: maneuver.mach,
         third: None,
     };
     let model: WindTunnel = super::fixture::database(&flown, |own| own.value);
-    let table = DerivativeTable::new(buildup, &model, &model, &condition);
+    let table = DerivativeTable::new(aero_model, &model, &model, &condition);
     let simulation = Simulation {
         aircraft,
         recording: &recording,
-        aerodynamics: Aerodynamics::new(aircraft, buildup, table),
+        aerodynamics: Aerodynamics::new(aircraft, aero_model, table),
     };
-    compare(&simulation, buildup);
+    compare(&simulation, aero_model);
 }

@@ -23,9 +23,11 @@ const REPEATS: u32 = 40;
 
 /// Posterior about the truth: independent errors in per cent of the derivatives of the axis.
 pub fn posterior(flown: &FlownManeuver, error_pct: f64) -> LocalPosterior {
-    let buildup = &shipped().config.buildup;
+    let aero_model = &shipped().config.aero_model;
     let is_known = |d: &&Derivative| d.regressor != Regressor::Constant;
-    let derivatives = buildup.derivatives_of(flown.maneuver.axis).filter(is_known);
+    let derivatives = aero_model
+        .derivatives_of(flown.maneuver.axis)
+        .filter(is_known);
     let derivatives: Vec<&Derivative> = derivatives.collect();
     let value = |d: &&Derivative| {
         let own = flown.truth.iter().find(|own| own.derivative == d.name);

@@ -3,7 +3,7 @@
 
 use super::fixture::{flown, shipped, specification, truth, verdict};
 use crate::aero::Regressor;
-use crate::dynamics::motion::{MassProperties, Window};
+use crate::dynamics::motion::{ManeuverSignals, MassProperties};
 use crate::flight::signal;
 use crate::lab::simulator::aerodynamics::Aerodynamics;
 use crate::lab::simulator::plant::{Plant, PlantInputs};
@@ -57,14 +57,14 @@ impl IndependentFlight {
         let campaign = shipped();
         let (record, aircraft) = (&flown.record, &campaign.config.aircraft);
         let settings = campaign.simulator.settings();
-        let buildup = &campaign.config.buildup;
+        let aero_model = &campaign.config.aero_model;
         let names = &settings.surface_names;
         let aerodynamics =
-            Aerodynamics::new(buildup, campaign.config.tunnel.clone(), names).unwrap();
+            Aerodynamics::new(aero_model, campaign.config.tunnel.clone(), names).unwrap();
         let first = record.sample_at(flown.maneuver.start_s);
         let range = first..record.sample_at(flown.maneuver.end_s) + 1;
         let surfaces = names.iter().map(String::as_str);
-        let window = Window::cut(
+        let window = ManeuverSignals::cut(
             aircraft,
             record,
             range.clone(),
@@ -75,9 +75,9 @@ impl IndependentFlight {
         let at = |name: &str, k: usize| record.values(name).unwrap()[k];
 
         let mut values: Vec<f64> = flown.truth.iter().map(|d| d.value).collect();
-        let index = buildup.derivatives.iter().position(|d| d.name == wrong);
+        let index = aero_model.derivatives.iter().position(|d| d.name == wrong);
         let index = index.unwrap();
-        let derivative = &buildup.derivatives[index];
+        let derivative = &aero_model.derivatives[index];
         let error = (factor - 1.0) * values[index];
         values[index] += error;
         let at_start = match &derivative.regressor {
@@ -86,7 +86,7 @@ impl IndependentFlight {
             Regressor::Beta => DEG * motion.beta,
             other => panic!("{other:?}"),
         };
-        let constant = buildup.derivatives.iter().position(|d| {
+        let constant = aero_model.derivatives.iter().position(|d| {
             d.coefficient == derivative.coefficient && d.regressor == Regressor::Constant
         });
         values[constant.unwrap()] -= error * at_start;

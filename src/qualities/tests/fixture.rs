@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::aero::{Axis, Buildup, Coefficient, Combined, Condition, Derivative, Regressor};
+use crate::aero::{AeroModel, Axis, Coefficient, Combined, Condition, Derivative, Regressor};
 use crate::aircraft::{Aircraft, Position, Sensors, Vane, VaneModel};
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
 use crate::qualities::linear::{Controls, LinearModel, SteadyFlight};
@@ -63,9 +63,9 @@ fn derivatives(axis: Axis) -> Vec<(&'static str, Coefficient, f64)> {
     }
 }
 
-pub fn buildup() -> Buildup {
+pub fn aero_model() -> AeroModel {
     let all = [Axis::Longitudinal, Axis::Lateral].map(derivatives);
-    Buildup {
+    AeroModel {
         derivatives: all
             .into_iter()
             .flatten()
@@ -184,11 +184,11 @@ pub fn linear_of(
     posterior: &LocalPosterior,
     feedback: &BTreeMap<String, BTreeMap<String, f64>>,
 ) -> LinearModel {
-    let (buildup, trim) = (buildup(), trim());
+    let (aero_model, trim) = (aero_model(), trim());
     let pitch = BTreeMap::from([("de_deg".to_owned(), 1.0)]);
     let flight = SteadyFlight {
         aircraft,
-        buildup: &buildup,
+        aero_model: &aero_model,
         trim: &trim,
         controls: Controls {
             feedback,

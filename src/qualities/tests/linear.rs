@@ -6,11 +6,12 @@ use approx::assert_relative_eq;
 use nalgebra::{DMatrix, DVector};
 
 use super::fixture::{aircraft, linear, linear_of, linear_with, posterior, trim};
-use crate::aero::{Axis, Buildup, Coefficient, Derivative, Regressor};
+use crate::aero::{AeroModel, Axis, Coefficient, Derivative, Regressor};
 use crate::aircraft::{Aircraft, ThrustLine};
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
 use crate::qualities::linear::{
-    AxisStates, Controls, Differentiation, Effect, Lag, LinearModel, Matrix, SteadyFlight, Vector,
+    AlphaRateTerm, AxisStates, Controls, Differentiation, Effect, LinearModel, Matrix,
+    SteadyFlight, Vector,
 };
 use crate::tables::FlyingQuality;
 use crate::units::DEG;
@@ -162,13 +163,13 @@ fn assert_matrix_is_that_of_differences(aircraft: &Aircraft) {
 /// Effect of a derivative of CN along a regressor, with velocity, α and q as states.
 fn effect(regressor: &str) -> Effect {
     let (aircraft, trim) = (aircraft(), trim());
-    let buildup = Buildup {
+    let aero_model = AeroModel {
         derivatives: vec![Derivative {
             name: "own".into(),
             coefficient: Coefficient::CN,
             regressor: Regressor::parse(regressor).unwrap(),
         }],
-        ..Buildup::default()
+        ..AeroModel::default()
     };
     let posterior = LocalPosterior {
         values: vec![LocalValue {
@@ -193,7 +194,7 @@ fn effect(regressor: &str) -> Effect {
     let pitch = BTreeMap::from([("de_deg".to_owned(), 1.0)]);
     let flight = SteadyFlight {
         aircraft: &aircraft,
-        buildup: &buildup,
+        aero_model: &aero_model,
         trim: &trim,
         controls: Controls {
             feedback: &BTreeMap::new(),
@@ -251,7 +252,7 @@ fn equations_with_a_lag_are_solved_with_their_slopes() {
     };
     let alpha = 1;
     let with_lag = LinearModel {
-        lag: Some(Lag {
+        alpha_rate: Some(AlphaRateTerm {
             alpha,
             slopes: (0..values.len()).map(effect).collect(),
         }),

@@ -7,7 +7,7 @@ use crate::aero::{Axis, Condition};
 use crate::aircraft::{Aircraft, Position};
 use crate::numerics::dual::Dual;
 use crate::qualities::linear::{
-    Differentiation, Lag, LinearModel, Matrix, SolvedEquations, Vector,
+    AlphaRateTerm, Differentiation, LinearModel, Matrix, SolvedEquations, Vector,
 };
 use crate::qualities::modes::{Modes, Pair};
 use crate::qualities::trim::Trim;
@@ -71,7 +71,7 @@ impl Reported {
             rigid: slopes.by_state + slopes.by_coefficient * by_state,
             slopes: vec![Matrix::zeros()],
             control_slopes: vec![control],
-            lag: Some(Lag {
+            alpha_rate: Some(AlphaRateTerm {
                 alpha: 1,
                 slopes: vec![slopes.by_coefficient * by_alpha_rate],
             }),

@@ -23,7 +23,7 @@ pub struct Chart {
     pub time: Scale,
     /// Width of the plot area: one unit per column of the time axis, or more.
     pub width: f64,
-    pub windows: Vec<Window>,
+    pub windows: Vec<ShadedManeuver>,
     pub lanes: Vec<Lane>,
     pub strips: Vec<Strip>,
     /// Lines under the chart.
@@ -32,7 +32,7 @@ pub struct Chart {
 
 /// A maneuver, shaded through all strips.
 #[derive(Clone, Debug)]
-pub struct Window {
+pub struct ShadedManeuver {
     pub maneuver_id: String,
     pub class: String,
     /// Text over the shade.
@@ -59,7 +59,7 @@ pub struct LaneBox {
 /// Drawing beside a word of the legend.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Key {
-    Window,
+    Maneuver,
     Event,
     Bridged,
     Despiked,
@@ -172,7 +172,7 @@ fn draw_key(svg: &mut SvgWriter, key: Key, x: f64, y: f64) {
     let excluded = PathStyle::filled(EXCLUDED_COLOUR);
     let box_outline = rectangle((x, y - 6.0), (20.0, 12.0));
     match key {
-        Key::Window => svg.path(
+        Key::Maneuver => svg.path(
             &box_outline,
             PathStyle {
                 fill: Some("#dddddd"),
@@ -364,14 +364,14 @@ mod tests {
             title: "flight <1>".into(),
             description: "two & more".into(),
             heading: vec!["word ".repeat(60)],
-            legend: vec![(Key::Window, "maneuver".into())],
+            legend: vec![(Key::Maneuver, "maneuver".into())],
             time: Scale {
                 min: 100.0,
                 max: 300.0,
                 step: 50.0,
             },
             width: 800.0,
-            windows: vec![Window {
+            windows: vec![ShadedManeuver {
                 maneuver_id: "f_t00150".into(),
                 class: "ONE".into(),
                 label: "ONE f_t00150".into(),

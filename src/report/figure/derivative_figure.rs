@@ -2,8 +2,8 @@
 //! manner of the paper's Figures 5-7 and 13-16.
 //!
 //! The plotting crate draws paper, axes, lines and band. Markers and bars of the estimates are one
-//! path per class in the crate's scene: the crate would draw bars over hollow markers, and give
-//! each mark its own element.
+//! path per class in the crate's scene. The crate itself would draw bars over hollow markers, and
+//! one element per mark.
 
 use std::fmt::Write;
 use std::sync::Arc;
@@ -271,8 +271,8 @@ fn path_of(d: String, colour: &str, width: f64, fill: Option<&str>) -> Primitive
     }))
 }
 
-/// Adapts a drawing of the crate to a page with others: scaled to its column, with alternative
-/// text, ids of its own and at most two decimals.
+/// Adapts a drawing of the crate to a page with other drawings: scaled to its column, with
+/// alternative text, unique ids and at most two decimals.
 fn inline(svg: &str, id: &str, title: &str, description: &str) -> String {
     let body = svg.split_once("-->").map_or(svg, |(_, body)| body);
     let height = svg

@@ -268,8 +268,8 @@ fn separator(number: i64) -> &'static str {
     if number < 0 { "" } else { " " }
 }
 
-/// Largest distance of a point from a line that leaves it out, in quarters of a unit: a quarter of a
-/// pixel, and half of the thinnest line.
+/// Largest distance of an omitted point from the line, in quarters of a unit: a quarter of a pixel,
+/// and half of the thinnest line.
 const TOLERANCE: f64 = 1.0;
 
 /// First and last point, and every point that the line between two kept points would miss by more

@@ -214,8 +214,8 @@ fn correlated_figure(
     figure_of_class(history, drawing, legend, caption, markers)
 }
 
-/// A signal's change from its mean over the root mean square of the change; `None` if the history
-/// lacks the signal or it did not move.
+/// A signal's change from its mean over the root mean square of the change. `None` if the history
+/// lacks the signal or the signal did not move.
 fn normalised_change(history: &History, name: &str) -> Option<Points> {
     let points = history::points(history, samples(history, name)?);
     let mean = mean(points.iter().map(|p| p.1));

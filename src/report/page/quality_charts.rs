@@ -1,5 +1,5 @@
-//! Charts of the flying qualities: probability of the levels, control anticipation over damping, frequency over
-//! damping of the Dutch roll, and the roots over angle of attack.
+//! Charts of the flying qualities: probability of the levels, control anticipation over damping,
+//! and frequency over damping of the Dutch roll. A chart of the roots over angle of attack follows.
 
 use serde::Serialize;
 

@@ -1,5 +1,5 @@
-//! Uncertainty that flights have left, the basis for what to fly next: posterior standard deviations over
-//! those before flight, and the effect of one more of the flown maneuvers.
+//! Uncertainty that remains after the flights, the basis for what to fly next. It shows posterior
+//! over prior standard deviations, and the effect of one more of the flown maneuvers.
 
 use std::collections::BTreeMap;
 
@@ -88,8 +88,8 @@ fn medians(rows: &[(&PosteriorRow, f64)], axis: Axis) -> Vec<(f64, f64)> {
 /// A row of the posterior, and its standard deviation in percent of that before flight.
 type RemainingUncertainty<'a> = (&'a PosteriorRow, f64);
 
-/// Median of all, the derivatives on which flights gave least, the maneuvers worth a repeat, the level to decide, and
-/// the command that plans the flight.
+/// Median of all derivatives, the derivatives about which flights gave least information, the
+/// maneuvers worth a repeat, the level to decide, and the command that plans the flight.
 fn answer(
     contents: &Contents,
     rows: &[RemainingUncertainty],

@@ -1,7 +1,7 @@
 //! Labels, legend and notes of strip charts.
 
 use crate::maneuver::Maneuver;
-use crate::report::figure::annotated_chart::{Key, Window};
+use crate::report::figure::annotated_chart::{Key, ShadedManeuver};
 use crate::report::figure::strip::{FlaggedSpans, Strip};
 use crate::report::figure::style::{INK, MEASURED_COLOUR};
 use crate::report::notation::without_unit;
@@ -15,7 +15,7 @@ const SAME_START_S: f64 = 1.0;
 
 /// A maneuver as a shaded window, labelled with the verdict on the analyst's event unless they
 /// agree.
-pub fn window(maneuver: &Maneuver, events: &[EventRow]) -> Window {
+pub fn window(maneuver: &Maneuver, events: &[EventRow]) -> ShadedManeuver {
     let event = events.iter().find(|event| {
         event.given_class.as_ref() == Some(&maneuver.class)
             && event
@@ -29,7 +29,7 @@ pub fn window(maneuver: &Maneuver, events: &[EventRow]) -> Window {
     if let Some(event) = event.filter(|event| event.verdict != EventVerdict::Agrees) {
         label = format!("{label}, {}", event.verdict);
     }
-    Window {
+    ShadedManeuver {
         maneuver_id: maneuver.maneuver_id.clone(),
         class: maneuver.class.clone(),
         label,
@@ -49,7 +49,7 @@ pub fn legend(
         strips.iter().any(|s| !spans(&s.flagged).is_empty())
     };
     let entries = [
-        (has_windows, Key::Window, "maneuver"),
+        (has_windows, Key::Maneuver, "maneuver"),
         (
             has_events,
             Key::Event,

@@ -1,5 +1,5 @@
-//! Reduction of a long signal to the columns of a picture: smallest and largest sample of each
-//! column, so that no spike is lost, and intervals of flagged samples.
+//! Reduction of a long signal to the columns of a picture. Each column has its smallest and largest
+//! sample, so that no spike is lost, and intervals of flagged samples.
 
 use crate::flight::Mark;
 use crate::flight::record::Series;

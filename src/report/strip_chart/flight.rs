@@ -7,8 +7,10 @@ use super::signal_strips::{
 };
 use crate::error::Problem;
 use crate::flight::{Record, signal};
-use crate::maneuver::{Maneuver, Unknown};
-use crate::report::figure::annotated_chart::{self, Chart, LABEL_PITCH, Lane, LaneBox, Window};
+use crate::maneuver::{Maneuver, UnclassifiedExcitation};
+use crate::report::figure::annotated_chart::{
+    self, Chart, LABEL_PITCH, Lane, LaneBox, ShadedManeuver,
+};
 use crate::report::figure::strip::Strip;
 use crate::report::notation::{count, fixed, number};
 use crate::tables::EventRow;
@@ -24,7 +26,7 @@ pub struct FlightView<'a> {
     pub groups: &'a SignalGroups,
     pub maneuvers: &'a [Maneuver],
     /// Excitation that fits no class.
-    pub unknown: &'a [Unknown],
+    pub unknown: &'a [UnclassifiedExcitation],
     /// The analyst's events against the recognised maneuvers; empty without a list.
     pub events: &'a [EventRow],
     pub problems: &'a [Problem],
@@ -97,15 +99,15 @@ pub(super) fn flight_signals(groups: &SignalGroups) -> Vec<(&str, StripStyle)> {
 }
 
 /// Maneuvers and unknown excitation in order of time.
-fn windows(view: &FlightView) -> Vec<Window> {
-    let unknown = view.unknown.iter().map(|u| Window {
+fn windows(view: &FlightView) -> Vec<ShadedManeuver> {
+    let unknown = view.unknown.iter().map(|u| ShadedManeuver {
         maneuver_id: String::new(),
         class: "unknown".to_owned(),
         label: format!("unknown, nearest to {}", u.nearest_class),
         start_s: u.start_s,
         end_s: u.end_s,
     });
-    let mut windows: Vec<Window> = view
+    let mut windows: Vec<ShadedManeuver> = view
         .maneuvers
         .iter()
         .map(|m| window(m, view.events))

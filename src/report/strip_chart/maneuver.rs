@@ -7,7 +7,7 @@ use super::signal_groups::SignalGroups;
 use super::signal_strips::{FLAG, INPUT, LEAST_COLUMNS, SignalStrips};
 use crate::flight::Record;
 use crate::maneuver::{Class, Maneuver};
-use crate::report::figure::annotated_chart::{self, Chart, Window};
+use crate::report::figure::annotated_chart::{self, Chart, ShadedManeuver};
 use crate::report::figure::scale::extent;
 use crate::report::figure::strip::Strip;
 use crate::report::notation::{angle, fixed, number, outcome_in_words};
@@ -64,7 +64,7 @@ pub fn draw_maneuver(view: &ManeuverView) -> String {
         "Scales fit the maneuver: a line that leaves its strip before or after it is cut there."
             .to_owned(),
     );
-    let windows: Vec<Window> = view
+    let windows: Vec<ShadedManeuver> = view
         .flight
         .iter()
         .filter(|m| m.start_s < last_s && m.end_s > first_s)

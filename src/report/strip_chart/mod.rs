@@ -1,5 +1,5 @@
-//! Strip charts of `harvest show`: a whole flight with its maneuvers, or one maneuver measured
-//! against computed, as an SVG file; and of a recording as `harvest init` finds it.
+//! Strip charts as SVG files. `harvest show` draws a whole flight with its maneuvers, or one
+//! maneuver measured against computed. `harvest init` draws a recording as it finds it.
 
 mod annotations;
 mod envelope;

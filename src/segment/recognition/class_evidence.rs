@@ -11,20 +11,20 @@ use crate::maneuver::{Class, Recognised};
 /// to halve the confidence (0.8³ = 0.51).
 const FLAG_CONTRADICTS: f64 = 0.8;
 
-/// Weight of a flag that is not recorded: a quarter of the loss by a contradiction, so that a class without its
-/// flag comes before one that a flag contradicts.
+/// Weight of a flag that is not recorded: a quarter of the loss of a contradiction. A class without
+/// its flag thus comes before a class that a flag contradicts.
 const FLAG_NOT_RECORDED: f64 = 0.95;
 
-/// Weight of a signal whose motion is neither clear nor absent, or is not recorded: half the loss by a
-/// contradiction, since either outcome is open.
+/// Weight of a signal whose motion is neither clear nor absent, or is not recorded: half the loss
+/// of a contradiction, since either outcome is open.
 const MOTION_UNCLEAR: f64 = 0.9;
 
 /// Weight of a record without pilot controls. All classes have it alike, so it lowers the published confidence
 /// and leaves their order.
 const PILOT_NOT_RECORDED: f64 = 0.9;
 
-/// Loss of weight of pulses that deviate by the whole tolerance: there the pulses are as likely those of
-/// another class, and beyond they do not count at all.
+/// Loss of weight of pulses that deviate by the whole tolerance. There the pulses may as well
+/// belong to another class; beyond it they do not count at all.
 const PULSES_AT_TOLERANCE: f64 = 0.5;
 
 /// One finding for or against a class.

@@ -9,7 +9,7 @@ use crate::maneuver::Class;
 /// one step and its return; more is flying.
 const CORRECTION_STEPS: usize = 2;
 
-/// True if every condition of a class holds in a segment.
+/// `true` if every condition of a class holds in a segment.
 pub(super) fn fits(segment: &Segment, class: &Class) -> bool {
     mismatches(segment, class).is_empty()
 }

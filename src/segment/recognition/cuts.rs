@@ -43,7 +43,7 @@ struct Cut<'a> {
 
 /// A segment explained as a maneuver of a class.
 #[derive(Clone, Copy, Debug)]
-struct Explanation<'a> {
+struct ExplainedSegment<'a> {
     class: &'a Class,
     penalties: Penalties,
 }
@@ -138,7 +138,7 @@ impl<'s, 'a> CutSearch<'s, 'a> {
 
     /// Explains a segment by the class that leaves the fewest steps unexplained; `None` if it fits
     /// no class.
-    fn explain(&self, steps: (usize, usize)) -> Option<Explanation<'a>> {
+    fn explain(&self, steps: (usize, usize)) -> Option<ExplainedSegment<'a>> {
         let segment = self.segment(steps);
         self.classes
             .iter()
@@ -152,7 +152,7 @@ impl<'s, 'a> CutSearch<'s, 'a> {
         class: &'a Class,
         segment: &Segment,
         (first, end): (usize, usize),
-    ) -> Explanation<'a> {
+    ) -> ExplainedSegment<'a> {
         let steps = self.sequence.steps.get(first..end).unwrap_or_default();
         let inputs = segment.inputs(class);
         let pulses = &class.recognition.pulses;
@@ -169,7 +169,7 @@ impl<'s, 'a> CutSearch<'s, 'a> {
             .iter()
             .map(|(signal, p)| changes_of(signal, steps).len().min(p.widths.len() + 1))
             .sum();
-        Explanation {
+        ExplainedSegment {
             class,
             penalties: Penalties {
                 unexplained_steps: steps.iter().filter(|s| !inputs.contains(s.signal)).count(),
@@ -257,7 +257,7 @@ fn changes_of(signal: &str, steps: &[SequenceStep]) -> Vec<f64> {
         .collect()
 }
 
-/// True for a signal that does not end near its beginning, by those of its changes that stand out
+/// `true` for a signal that does not end near its beginning, by those of its changes that stand out
 /// from feedback.
 fn ends_away(changes: &[f64], outstanding_share: f64) -> bool {
     let largest = changes.iter().map(|c| c.abs()).fold(0.0, f64::max);

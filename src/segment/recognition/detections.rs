@@ -24,11 +24,11 @@ pub(in crate::segment) struct Detections<'a> {
     pub deflections: Steps,
     /// The steps of surfaces that no pilot control explains.
     pub uncommanded: Steps,
-    /// True if one of the pilot's controls is recorded. Otherwise the pilot's inputs cannot be
+    /// `true` if one of the pilot's controls is recorded. Otherwise the pilot's inputs cannot be
     /// separated from the system's.
     pub pilot_is_recorded: bool,
     control_noise: &'a ControlNoise<'a>,
-    /// True if the excitation flag is recorded and not stuck.
+    /// `true` if the excitation flag is recorded and not stuck.
     flag_varies: bool,
     /// Times during which a varying flag is down between two times that it is up, of at least the
     /// shortest pause.
@@ -92,7 +92,7 @@ impl<'a> Detections<'a> {
         self.settings.pilot_controls.iter().any(|c| c == signal)
     }
 
-    /// True if a pilot control moves at a time, or has stepped shortly before it while no flag
+    /// `true` if a pilot control moves at a time, or has stepped shortly before it while no flag
     /// indicates that the on-board system is active.
     fn pilot_explains(&self, time_s: f64) -> bool {
         let system_works = self.flag_is_up_at(time_s);
@@ -101,14 +101,14 @@ impl<'a> Detections<'a> {
         })
     }
 
-    /// True if a control has stepped so shortly before a time that feedback may still respond.
+    /// `true` if a control has stepped so shortly before a time that feedback may still respond.
     fn steps_before(&self, control: &str, time_s: f64) -> bool {
         let settings = self.settings;
         let (from_s, to_s) = (time_s - settings.answer_s, time_s + settings.transit_s);
         !self.steps.between(control, from_s, to_s).is_empty()
     }
 
-    /// True if a control moves at a time by enough to move a surface that is geared to it.
+    /// `true` if a control moves at a time by enough to move a surface that is geared to it.
     fn moves_at(&self, control: &str, time_s: f64) -> bool {
         let settings = self.settings;
         let geared_s = (time_s - settings.gearing_s, time_s + settings.transit_s);
@@ -118,7 +118,7 @@ impl<'a> Detections<'a> {
             >= smallest.max(settings.steps_over_noise * noise)
     }
 
-    /// True if a varying flag is up at a time.
+    /// `true` if a varying flag is up at a time.
     fn flag_is_up_at(&self, time_s: f64) -> bool {
         let values = self
             .record
@@ -130,7 +130,7 @@ impl<'a> Detections<'a> {
                 .is_some_and(|v| *v > FLAG_UP)
     }
 
-    /// True if a flag is up for most of the time; `None` if it is not recorded.
+    /// `true` if a flag is up for most of the time; `None` if it is not recorded.
     pub fn flag_is_mostly_up(&self, flag: &str, (from_s, to_s): (f64, f64)) -> Option<bool> {
         let record = self.record;
         let (first, last) = (record.sample_at(from_s), record.sample_at(to_s));
@@ -150,7 +150,7 @@ impl<'a> Detections<'a> {
     }
 }
 
-/// True for a flag that is up in some samples and down in others.
+/// `true` for a flag that is up in some samples and down in others.
 fn varies(flag: &[f64]) -> bool {
     let mut up = flag.iter().filter(|v| v.is_finite()).map(|v| *v > FLAG_UP);
     up.next().is_some_and(|first| up.any(|v| v != first))

@@ -1,6 +1,6 @@
 //! Results of recognition: maneuvers found, and excitation that fits no class.
 
-use crate::maneuver::{Class, Recognised, Unknown};
+use crate::maneuver::{Class, Recognised, UnclassifiedExcitation};
 
 /// A maneuver's class and the times of its first and last input, s on the record's clock.
 #[derive(Clone, Debug)]
@@ -29,13 +29,13 @@ impl FoundManeuver<'_> {
 
 /// Recognition of a record or of one sequence of its steps.
 #[derive(Clone, Debug, Default)]
-pub(in crate::segment) struct Recognition<'a> {
+pub(in crate::segment) struct RecognitionResult<'a> {
     pub found: Vec<FoundManeuver<'a>>,
-    pub unknown: Vec<Unknown>,
+    pub unknown: Vec<UnclassifiedExcitation>,
 }
 
-impl<'a> Recognition<'a> {
-    pub fn add(&mut self, more: Recognition<'a>) {
+impl<'a> RecognitionResult<'a> {
+    pub fn add(&mut self, more: RecognitionResult<'a>) {
         self.found.extend(more.found);
         self.unknown.extend(more.unknown);
     }

@@ -2,11 +2,11 @@
 //! unless the maneuver explains the same motion.
 
 use super::detections::Detections;
-use super::found::{FoundManeuver, Recognition};
-use crate::maneuver::Unknown;
+use super::found::{FoundManeuver, RecognitionResult};
+use crate::maneuver::UnclassifiedExcitation;
 
 /// A candidate with the reason for which it would be rejected.
-struct Candidate<'a> {
+struct CandidateManeuver<'a> {
     found: FoundManeuver<'a>,
     rejection: Option<String>,
 }
@@ -20,10 +20,10 @@ struct Candidate<'a> {
 /// part.
 pub(in crate::segment) fn without_overlaps<'a>(
     detections: &Detections,
-    recognition: Recognition<'a>,
+    recognition: RecognitionResult<'a>,
     rejection: impl Fn(&FoundManeuver) -> Option<String>,
-) -> Recognition<'a> {
-    let mut candidates: Vec<Candidate> = Vec::new();
+) -> RecognitionResult<'a> {
+    let mut candidates: Vec<CandidateManeuver> = Vec::new();
     for found in &recognition.found {
         let others = recognition
             .found
@@ -31,7 +31,7 @@ pub(in crate::segment) fn without_overlaps<'a>(
             .filter(|other| overlap(found, other));
         // A candidate overlaps itself.
         let is_contested = others.count() > 1;
-        candidates.push(Candidate {
+        candidates.push(CandidateManeuver {
             rejection: is_contested.then(|| rejection(found)).flatten(),
             found: found.clone(),
         });
@@ -42,7 +42,7 @@ pub(in crate::segment) fn without_overlaps<'a>(
         accepted.then(longer)
     });
     let mut found: Vec<FoundManeuver> = Vec::new();
-    let mut displaced: Vec<Unknown> = Vec::new();
+    let mut displaced: Vec<UnclassifiedExcitation> = Vec::new();
     for candidate in candidates {
         match found.iter().find(|other| overlap(&candidate.found, other)) {
             None => found.push(candidate.found),
@@ -53,18 +53,21 @@ pub(in crate::segment) fn without_overlaps<'a>(
     let mut unknown = apart(recognition.unknown, &found);
     unknown.extend(displaced);
     unknown.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
-    Recognition { found, unknown }
+    RecognitionResult { found, unknown }
 }
 
-/// Returns true if the inputs of two candidates overlap.
+/// `true` if the inputs of two candidates overlap.
 fn overlap(a: &FoundManeuver, b: &FoundManeuver) -> bool {
     a.first_s <= b.last_s && a.last_s >= b.first_s
 }
 
 /// Excitation of no class apart from maneuvers and from longer excitation of no class.
-fn apart(mut all: Vec<Unknown>, found: &[FoundManeuver]) -> Vec<Unknown> {
+fn apart(
+    mut all: Vec<UnclassifiedExcitation>,
+    found: &[FoundManeuver],
+) -> Vec<UnclassifiedExcitation> {
     all.sort_by(|a, b| (b.end_s - b.start_s).total_cmp(&(a.end_s - a.start_s)));
-    let mut unknown: Vec<Unknown> = Vec::new();
+    let mut unknown: Vec<UnclassifiedExcitation> = Vec::new();
     for u in all {
         let overlaps = |from_s: f64, to_s: f64| u.start_s <= to_s && u.end_s >= from_s;
         if !found.iter().any(|f| overlaps(f.first_s, f.last_s))
@@ -76,9 +79,13 @@ fn apart(mut all: Vec<Unknown>, found: &[FoundManeuver]) -> Vec<Unknown> {
     unknown
 }
 
-impl Candidate<'_> {
+impl CandidateManeuver<'_> {
     /// Row of a candidate that a maneuver displaces; `None` if the maneuver explains its inputs.
-    fn displaced(&self, detections: &Detections, maneuver: &FoundManeuver) -> Option<Unknown> {
+    fn displaced(
+        &self,
+        detections: &Detections,
+        maneuver: &FoundManeuver,
+    ) -> Option<UnclassifiedExcitation> {
         let FoundManeuver {
             class,
             first_s,
@@ -90,7 +97,7 @@ impl Candidate<'_> {
         }
         let rejected = self.rejection.as_ref();
         let rejected = rejected.map_or_else(String::new, |reason| format!("; {reason}"));
-        Some(Unknown {
+        Some(UnclassifiedExcitation {
             flight_id: detections.record.flight_id.clone(),
             start_s: first_s,
             end_s: last_s,

@@ -14,7 +14,7 @@ const PARTS: usize = 3;
 const FEWEST_SWINGS: usize = PARTS + 1;
 
 /// Factor by which an interval between swings may exceed the one before and still count as not
-/// slower: the times of swings have errors of some samples.
+/// slower. The times of swings have errors of some samples.
 const INTERVAL_TOLERANCE: f64 = 1.1;
 
 /// Smallest share of intervals that are not slower than the one before: a step of feedback may

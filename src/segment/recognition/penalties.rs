@@ -39,8 +39,8 @@ pub(super) struct Penalties {
     /// repetition mostly has the same steps.
     pub unlike_repeats: usize,
     /// Inputs of a maneuver that do not end where they began, and returns to an input after another
-    /// has stepped: a cut in the wrong place makes more of both. The two are one term, for a step
-    /// may pass undetected.
+    /// has stepped. A wrong cut increases both. The two are one term, for a step may pass
+    /// undetected.
     pub loose_ends: usize,
     /// The pauses between the maneuvers, s: inputs of one maneuver follow each other closely.
     pub pauses_s: Reverse<f64>,

@@ -8,10 +8,10 @@ use crate::segment::steps::step::{Step, TRIM_SHARE};
 
 /// Periods in which pilot controls step.
 ///
-/// A sequence continues while a control is held away from its trim for no longer than
-/// `longest_hold_s`, or while all rest at trim for no longer than `longest_rest_s`. Steps of at
-/// least the smallest size count. A smaller deflection can only begin a sequence, as the first half
-/// of a reversal, or end one, by returning a control to trim.
+/// A sequence continues while a control is held away from trim, up to `longest_hold_s`, or while
+/// all controls rest at trim, up to `longest_rest_s`. Steps of at least the smallest size count. A
+/// smaller deflection can only begin a sequence, as the first half of a reversal, or end one, by
+/// returning a control to trim.
 pub(super) fn pilot_sequences(
     detections: &Detections,
     controls: &BTreeSet<String>,
@@ -95,15 +95,15 @@ impl ControlState {
         from_trim.abs() < self.smallest_deflection.max(TRIM_SHARE * self.largest_step)
     }
 
-    /// True if the control's steps cancel, or if its level is back at trim, since trim drifts in a
-    /// turn. A whole reversal leads to the other side at any level.
+    /// `true` if the control's steps cancel, or if its level is back at trim, since trim drifts in
+    /// a turn. A whole reversal leads to the other side at any level.
     fn rests(&self) -> bool {
         let reversed = self.last_step > (1.0 - TRIM_SHARE) * self.largest_step;
         self.is_near_trim(self.moved) || (self.is_near_trim(self.level - self.trim) && !reversed)
     }
 
-    /// True for a step that returns the control to trim, by the sum of the steps or by the level:
-    /// one of the steps may have been too slow to be detected.
+    /// `true` if the step returns the control to trim, judged by the sum of the steps or by the
+    /// level. The level is needed because a slow step may have been missed.
     fn is_return(&self, step: &Step) -> bool {
         let returns =
             |before: f64, after: f64| !self.is_near_trim(before) && self.is_near_trim(after);
@@ -135,7 +135,7 @@ impl<'a> GrowingSequence<'a> {
         };
     }
 
-    /// True if a control that is held away from trim returns to it with this step.
+    /// `true` if a control that is held away from trim returns to it with this step.
     fn returns_to_trim(&self, signal: &str, step: &Step) -> bool {
         self.controls.get(signal).is_some_and(|c| c.is_return(step))
     }

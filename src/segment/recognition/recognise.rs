@@ -4,12 +4,12 @@ use super::class_evidence::{confidence, recognised};
 use super::class_match::fits;
 use super::cuts::CutSearch;
 use super::detections::Detections;
-use super::found::{FoundManeuver, Recognition};
+use super::found::{FoundManeuver, RecognitionResult};
 use super::segment::Segment;
 use super::sequences::{Source, StepSequence, sequences};
 use super::sweeps::find_sweeps;
 use super::unclassified::{ambiguous, unexplained};
-use crate::maneuver::{Class, Unknown};
+use crate::maneuver::{Class, UnclassifiedExcitation};
 use crate::segment::steps::step::Step;
 
 /// Difference of confidence below which two classes fit alike: less than the weight of a flag that
@@ -27,9 +27,9 @@ const OPENING_SHARE: f64 = 0.5;
 pub(in crate::segment) fn recognise<'a>(
     detections: &Detections,
     classes: &'a [Class],
-) -> Recognition<'a> {
-    let mut recognition = Recognition::default();
-    let mut previous: Option<(StepSequence, Recognition)> = None;
+) -> RecognitionResult<'a> {
+    let mut recognition = RecognitionResult::default();
+    let mut previous: Option<(StepSequence, RecognitionResult)> = None;
     for sequence in sequences(detections, classes) {
         let own = recognise_sequence(detections, classes, &sequence);
         let found_apart = previous.as_ref().map_or(0, |p| p.1.found.len()) + own.found.len();
@@ -57,7 +57,7 @@ fn recognise_sequence<'a>(
     detections: &Detections,
     classes: &'a [Class],
     sequence: &StepSequence,
-) -> Recognition<'a> {
+) -> RecognitionResult<'a> {
     let of_source = |class: &&Class| {
         class.recognition.sweep.is_empty() && Source::of_class(class, detections) == sequence.source
     };
@@ -66,7 +66,7 @@ fn recognise_sequence<'a>(
         classes: classes.iter().filter(of_source).collect(),
         sequence,
     };
-    let mut recognition = Recognition::default();
+    let mut recognition = RecognitionResult::default();
     let (parts, penalties) = search.best_cut();
     for run in parts.chunk_by(|a, b| !a.is_maneuver && !b.is_maneuver) {
         let (first, last) = (run[0], run[run.len() - 1]);
@@ -91,7 +91,7 @@ fn recognise_sequence<'a>(
 enum Classified<'a> {
     Found(FoundManeuver<'a>),
     /// Several classes fit alike.
-    Ambiguous(Unknown),
+    Ambiguous(UnclassifiedExcitation),
     None,
 }
 
@@ -159,8 +159,8 @@ fn maneuver<'a>(
     })
 }
 
-/// Time of the first step of a maneuver, or of a smaller step to the other side before it: a
-/// deflection of a surface from trim that feedback made small.
+/// Time of the first step of a maneuver. If a smaller step to the other side precedes it, the time
+/// of that step: a deflection from trim that feedback made small.
 ///
 /// Steps up to the last one before the segment belong to another maneuver.
 fn opening_s(segment: &Segment, (previous_s, first_s): (f64, f64)) -> f64 {

@@ -59,8 +59,8 @@ impl<'a> Segment<'a> {
         (self.from_s - slack_s, self.to_s + slack_s)
     }
 
-    /// The steps of a signal that stand out from feedback: at least a share of its largest step,
-    /// reduced by the effect that turbulence may have. For a surface that the on-board system
+    /// Steps of a signal that stand out from feedback: at least a fraction of the signal's largest
+    /// step, reduced by the possible effect of turbulence. For a surface that the on-board system
     /// moves, only the uncommanded steps.
     pub fn steps_of(&self, signal: &str) -> Vec<&'a Step> {
         let detections = self.detections;
@@ -105,8 +105,8 @@ impl<'a> Segment<'a> {
             .fold(0.0, f64::max)
     }
 
-    /// True for a signal that moves, false for one at rest; `None` for a signal in between, or one
-    /// that is not recorded.
+    /// `true` for a signal that moves, false for one at rest; `None` for a signal in between, or
+    /// one that is not recorded.
     pub fn moves(&self, signal: &str) -> Option<bool> {
         let record = self.detections.record;
         let (first, last) = (record.sample_at(self.from_s), record.sample_at(self.to_s));
@@ -118,13 +118,13 @@ impl<'a> Segment<'a> {
         (moves || range <= RESTS * smallest).then_some(moves)
     }
 
-    /// True if a flag is up for most of the segment; `None` if it is not recorded.
+    /// `true` if a flag is up for most of the segment; `None` if it is not recorded.
     pub fn flag_is_up(&self, flag: &str) -> Option<bool> {
         self.detections
             .flag_is_mostly_up(flag, (self.from_s, self.to_s))
     }
 
-    /// True for `fewest_steps` steps of a signal to alternating sides, at least one of which is a
+    /// `true` for `fewest_steps` steps of a signal to alternating sides, at least one of which is a
     /// reversal.
     pub fn is_excitation(&self, signal: &str) -> bool {
         let steps = self.steps_of(signal);

@@ -1,5 +1,5 @@
-//! Sequences of steps: uncommanded steps of surfaces, or steps of pilot controls, that follow each
-//! other closely enough to belong to one maneuver or to several close together.
+//! Sequences of steps: uncommanded steps of surfaces, or steps of pilot controls, in close
+//! succession. They belong to one maneuver or to several close together.
 
 use std::collections::BTreeSet;
 

@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 use super::class_match::mismatches;
 use super::cuts::CutSearch;
 use super::detections::Detections;
-use super::found::Recognition;
+use super::found::RecognitionResult;
 use super::mismatch::Mismatch;
 use super::segment::Segment;
-use crate::maneuver::{Class, Unknown};
+use crate::maneuver::{Class, UnclassifiedExcitation};
 use crate::segment::steps::detection::{is_maneuver_alone, largest_change};
 
 /// Least number of steps of pilot controls that are more than ordinary flying: four reversals.
@@ -20,10 +20,13 @@ const CUT_AT_START_S: f64 = 1.0;
 /// Reports steps that no maneuver explains, unless they may be ordinary flying.
 ///
 /// They are reported if a signal moves to one side, to the other by more than in ordinary flying,
-/// and back. Ordinary flying moves the controls too: a few steps of the pilot, or steps among which
-/// no class has one of its inputs complete, are not reported. In a recording that may be one
-/// maneuver everything is reported.
-pub(super) fn unexplained(search: &CutSearch, steps: (usize, usize)) -> Option<Unknown> {
+/// and back. Ordinary flying moves the controls too. Two cases are not reported: a few steps of the
+/// pilot, and steps among which no class has one of its inputs complete. In a recording that may be
+/// one maneuver everything is reported.
+pub(super) fn unexplained(
+    search: &CutSearch,
+    steps: (usize, usize),
+) -> Option<UnclassifiedExcitation> {
     let segment = search.segment(steps);
     let nearest = search
         .classes
@@ -56,8 +59,8 @@ pub(super) fn unexplained(search: &CutSearch, steps: (usize, usize)) -> Option<U
 /// Reports a recording that may be one maneuver and in which nothing was found.
 pub(in crate::segment) fn nothing_found(
     detections: &Detections,
-    recognition: &Recognition,
-) -> Option<Unknown> {
+    recognition: &RecognitionResult,
+) -> Option<UnclassifiedExcitation> {
     let record = detections.record;
     let is_empty = recognition.found.is_empty() && recognition.unknown.is_empty();
     if !is_empty || !is_maneuver_alone(record) {
@@ -75,7 +78,7 @@ pub(in crate::segment) fn nothing_found(
     };
     let changes = detections.settings.steps.iter().filter_map(change);
     let changes: Vec<String> = changes.collect();
-    Some(Unknown {
+    Some(UnclassifiedExcitation {
         flight_id: record.flight_id.clone(),
         start_s,
         end_s,
@@ -90,13 +93,17 @@ pub(in crate::segment) fn nothing_found(
 }
 
 /// Reports a segment that fits several classes alike.
-pub(super) fn ambiguous(search: &CutSearch, segment: &Segment, names: String) -> Unknown {
+pub(super) fn ambiguous(
+    search: &CutSearch,
+    segment: &Segment,
+    names: String,
+) -> UnclassifiedExcitation {
     let reason = format!("fits {names} alike; make their recognition exclude each other");
     unknown(search, segment, names, reason)
 }
 
-/// True for pilot steps beyond ordinary flying: at least [`FEWEST_PILOT_STEPS`], and at least half
-/// of the steps that the class requires of all its inputs together.
+/// `true` for pilot steps beyond ordinary flying: at least [`FEWEST_PILOT_STEPS`], and at least
+/// half of the steps that the class requires of all its inputs together.
 fn is_series(segment: &Segment, class: &Class) -> bool {
     let wanted: usize = class.recognition.steps.values().map(|c| c.at_least).sum();
     segment.count_explained(class) >= wanted.div_ceil(2).max(FEWEST_PILOT_STEPS)
@@ -107,7 +114,7 @@ fn unknown(
     segment: &Segment,
     nearest_class: String,
     reason: String,
-) -> Unknown {
+) -> UnclassifiedExcitation {
     let counted = search
         .classes
         .iter()
@@ -115,7 +122,7 @@ fn unknown(
         .map(String::as_str);
     let own = search.sequence.steps.iter().map(|step| step.signal);
     let counted = counted.chain(own.filter(|_| search.classes.is_empty()));
-    Unknown {
+    UnclassifiedExcitation {
         flight_id: segment.detections.record.flight_id.clone(),
         start_s: segment.from_s,
         end_s: segment.to_s,

@@ -35,27 +35,27 @@ const NEAR_MAXIMUM: f64 = 0.95;
 /// Detects the steps and the deflections of every signal that has a smallest step.
 ///
 /// The smallest step is the one in the settings, or `steps_over_noise` times the noise of the
-/// signal's own changes if that is larger, since feedback moves a surface in turbulence. In a
-/// recording that is a single maneuver it is limited to the share of the largest change below which
-/// steps count as feedback. Deflections are all changes of at least `deflection_share` of the
-/// smallest step; every step is one.
+/// signal's changes if that is larger. Feedback moves a surface in turbulence. In a recording that
+/// is a single maneuver it is limited to the share of the largest change below which steps count as
+/// feedback. Deflections are all changes of at least `deflection_share` of the smallest step; every
+/// step is one.
 pub(in crate::segment) fn detect(record: &Record, settings: &Settings) -> (Steps, Steps) {
-    let window = Window::of(record, settings);
+    let lengths = DetectorLengths::new(record, settings);
     let (mut steps, mut deflections) = (Steps::default(), Steps::default());
     for (signal, set) in &settings.steps {
         let Some(values) = record.values(signal) else {
             continue;
         };
-        let levels = levels(values, window.level);
-        let own_noise = noise(&levels, window, is_maneuver_alone(record));
+        let levels = levels(values, lengths.level);
+        let own_noise = noise(&levels, lengths, is_maneuver_alone(record));
         let mut over_noise = settings.steps_over_noise * own_noise;
         if is_maneuver_alone(record) {
-            over_noise = over_noise.min(settings.outstanding_share * largest(&levels, window));
+            over_noise = over_noise.min(settings.outstanding_share * largest(&levels, lengths));
         }
         let smallest = set.max(over_noise);
         let noise = if smallest > *set { own_noise } else { 0.0 };
         let larger_than = |smallest: f64| SignalSteps {
-            steps: on_record_clock(steps_of_levels(&levels, smallest, window), record),
+            steps: on_record_clock(steps_of_levels(&levels, smallest, lengths), record),
             smallest,
             noise,
         };
@@ -85,14 +85,14 @@ pub(in crate::segment) fn largest_change(
     settings: &Settings,
     (from_s, to_s): (f64, f64),
 ) -> f64 {
-    let window = Window::of(record, settings);
-    let first = record.sample_at(from_s).saturating_sub(window.reach());
-    let end = (record.sample_at(to_s) + window.reach()).min(record.samples);
+    let lengths = DetectorLengths::new(record, settings);
+    let first = record.sample_at(from_s).saturating_sub(lengths.reach());
+    let end = (record.sample_at(to_s) + lengths.reach()).min(record.samples);
     let values = record
         .values(signal)
         .and_then(|v| v.get(first..end))
         .unwrap_or_default();
-    changes(&levels(values, window.level), window)
+    changes(&levels(values, lengths.level), lengths)
         .map(|change| change.size())
         .fold(0.0, f64::max)
 }
@@ -105,15 +105,15 @@ pub(in crate::segment) fn level_noise(
     settings: &Settings,
 ) -> Option<f64> {
     let noise = white_noise(record.values(signal)?)?;
-    let length = Window::of(record, settings).level as f64;
+    let length = DetectorLengths::new(record, settings).level as f64;
     Some(noise * (2.0 / length).sqrt())
 }
 
 /// Standard deviation of uncommanded changes. Steps are few, so it follows from the median size of
 /// all changes. In a recording that is a single maneuver they are not few; there it follows from
 /// the rests between the inputs.
-fn noise(levels: &[f64], window: Window, is_maneuver_alone: bool) -> f64 {
-    let mut sizes: Vec<f64> = changes(levels, window)
+fn noise(levels: &[f64], lengths: DetectorLengths, is_maneuver_alone: bool) -> f64 {
+    let mut sizes: Vec<f64> = changes(levels, lengths)
         .map(|change| change.size())
         .collect();
     if sizes.len() < 2 {
@@ -128,8 +128,8 @@ fn noise(levels: &[f64], window: Window, is_maneuver_alone: bool) -> f64 {
 }
 
 /// Largest change of a signal.
-fn largest(levels: &[f64], window: Window) -> f64 {
-    changes(levels, window)
+fn largest(levels: &[f64], lengths: DetectorLengths) -> f64 {
+    changes(levels, lengths)
         .map(|change| change.size())
         .fold(0.0, f64::max)
 }
@@ -138,7 +138,7 @@ fn largest(levels: &[f64], window: Window) -> f64 {
 /// decay.
 const MANEUVER_ALONE_S: f64 = 45.0;
 
-/// True for a recording that may hold one maneuver and little else.
+/// `true` for a recording that may hold one maneuver and little else.
 pub(in crate::segment) fn is_maneuver_alone(record: &Record) -> bool {
     record.samples as f64 * record.step_s <= MANEUVER_ALONE_S
 }
@@ -154,16 +154,16 @@ fn samples(time_s: f64, step_s: f64) -> usize {
     n
 }
 
-/// The detector's windows in samples.
+/// Lengths of the detector: half the transit between two levels, and a level, in samples.
 #[derive(Clone, Copy, Debug)]
-struct Window {
+struct DetectorLengths {
     half_transit: usize,
     level: usize,
 }
 
-impl Window {
-    fn of(record: &Record, settings: &Settings) -> Window {
-        Window {
+impl DetectorLengths {
+    fn new(record: &Record, settings: &Settings) -> DetectorLengths {
+        DetectorLengths {
             half_transit: samples(settings.transit_s / 2.0, record.step_s),
             level: samples(settings.level_s, record.step_s),
         }
@@ -194,10 +194,10 @@ impl LevelChange {
 }
 
 /// The changes between levels at each time at which both levels exist.
-fn changes(levels: &[f64], window: Window) -> impl Iterator<Item = LevelChange> {
-    let reach = window.reach();
+fn changes(levels: &[f64], lengths: DetectorLengths) -> impl Iterator<Item = LevelChange> {
+    let reach = lengths.reach();
     let after = levels
-        .get(reach + window.half_transit..)
+        .get(reach + lengths.half_transit..)
         .unwrap_or_default();
     let change = move |(k, (before, after)): (usize, (&f64, &f64))| LevelChange {
         at: k + reach,
@@ -217,15 +217,15 @@ fn changes(levels: &[f64], window: Window) -> impl Iterator<Item = LevelChange> 
 ///
 /// Steps of a signal's levels. A missing level neither continues nor ends a run, unless the gap is
 /// longer than a step.
-fn steps_of_levels(levels: &[f64], smallest: f64, window: Window) -> Vec<Step> {
+fn steps_of_levels(levels: &[f64], smallest: f64, lengths: DetectorLengths) -> Vec<Step> {
     let mut steps = Vec::new();
     let mut run: Vec<LevelChange> = Vec::new();
-    for change in changes(levels, window) {
+    for change in changes(levels, lengths) {
         let is_large = change.size() >= smallest;
         let continues = |last: &LevelChange| {
             is_large
                 && change.signed() * last.signed() > 0.0
-                && change.at - last.at <= window.reach()
+                && change.at - last.at <= lengths.reach()
         };
         if !run.last().is_none_or(continues) {
             steps.extend(step_of_run(&run));
@@ -271,8 +271,8 @@ const SIDE: usize = 64;
 /// Least number of finite samples of a level that leaves out its largest and smallest: two remain.
 const FEWEST_TO_TRIM: f64 = 4.0;
 
-/// The level that begins at each sample: the mean of its finite samples without the largest and the
-/// smallest; NaN where fewer than half are finite.
+/// Level that begins at each sample: the mean of its finite samples without the largest and the
+/// smallest. NaN if fewer than half are finite.
 fn levels(values: &[f64], length: usize) -> Vec<f64> {
     let mut levels = vec![f64::NAN; (values.len() + 1).saturating_sub(length)];
     let side_by_side = pulp::Arch::new();
@@ -326,13 +326,13 @@ mod tests {
     use super::*;
     use approx::assert_abs_diff_eq;
 
-    const WINDOW: Window = Window {
+    const LENGTHS: DetectorLengths = DetectorLengths {
         half_transit: 3,
         level: 5,
     };
 
     fn steps(values: &[f64]) -> Vec<Step> {
-        steps_of_levels(&levels(values, WINDOW.level), 2.0, WINDOW)
+        steps_of_levels(&levels(values, LENGTHS.level), 2.0, LENGTHS)
     }
 
     /// A level that jumps at the given samples.
@@ -426,7 +426,7 @@ mod tests {
     fn noise_alone_is_the_same_by_its_quiet_tenth_as_by_its_median() {
         let mut random = crate::numerics::random::RandomStream::new(5, "levels");
         let levels: Vec<f64> = (0..20_000).map(|_| random.normal()).collect();
-        let [median, quiet] = [false, true].map(|alone| noise(&levels, WINDOW, alone));
+        let [median, quiet] = [false, true].map(|alone| noise(&levels, LENGTHS, alone));
         // Differences of white levels: √2 of their deviation.
         assert_abs_diff_eq!(median, 2.0_f64.sqrt(), epsilon = 0.05);
         assert_abs_diff_eq!(quiet, median, epsilon = 0.08);

@@ -3,10 +3,10 @@
 //! If feedback moves a surface in turbulence, its smallest step is raised above the noise. The
 //! halves of a doublet, away from trim and back to it, may be smaller than that.
 //!
-//! Steps that follow each other closely begin and end with a half. If the first or last step,
-//! compared with its neighbour, is larger than a half, then a deflection to the other side of about
-//! half its size becomes a step. If that step may be a half itself, the deflection must clearly
-//! exceed the noise. A lone step near the smallest size and without halves is attributed to a gust.
+//! Steps that follow each other closely begin and end with a half. The first or last step may be
+//! larger than half of its neighbour. A deflection to the other side of about half its size then
+//! becomes a step. If that step may be a half itself, the deflection must clearly exceed the noise.
+//! A lone step near the smallest size and without halves is attributed to a gust.
 
 use super::step::{Step, Steps, TRIM_SHARE};
 use crate::segment::settings::Settings;

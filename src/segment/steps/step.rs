@@ -25,7 +25,7 @@ impl Step {
         self.change().abs()
     }
 
-    /// True for steps to opposite sides.
+    /// `true` for steps to opposite sides.
     pub fn opposes(&self, other: &Step) -> bool {
         self.change() * other.change() < 0.0
     }

@@ -1,8 +1,8 @@
 //! Swings of a signal: from one extreme to the next, by more than the smallest step. Unlike steps
 //! they need not be fast, so a slow sine has them as well as a pulse.
 
-/// Share of the way between two extremes that a swing excludes at either end: near an extreme the
-/// signal is flat, and noise would determine the swing's times.
+/// Fraction of the way between two extremes that a swing excludes at either end. Near an extreme
+/// the signal is flat, and noise would determine the swing's times.
 const NEAR_EXTREME: f64 = 0.25;
 
 /// One swing: the times at which the signal has left the first extreme and has come near the

@@ -1,5 +1,5 @@
-//! The archive: Parquet files of flights in a folder, under a glob, or in a hive-partitioned tree;
-//! or objects of an object store under the same names.
+//! The archive: Parquet files of flights in a folder, under a glob, or in a hive-partitioned tree.
+//! An object store has objects under the same names.
 //!
 //! Only the columns of the channel map are read, one at a time, page by page, into numbers. A tall
 //! file (time, name, value) is first written with one column a name. A fault of a file is a problem

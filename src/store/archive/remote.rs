@@ -13,8 +13,8 @@ use super::super::object;
 use super::file_rules::{is_hidden, unreadable};
 use crate::error::Error;
 
-/// Finds the objects of an archive `s3://bucket/prefix`: those below it whose names end in
-/// `.parquet`, the object of this name, or those that match it as a glob.
+/// Finds the objects of an archive `s3://bucket/prefix`: the `.parquet` objects below the prefix,
+/// the object of this name, or the objects that match the name as a glob.
 ///
 /// # Errors
 /// The objects cannot be listed.
@@ -110,8 +110,8 @@ pub(super) fn byte_ranges(
     joined(ranges)
 }
 
-/// Byte ranges of the dictionary and of the pages with these rows, in a column of a row group with the
-/// rows `group` and the bytes `bytes`.
+/// Byte ranges of the dictionary and of the pages with these rows, in one column of a row group.
+/// The row group has the rows `group`, the column the bytes `bytes`.
 fn ranges_of_pages(
     pages: &[PageLocation],
     bytes: Range<u64>,

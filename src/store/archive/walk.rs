@@ -10,8 +10,8 @@ use crate::error::Error;
 /// Largest number of folders of an archive: links may lead to the whole file system.
 const MOST_FOLDERS: usize = 50_000;
 
-/// Search of folders, each entered once, no matter how many links lead to it: folders themselves
-/// first, then links in the order in which they are found.
+/// Search of folders. Each is entered once, no matter how many links lead to it. Folders themselves
+/// come first, then links in the order in which they are found.
 #[derive(Debug)]
 pub(super) struct Walk {
     /// Folders entered, without links.
@@ -43,8 +43,8 @@ impl Walk {
     }
 
     /// Adds the files below a folder, except names with a leading dot or underscore. A sub-folder
-    /// is added itself, in place of its files, if it cannot be read, if a link leads to it again,
-    /// or if it holds the archive.
+    /// is added in place of its files if it cannot be read, if a link leads to it again, or if it
+    /// holds the archive.
     ///
     /// # Errors
     /// The folder cannot be read, or there are more folders than an archive has.

@@ -50,7 +50,7 @@ impl FlightWriter {
         let heads = columns.iter().map(|c| (c.name.as_str(), c.unit.as_deref()));
         let schema = schema(heads);
         let properties = encoding::properties().map_err(|e| Error::store(path, &e))?;
-        let draft = Draft::of(path)?;
+        let draft = Draft::create(path)?;
         let file = BufWriter::with_capacity(1 << 16, draft.handle()?);
         let writer = ArrowWriter::try_new(file, schema.clone(), Some(properties.build()))
             .map_err(|e| Error::store(path, &e))?;

@@ -1,5 +1,5 @@
 //! Import: recordings in other formats, written as Parquet of the archive with the units of the
-//! columns, and a manifest that names the source of each file.
+//! columns. A manifest names the source of each file.
 //!
 //! CSV and tall Parquet are read row by row, in bounded memory. A MATLAB or HDF5 file is read
 //! whole, since its columns follow one another.

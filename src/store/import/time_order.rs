@@ -1,4 +1,4 @@
-//! Sorting of values by time on the disk: each value is written to its span of time, and a span is
+//! Sorting of values by time on the disk. Each value is written to its span of time, and a span is
 //! small enough to be sorted in memory. The time taken is proportional to the number of values, for
 //! any order.
 

@@ -5,23 +5,23 @@ use std::ops::Range;
 
 use bytes::Bytes;
 
-use super::failure::{Failure, ObjectInfo};
+use super::failure::{ObjectInfo, RequestFailure};
 
 /// No connection.
 #[derive(Debug)]
 pub enum Client {}
 
-pub fn available() -> Result<(), Failure> {
+pub fn available() -> Result<(), RequestFailure> {
     let what = "this harvest was built without object stores; build one with them: cargo build --release --features s3";
-    Err(Failure::Lasting(what.to_owned()))
+    Err(RequestFailure::Permanent(what.to_owned()))
 }
 
 impl Client {
-    pub fn open(_: &str) -> Result<Client, Failure> {
-        available().and_then(|()| Err(Failure::Lasting(String::new())))
+    pub fn open(_: &str) -> Result<Client, RequestFailure> {
+        available().and_then(|()| Err(RequestFailure::Permanent(String::new())))
     }
 
-    pub fn list(&self, _: &str) -> Result<BTreeMap<String, ObjectInfo>, Failure> {
+    pub fn list(&self, _: &str) -> Result<BTreeMap<String, ObjectInfo>, RequestFailure> {
         match *self {}
     }
 
@@ -29,7 +29,7 @@ impl Client {
         match *self {}
     }
 
-    pub fn remove(&self, _: &str) -> Result<(), Failure> {
+    pub fn remove(&self, _: &str) -> Result<(), RequestFailure> {
         match *self {}
     }
 
@@ -37,7 +37,7 @@ impl Client {
         match *self {}
     }
 
-    pub fn about(&self, _: &str) -> Result<Option<ObjectInfo>, Failure> {
+    pub fn about(&self, _: &str) -> Result<Option<ObjectInfo>, RequestFailure> {
         match *self {}
     }
 
@@ -45,15 +45,15 @@ impl Client {
         match *self {}
     }
 
-    pub fn get(&self, _: &str) -> Result<Option<Bytes>, Failure> {
+    pub fn get(&self, _: &str) -> Result<Option<Bytes>, RequestFailure> {
         match *self {}
     }
 
-    pub fn range(&self, _: &str, _: Range<u64>, _: Option<&str>) -> Result<Bytes, Failure> {
+    pub fn range(&self, _: &str, _: Range<u64>, _: Option<&str>) -> Result<Bytes, RequestFailure> {
         match *self {}
     }
 
-    pub fn put(&self, _: &str, _: Vec<u8>) -> Result<(), Failure> {
+    pub fn put(&self, _: &str, _: Vec<u8>) -> Result<(), RequestFailure> {
         match *self {}
     }
 
@@ -61,8 +61,8 @@ impl Client {
         &self,
         _: &str,
         _: Vec<u8>,
-        _: &mut dyn FnMut() -> Result<Vec<u8>, Failure>,
-    ) -> Result<(), Failure> {
+        _: &mut dyn FnMut() -> Result<Vec<u8>, RequestFailure>,
+    ) -> Result<(), RequestFailure> {
         match *self {}
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, OnceLock};
 
 use super::client::Client;
-use super::failure::Failure;
+use super::failure::RequestFailure;
 
 pub(super) const SCHEME: &str = "s3://";
 
@@ -23,9 +23,10 @@ pub(super) struct Address {
 }
 
 impl Address {
-    pub(super) fn parse(path: &Path) -> Result<Address, Failure> {
+    pub(super) fn parse(path: &Path) -> Result<Address, RequestFailure> {
         let text = path.to_string_lossy();
-        let wrong = |what: &str| Failure::Lasting(format!("{what}; expected s3://bucket/prefix"));
+        let wrong =
+            |what: &str| RequestFailure::Permanent(format!("{what}; expected s3://bucket/prefix"));
         let rest = text
             .strip_prefix(SCHEME)
             .ok_or_else(|| wrong("not in an object store"))?;
@@ -51,7 +52,7 @@ impl Address {
         })
     }
 
-    pub(super) fn client(&self) -> Result<Arc<Client>, Failure> {
+    pub(super) fn client(&self) -> Result<Arc<Client>, RequestFailure> {
         // Connections last as long as the process, like its environment.
         static OPENED: OnceLock<Mutex<BTreeMap<String, Arc<Client>>>> = OnceLock::new();
         let mut opened = OPENED
@@ -68,7 +69,7 @@ impl Address {
 }
 
 /// Client of an object's bucket, and the object's key.
-pub(super) fn at(path: &Path) -> Result<(Arc<Client>, String), Failure> {
+pub(super) fn at(path: &Path) -> Result<(Arc<Client>, String), RequestFailure> {
     let address = Address::parse(path)?;
     Ok((address.client()?, address.key))
 }

@@ -1,8 +1,8 @@
 //! The connection to a bucket: requests of the `object_store` crate, each awaited by its thread.
 //!
-//! The crate retries with backoff for up to half a minute. After [`SILENT_REQUESTS`] requests in a row
-//! without an answer no more are made in this run, so a dead endpoint costs one minute and not one
-//! for each flight.
+//! The crate retries with backoff for up to half a minute. After [`SILENT_REQUESTS`] requests in a
+//! row without an answer, this run makes no more. A dead endpoint thus costs one minute, and not
+//! one for each flight.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -19,7 +19,7 @@ use object_store::{
 };
 use tokio::runtime::Runtime;
 
-use super::failure::{Failure, ObjectInfo};
+use super::failure::{ObjectInfo, RequestFailure};
 
 /// Requests in a row without an answer after which the endpoint counts as dead.
 const SILENT_REQUESTS: usize = 3;
@@ -72,7 +72,7 @@ impl std::fmt::Debug for Client {
     clippy::unnecessary_wraps,
     reason = "as where there are no object stores"
 )]
-pub fn available() -> Result<(), Failure> {
+pub fn available() -> Result<(), RequestFailure> {
     Ok(())
 }
 
@@ -81,18 +81,18 @@ fn set(name: &str) -> Option<String> {
 }
 
 /// Fault of the environment: something missing or contradictory.
-fn refuse_environment() -> Result<(), Failure> {
+fn refuse_environment() -> Result<(), RequestFailure> {
     let has_key = set("AWS_ACCESS_KEY_ID").is_some() && set("AWS_SECRET_ACCESS_KEY").is_some();
     if !has_key && !CREDENTIALS.iter().any(|name| set(name).is_some()) {
         let what = "no credentials in the environment: set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY (and AWS_REGION, \
                     AWS_SESSION_TOKEN, AWS_ENDPOINT_URL where they are needed)";
-        return Err(Failure::Lasting(what.to_owned()));
+        return Err(RequestFailure::Permanent(what.to_owned()));
     }
     let allowed = set("AWS_ALLOW_HTTP")
         .is_some_and(|v| matches!(v.to_lowercase().as_str(), "true" | "1" | "yes" | "on"));
     match ENDPOINTS.iter().find_map(|name| set(name)) {
         Some(endpoint) if endpoint.starts_with("http://") && !allowed => {
-            Err(Failure::Lasting(format!(
+            Err(RequestFailure::Permanent(format!(
                 "the endpoint {endpoint} is not encrypted: use https, or set AWS_ALLOW_HTTP=true in a trusted network"
             )))
         }
@@ -140,14 +140,14 @@ fn endpoint() -> String {
 
 impl Client {
     /// Opens a bucket with the environment's settings.
-    pub fn open(bucket: &str) -> Result<Client, Failure> {
+    pub fn open(bucket: &str) -> Result<Client, RequestFailure> {
         refuse_environment()?;
         let store = AmazonS3Builder::from_env()
             .with_bucket_name(bucket)
             .with_retry(retries())
             .build();
         let store = store.map_err(|e| {
-            Failure::Lasting(format!(
+            RequestFailure::Permanent(format!(
                 "cannot connect with the environment's AWS_ variables: {}",
                 error_messages(&e).join(": ")
             ))
@@ -155,7 +155,8 @@ impl Client {
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build();
-        let runtime = runtime.map_err(|e| Failure::Passing(format!("cannot connect: {e}")))?;
+        let runtime =
+            runtime.map_err(|e| RequestFailure::Transient(format!("cannot connect: {e}")))?;
         Ok(Client {
             runtime,
             store,
@@ -171,11 +172,11 @@ impl Client {
         &self,
         key: &str,
         request: impl Future<Output = Result<T, Error>>,
-    ) -> Result<Option<T>, Failure> {
+    ) -> Result<Option<T>, RequestFailure> {
         let failures = || self.failures.lock().unwrap_or_else(PoisonError::into_inner);
         let unanswered = |what: String| {
             failures().failed.insert(key.to_owned(), what.clone());
-            Failure::Passing(what)
+            RequestFailure::Transient(what)
         };
         if failures().silent >= SILENT_REQUESTS {
             return Err(unanswered(format!(
@@ -222,13 +223,13 @@ impl Client {
             .map(str::to_owned)
             .or(status.map(|s| format!("status {s}")))
             .unwrap_or_default();
-        let refused = |what: String| RequestError::Refused(Failure::Lasting(what));
+        let refused = |what: String| RequestError::Refused(RequestFailure::Permanent(what));
         match (error, status) {
             _ if code == Some("NoSuchBucket") => refused(format!(
                 "there is no bucket `{bucket}` at {endpoint}: create it, or name another"
             )),
             (Error::NotFound { .. }, _) | (_, Some("404")) => RequestError::Missing,
-            (Error::Precondition { .. }, _) => RequestError::Refused(Failure::Passing(
+            (Error::Precondition { .. }, _) => RequestError::Refused(RequestFailure::Transient(
                 "was replaced while it was read; the next run will read it".to_owned(),
             )),
             (Error::PermissionDenied { .. } | Error::Unauthenticated { .. }, _)
@@ -257,8 +258,8 @@ impl Client {
         }
     }
 
-    fn key(key: &str) -> Result<Key, Failure> {
-        Key::parse(key).map_err(|e| Failure::Lasting(format!("no key of an object: {e}")))
+    fn key(key: &str) -> Result<Key, RequestFailure> {
+        Key::parse(key).map_err(|e| RequestFailure::Permanent(format!("no key of an object: {e}")))
     }
 
     pub fn failed(&self, key: &str) -> Option<String> {
@@ -271,7 +272,7 @@ impl Client {
     }
 
     /// Lists the objects whose keys begin with a prefix.
-    pub fn list(&self, prefix: &str) -> Result<BTreeMap<String, ObjectInfo>, Failure> {
+    pub fn list(&self, prefix: &str) -> Result<BTreeMap<String, ObjectInfo>, RequestFailure> {
         let (mut found, mut page_token) = (BTreeMap::new(), None);
         loop {
             let options = PaginatedListOptions {
@@ -288,7 +289,7 @@ impl Client {
                     "there is no bucket `{}` at {}: create it, or name another",
                     self.bucket, self.endpoint
                 );
-                return Err(Failure::Lasting(what));
+                return Err(RequestFailure::Permanent(what));
             };
             found.extend(
                 page.result
@@ -318,18 +319,23 @@ impl Client {
             .cloned()
     }
 
-    pub fn about(&self, key: &str) -> Result<Option<ObjectInfo>, Failure> {
+    pub fn about(&self, key: &str) -> Result<Option<ObjectInfo>, RequestFailure> {
         let path = Self::key(key)?;
         Ok(self.ask(key, self.store.head(&path))?.as_ref().map(about))
     }
 
-    pub fn get(&self, key: &str) -> Result<Option<Bytes>, Failure> {
+    pub fn get(&self, key: &str) -> Result<Option<Bytes>, RequestFailure> {
         let path = Self::key(key)?;
         self.ask(key, async { self.store.get(&path).await?.bytes().await })
     }
 
     /// Reads a range of an object whose content has this tag.
-    pub fn range(&self, key: &str, range: Range<u64>, tag: Option<&str>) -> Result<Bytes, Failure> {
+    pub fn range(
+        &self,
+        key: &str,
+        range: Range<u64>,
+        tag: Option<&str>,
+    ) -> Result<Bytes, RequestFailure> {
         let path = Self::key(key)?;
         let expected = range.end - range.start;
         let options = GetOptions {
@@ -341,25 +347,27 @@ impl Client {
             self.store.get_opts(&path, options).await?.bytes().await
         })?;
         let gone = || {
-            Failure::Passing("vanished while it was read; the next run will report it".to_owned())
+            RequestFailure::Transient(
+                "vanished while it was read; the next run will report it".to_owned(),
+            )
         };
         let bytes = bytes.ok_or_else(gone)?;
         if bytes.len() as u64 == expected {
             return Ok(bytes);
         }
-        Err(Failure::Passing(format!(
+        Err(RequestFailure::Transient(format!(
             "gave {} bytes where {expected} were asked for",
             bytes.len()
         )))
     }
 
-    pub fn put(&self, key: &str, bytes: Vec<u8>) -> Result<(), Failure> {
+    pub fn put(&self, key: &str, bytes: Vec<u8>) -> Result<(), RequestFailure> {
         let path = Self::key(key)?;
         self.written(self.ask(key, self.store.put(&path, bytes.into()))?)
             .map(|_| ())
     }
 
-    pub fn remove(&self, key: &str) -> Result<(), Failure> {
+    pub fn remove(&self, key: &str) -> Result<(), RequestFailure> {
         let path = Self::key(key)?;
         self.ask(key, self.store.delete(&path)).map(|_| ())
     }
@@ -369,8 +377,8 @@ impl Client {
         &self,
         key: &str,
         first: Vec<u8>,
-        next: &mut dyn FnMut() -> Result<Vec<u8>, Failure>,
-    ) -> Result<(), Failure> {
+        next: &mut dyn FnMut() -> Result<Vec<u8>, RequestFailure>,
+    ) -> Result<(), RequestFailure> {
         let path = Self::key(key)?;
         let upload = self.ask(key, self.store.put_multipart(&path))?;
         let mut upload = self.written(upload)?;
@@ -386,9 +394,9 @@ impl Client {
         &self,
         key: &str,
         first: Vec<u8>,
-        next: &mut dyn FnMut() -> Result<Vec<u8>, Failure>,
+        next: &mut dyn FnMut() -> Result<Vec<u8>, RequestFailure>,
         upload: &mut dyn MultipartUpload,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), RequestFailure> {
         let mut part = first;
         while !part.is_empty() {
             self.written(self.ask(key, upload.put_part(part.into()))?)?;
@@ -398,21 +406,21 @@ impl Client {
     }
 
     /// Result of a write: the answer `not found` means that the bucket is missing.
-    fn written<T>(&self, answer: Option<T>) -> Result<T, Failure> {
+    fn written<T>(&self, answer: Option<T>) -> Result<T, RequestFailure> {
         let what = || {
             format!(
                 "there is no bucket `{}` at {}: create it, or name another",
                 self.bucket, self.endpoint
             )
         };
-        answer.ok_or_else(|| Failure::Lasting(what()))
+        answer.ok_or_else(|| RequestFailure::Permanent(what()))
     }
 }
 
 /// Kind of a failed request.
 enum RequestError {
     Missing,
-    Refused(Failure),
+    Refused(RequestFailure),
     /// No answer, or none that could be parsed.
     Nothing(String),
 }

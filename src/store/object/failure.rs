@@ -4,34 +4,34 @@ use std::path::Path;
 
 use crate::error::Error;
 
-/// Failure of a request, and whether to try again.
+/// RequestFailure of a request, and whether to try again.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Failure {
-    /// Another try may succeed: no answer, or the object was replaced meanwhile.
-    Passing(String),
-    /// Another try will fail as well: no such bucket, no right to it, or no credentials.
-    Lasting(String),
+pub enum RequestFailure {
+    /// A retry may succeed: no answer, or the object was replaced meanwhile.
+    Transient(String),
+    /// A retry fails too: no such bucket, no permission, or no credentials.
+    Permanent(String),
 }
 
-impl std::fmt::Display for Failure {
+impl std::fmt::Display for RequestFailure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let (Failure::Passing(what) | Failure::Lasting(what)) = self;
+        let (RequestFailure::Transient(what) | RequestFailure::Permanent(what)) = self;
         f.write_str(what)
     }
 }
 
-impl std::error::Error for Failure {}
+impl std::error::Error for RequestFailure {}
 
-impl Failure {
+impl RequestFailure {
     /// Converts to the error that stops a run.
     #[must_use]
     pub fn at(self, place: &Path) -> Error {
         match self {
-            Failure::Passing(what) => Error::Unavailable {
+            RequestFailure::Transient(what) => Error::Unavailable {
                 place: place.to_owned(),
                 what,
             },
-            Failure::Lasting(what) => Error::Archive {
+            RequestFailure::Permanent(what) => Error::Archive {
                 place: place.to_owned(),
                 what,
             },

@@ -22,7 +22,7 @@ use crate::error::Result;
 use address::{Address, SCHEME, at};
 
 pub use address::is_object;
-pub use failure::{Failure, ObjectInfo};
+pub use failure::{ObjectInfo, RequestFailure};
 pub use reader::Reader;
 
 /// Memory for copying an object to or from a file, bytes.
@@ -32,7 +32,7 @@ const PART: usize = 16 << 20;
 ///
 /// # Errors
 /// The fault of the path, or that this program was built without object stores.
-pub fn check(path: &Path) -> Result<(), Failure> {
+pub fn check(path: &Path) -> Result<(), RequestFailure> {
     Address::parse(path)?;
     client::available()
 }
@@ -42,7 +42,7 @@ pub fn check(path: &Path) -> Result<(), Failure> {
 ///
 /// # Errors
 /// They cannot be listed.
-pub fn list(path: &Path) -> Result<BTreeMap<PathBuf, ObjectInfo>, Failure> {
+pub fn list(path: &Path) -> Result<BTreeMap<PathBuf, ObjectInfo>, RequestFailure> {
     let address = Address::parse(path)?;
     let listed = address.client()?.list(&address.key)?;
     Ok(listed
@@ -60,7 +60,7 @@ pub fn list(path: &Path) -> Result<BTreeMap<PathBuf, ObjectInfo>, Failure> {
 ///
 /// # Errors
 /// The path is no object's.
-pub fn remember(path: &Path, about: &ObjectInfo) -> Result<(), Failure> {
+pub fn remember(path: &Path, about: &ObjectInfo) -> Result<(), RequestFailure> {
     let (client, key) = at(path)?;
     client.remember(key, about.clone());
     Ok(())
@@ -70,7 +70,7 @@ pub fn remember(path: &Path, about: &ObjectInfo) -> Result<(), Failure> {
 ///
 /// # Errors
 /// The request fails.
-pub fn about(path: &Path) -> Result<Option<ObjectInfo>, Failure> {
+pub fn about(path: &Path) -> Result<Option<ObjectInfo>, RequestFailure> {
     let (client, key) = at(path)?;
     client.about(&key)
 }
@@ -79,7 +79,7 @@ pub fn about(path: &Path) -> Result<Option<ObjectInfo>, Failure> {
 ///
 /// # Errors
 /// The request fails.
-pub fn listed(path: &Path) -> Result<Option<ObjectInfo>, Failure> {
+pub fn listed(path: &Path) -> Result<Option<ObjectInfo>, RequestFailure> {
     let (client, key) = at(path)?;
     match client.listed(&key) {
         Some(about) if about.tag.is_some() => Ok(Some(about)),
@@ -98,7 +98,7 @@ pub fn failed(path: &Path) -> Option<String> {
 ///
 /// # Errors
 /// It cannot be read.
-pub fn get(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
+pub fn get(path: &Path) -> Result<Option<Vec<u8>>, RequestFailure> {
     let (client, key) = at(path)?;
     Ok(client.get(&key)?.map(|bytes| bytes.to_vec()))
 }
@@ -107,7 +107,7 @@ pub fn get(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
 ///
 /// # Errors
 /// It cannot be written.
-pub fn put(path: &Path, bytes: Vec<u8>) -> Result<(), Failure> {
+pub fn put(path: &Path, bytes: Vec<u8>) -> Result<(), RequestFailure> {
     let (client, key) = at(path)?;
     client.put(&key, bytes)
 }
@@ -116,7 +116,7 @@ pub fn put(path: &Path, bytes: Vec<u8>) -> Result<(), Failure> {
 ///
 /// # Errors
 /// It cannot be removed.
-pub fn remove(path: &Path) -> Result<(), Failure> {
+pub fn remove(path: &Path) -> Result<(), RequestFailure> {
     let (client, key) = at(path)?;
     client.remove(&key)
 }
@@ -125,10 +125,11 @@ pub fn remove(path: &Path) -> Result<(), Failure> {
 ///
 /// # Errors
 /// The file cannot be read or the object not written.
-pub fn send(file: &Path, path: &Path) -> Result<(), Failure> {
+pub fn send(file: &Path, path: &Path) -> Result<(), RequestFailure> {
     let (client, key) = at(path)?;
-    let unreadable =
-        |e: std::io::Error| Failure::Passing(format!("{} cannot be read: {e}", file.display()));
+    let unreadable = |e: std::io::Error| {
+        RequestFailure::Transient(format!("{} cannot be read: {e}", file.display()))
+    };
     let mut from = std::fs::File::open(file).map_err(unreadable)?;
     let mut part = || {
         let mut bytes = Vec::new();
@@ -150,16 +151,16 @@ pub fn send(file: &Path, path: &Path) -> Result<(), Failure> {
 ///
 /// # Errors
 /// It cannot be read or written out.
-pub fn fetch(path: &Path, out: &mut impl Write) -> Result<bool, Failure> {
+pub fn fetch(path: &Path, out: &mut impl Write) -> Result<bool, RequestFailure> {
     let Some(mut reader) = Reader::of(path)? else {
         return Ok(false);
     };
     // A full disk must not look like damage of the object.
     std::io::copy(&mut reader, out)
         .and_then(|_| out.flush())
-        .map_err(|e| match e.downcast::<Failure>() {
+        .map_err(|e| match e.downcast::<RequestFailure>() {
             Ok(failure) => failure,
-            Err(e) => Failure::Passing(format!("cannot be copied: {e}")),
+            Err(e) => RequestFailure::Transient(format!("cannot be copied: {e}")),
         })?;
     Ok(true)
 }
@@ -188,7 +189,7 @@ mod tests {
         ] {
             let failure = parsed(wrong).unwrap_err();
             assert!(
-                matches!(&failure, Failure::Lasting(what) if what.contains("s3://bucket/prefix")),
+                matches!(&failure, RequestFailure::Permanent(what) if what.contains("s3://bucket/prefix")),
                 "{wrong}: {failure}"
             );
         }

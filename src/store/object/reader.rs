@@ -11,7 +11,7 @@ use parquet::file::reader::{ChunkReader, Length};
 
 use super::address::at;
 use super::client::Client;
-use super::failure::{Failure, ObjectInfo};
+use super::failure::{ObjectInfo, RequestFailure};
 
 /// Longest read-ahead of a request, bytes: the latency of a request equals the transfer of some
 /// hundred kilobytes.
@@ -37,7 +37,7 @@ struct Source {
 
 impl Reader {
     /// Opens an object; `None` if there is no such object.
-    pub(super) fn of(path: &Path) -> Result<Option<Reader>, Failure> {
+    pub(super) fn of(path: &Path) -> Result<Option<Reader>, RequestFailure> {
         let (client, key) = at(path)?;
         let Some(about) = client.about(&key)? else {
             return Ok(None);
@@ -60,9 +60,10 @@ impl Reader {
     ///
     /// # Errors
     /// It cannot be read.
-    pub fn open(path: &Path) -> Result<Reader, Failure> {
-        Reader::of(path)?
-            .ok_or_else(|| Failure::Passing("there is no such object (any more)".to_owned()))
+    pub fn open(path: &Path) -> Result<Reader, RequestFailure> {
+        Reader::of(path)?.ok_or_else(|| {
+            RequestFailure::Transient("there is no such object (any more)".to_owned())
+        })
     }
 
     /// Size and tag of the object.
@@ -93,7 +94,7 @@ impl Reader {
 
 impl Source {
     /// Reads at least `least` bytes from `start`; none beyond the end.
-    fn bytes(&self, start: u64, least: u64) -> Result<Bytes, Failure> {
+    fn bytes(&self, start: u64, least: u64) -> Result<Bytes, RequestFailure> {
         let end = start.saturating_add(least).min(self.about.bytes);
         let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
         let (from, bytes) = &*held;

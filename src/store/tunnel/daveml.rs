@@ -1,6 +1,6 @@
-//! DAVE-ML (ANSI/AIAA S-119) read as a tunnel database: the functions of the wanted variables over
-//! gridded tables or points, with their breakpoints, units and additive normal uncertainties. In a
-//! gridded table the last of its breakpoints varies fastest.
+//! DAVE-ML (ANSI/AIAA S-119) read as a tunnel database. It reads the functions of the wanted
+//! variables over gridded tables or points, with breakpoints, units and additive normal
+//! uncertainties. In a gridded table the last of its breakpoints varies fastest.
 
 use std::collections::BTreeMap;
 

@@ -1,5 +1,5 @@
-//! Bounds of an XML text, checked before it is parsed: the parser's time grows with the square of an element's
-//! attributes, and entities multiply the text.
+//! Bounds of an XML text, checked before it is parsed. The parser's time grows with the square of
+//! an element's attributes, and entities multiply the text.
 
 /// Largest file, bytes: a hundred times a simulator's aerodynamic model.
 const LARGEST: usize = 1 << 25;

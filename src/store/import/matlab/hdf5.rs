@@ -1,8 +1,9 @@
 //! Variables of an HDF5 file: MATLAB 7.3, and the recordings of other programs.
 //!
-//! MATLAB writes a dataset for each array, with its class as the attribute `MATLAB_class` and with the
-//! sizes in reverse order, and a group for each struct. A cell array refers to datasets of the group
-//! `#refs#`. Other programs write datasets and groups alike, and a unit as an attribute of its dataset.
+//! MATLAB writes a dataset for each array, with its class as the attribute `MATLAB_class` and the
+//! sizes in reverse order. It writes a group for each struct. A cell array refers to datasets of
+//! the group `#refs#`. Other programs write datasets and groups alike, and a unit as an attribute
+//! of its dataset.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -29,8 +30,8 @@ const UNITS: [&str; 4] = ["unit", "units", "Unit", "Units"];
 /// reach.
 const LARGEST_RATIO: usize = 1100;
 
-/// Largest number of datasets and groups of a file, each counted as often as others refer to it:
-/// references may form a tree whose branches are all one dataset.
+/// Largest number of datasets and groups of a file, each counted once per reference. References may
+/// form a tree whose branches are all one dataset.
 const MOST_MEMBERS: usize = 100_000;
 
 type Result<T> = std::result::Result<T, String>;

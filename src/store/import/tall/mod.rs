@@ -1,5 +1,5 @@
-//! Tall Parquet (time, name, value) converted to one column per name: by import, or by ingest
-//! beside its records, which then reads it like any flight.
+//! Tall Parquet (time, name, value) converted to one column per name: by import, or by ingest.
+//! Ingest keeps the result beside its records and reads it like any flight.
 //!
 //! Names whose times are mostly those of the name with the most values form one part; missing
 //! values are empty. The other names form further parts, one for each set of times: files with

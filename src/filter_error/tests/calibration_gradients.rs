@@ -3,22 +3,22 @@
 use nalgebra::DVector;
 
 use super::*;
-use crate::filter_error::misread::Recorded;
+use crate::filter_error::calibration_gradients::Recorded;
 use crate::filter_error::pass::RecordedPass;
 use crate::filter_error::response::FilterResponse;
 use crate::flight::signal;
-use crate::output_error::calibration_errors::Misreading;
+use crate::output_error::calibration_errors::SignalError;
 use crate::output_error::kernel::normal_equations::NormalSums;
 
 /// Errors so small that the direct change is linear in them.
-fn errors(surface: &str) -> Vec<Misreading<'_>> {
-    let scale = |signal, scale| Misreading {
+fn errors(surface: &str) -> Vec<SignalError<'_>> {
+    let scale = |signal, scale| SignalError {
         signal,
         scale,
         bias: 0.0,
         delay_s: 0.0,
     };
-    let bias = |signal, bias| Misreading {
+    let bias = |signal, bias| SignalError {
         signal,
         scale: 0.0,
         bias,
@@ -34,7 +34,7 @@ fn errors(surface: &str) -> Vec<Misreading<'_>> {
         bias(signal::THETA, 0.1),
         bias(signal::AY, 0.001),
         scale(surface, 1e-3),
-        Misreading::late(surface, 1e-3),
+        SignalError::delay(surface, 1e-3),
     ]
 }
 
@@ -43,9 +43,9 @@ fn shift_by_pass<const NX: usize, E: InGusts<NX>>(
     filter: &Filter<NX, E>,
     at: &[f64],
     model: &Model,
-    error: &Misreading,
+    error: &SignalError,
 ) -> DVector<f64> {
-    let gains = filter.gains(at).unwrap();
+    let gains = filter.gains_with_slopes(at).unwrap();
     let mut pass = RecordedPass::new(filter.samples(), filter.lanes());
     let mut exact = FilterResponse::empty(filter.samples(), filter.parameters());
     filter.run(at, &gains, &mut exact, Some(&mut pass)).unwrap();
@@ -56,12 +56,12 @@ fn shift_by_pass<const NX: usize, E: InGusts<NX>>(
             values[o] += error.scale * values[o] + error.bias;
         }
     }
-    let (own, misread) = (window(), error.of_window(&window()));
+    let (without_error, in_error) = (window(), error.apply_to(&window()));
     let held_start = Model {
         initial_state: InitialState::Measured,
         ..model.clone()
     };
-    let windows = [&own, &misread];
+    let windows = [&without_error, &in_error];
     let case = filter
         .case
         .as_recorded(&aircraft(), windows, measured, &held_start);

@@ -1,5 +1,5 @@
-//! Build-up of the six coefficients: derivatives, sensor biases estimated with them, and sums that the
-//! wind tunnel tabulates instead of their parts.
+//! Aerodynamic model: build-up of the six coefficients from derivatives, sensor biases estimated with
+//! them, and sums that the wind tunnel tabulates instead of their parts.
 
 use serde::{Deserialize, Serialize};
 
@@ -35,15 +35,15 @@ pub struct Combined {
     pub slope: String,
 }
 
-/// The aerodynamic model of one aircraft.
+/// Aerodynamic model of one aircraft, as in `model.yaml`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Buildup {
+pub struct AeroModel {
     pub derivatives: Vec<Derivative>,
     pub biases: Vec<Bias>,
     pub combined: Vec<Combined>,
 }
 
-impl Buildup {
+impl AeroModel {
     #[must_use]
     pub fn derivative(&self, name: &str) -> Option<&Derivative> {
         self.derivatives.iter().find(|d| d.name == name)
@@ -57,7 +57,7 @@ impl Buildup {
     }
 
     /// Derivatives along the rate of the angle of attack.
-    pub fn lags(&self) -> impl Iterator<Item = &Derivative> {
+    pub fn along_alpha_rate(&self) -> impl Iterator<Item = &Derivative> {
         let derivatives = self.derivatives.iter();
         derivatives.filter(|d| d.regressor.has_alpha_rate())
     }
@@ -65,7 +65,7 @@ impl Buildup {
     /// Sentence on what a derivative along `alpha_dot` can mean; `None` without one.
     #[must_use]
     pub fn lag_warning(&self) -> Option<String> {
-        let names: Vec<&str> = self.lags().map(|d| d.name.as_str()).collect();
+        let names: Vec<&str> = self.along_alpha_rate().map(|d| d.name.as_str()).collect();
         (!names.is_empty()).then(|| {
             format!(
                 "{}: a constant along `alpha_dot` stands for a lag of the flow and is right for slow motion alone; flight shows the sum \

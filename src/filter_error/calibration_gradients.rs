@@ -1,9 +1,9 @@
 //! Changes of the gradient by errors of the instruments, to first order in the errors.
 //!
-//! An instrument in error changes the recorded inputs and outputs. At the same parameters and the
-//! same gain, let f and y be the changes of the rates and of the computed outputs at a sample, both
-//! at the filter's own corrected state, and z the change of the measured outputs. The change s of
-//! the predicted state and the change v of the innovations then obey
+//! An instrument in error changes the recorded inputs and outputs. Let f be the change of the
+//! rates, y of the computed outputs and z of the measured outputs, at one sample. f and y are taken
+//! at the filter's corrected state, with unchanged parameters and gain. The change s of the
+//! predicted state and the change v of the innovations then obey
 //!
 //! ```text
 //! v(k) = z(k) − y(k) − C s(k)
@@ -28,17 +28,17 @@ use super::gains::{Pattern, PatternGain};
 use super::pass::{RecordedPass, RecordedStep};
 use super::response::FilterResponse;
 use crate::aircraft::Aircraft;
-use crate::dynamics::motion::Window;
+use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
 use crate::numerics::matrix::AlignedMatrix;
-use crate::output_error::calibration_errors::Misreading;
+use crate::output_error::calibration_errors::SignalError;
 use crate::output_error::{Case, Diverged, InitialState, Measurements, Model};
 
 /// Maneuver as its instruments recorded it.
 #[derive(Clone, Copy, Debug)]
 pub struct Recorded<'a> {
     pub aircraft: &'a Aircraft,
-    pub window: &'a Window,
+    pub window: &'a ManeuverSignals,
     pub model: &'a Model<'a>,
 }
 
@@ -52,9 +52,9 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         &self,
         parameters: &[f64],
         recorded: &Recorded,
-        errors: &[Misreading],
+        errors: &[SignalError],
     ) -> Result<Vec<DVector<f64>>, Diverged> {
-        let gains = self.gains(parameters)?;
+        let gains = self.gains_with_slopes(parameters)?;
         let mut pass = RecordedPass::new(self.samples(), self.lanes());
         let mut response = FilterResponse::empty(self.samples(), self.parameters());
         self.run(parameters, &gains, &mut response, Some(&mut pass))?;
@@ -64,45 +64,48 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         let exact = evaluate(&samples.exact, &pass.steps);
         let mut changes = AlignedMatrix::zeros(errors.len(), OUTPUTS * self.samples());
         for (error, changes) in errors.iter().zip(changes.rows_mut()) {
-            let inputs = evaluate(&samples.misread(recorded, error), &pass.steps);
-            Arch::new().dispatch(LinearRun::<NX, E, _> {
+            let inputs = evaluate(&samples.case_with_error(recorded, error), &pass.steps);
+            Arch::new().dispatch(ErrorPropagation::<NX, E, _> {
                 steps: &pass.steps,
                 gains: &gains,
                 patterns: self.patterns(),
                 decay: self.noise(parameters).decay(self.case.step_s),
                 half_step_s: 0.5 * self.case.step_s,
                 inputs: [&exact, &inputs],
-                measured: misread_outputs::<NX, E>(&self.case.measurements, error),
+                measured: output_errors::<NX, E>(&self.case.measurements, error),
                 changes,
                 equations: std::marker::PhantomData,
             });
         }
         let lanes = changes.product(&pass.rows);
         if lanes.values().iter().all(|change| change.is_finite()) {
-            Ok(lanes.rows().map(|lanes| self.own_lanes(lanes)).collect())
+            Ok(lanes
+                .rows()
+                .map(|lanes| self.values_in_lanes(lanes))
+                .collect())
         } else {
             Err(Diverged { sample: 0 })
         }
     }
 
     /// Values of the filter's own parameters, from values in lanes.
-    fn own_lanes(&self, lanes: &[f64]) -> DVector<f64> {
+    fn values_in_lanes(&self, lanes: &[f64]) -> DVector<f64> {
         let values = (0..self.first_noise()).map(|j| lanes[self.lane(j)]);
         DVector::from_iterator(self.first_noise(), values)
     }
 }
 
 /// Changes of the measured outputs by an error.
-fn misread_outputs<'a, const NX: usize, E: Equations<NX>>(
+fn output_errors<'a, const NX: usize, E: Equations<NX>>(
     measurements: &'a Measurements,
-    error: &Misreading,
+    error: &SignalError,
 ) -> impl Fn(usize) -> [f64; OUTPUTS] + use<'a, NX, E> {
     let outputs = E::AXIS.outputs();
-    let own = outputs.iter().position(|o| o.signal() == error.signal);
+    let in_error = outputs.iter().position(|o| o.signal() == error.signal);
     let (scale, bias) = (error.scale, error.bias);
     move |sample| {
         let mut change = [0.0; OUTPUTS];
-        if let Some(o) = own {
+        if let Some(o) = in_error {
             change[o] = scale * measurements.values[sample][o] + bias;
         }
         change
@@ -117,7 +120,7 @@ struct SampleValues<const NX: usize> {
 
 /// Equations of a maneuver at its samples, with all derivatives held at their values.
 struct SampleEquations<'a, const NX: usize, E: Equations<NX>> {
-    window: Window,
+    window: ManeuverSignals,
     model: Model<'a>,
     /// Maneuver as recorded.
     exact: Case<NX, E>,
@@ -143,13 +146,13 @@ impl<'a, const NX: usize, E: Equations<NX>> SampleEquations<'a, NX, E> {
     }
 
     /// Maneuver as an instrument in error would have recorded it.
-    fn misread(&self, recorded: &Recorded, error: &Misreading) -> Case<NX, E> {
+    fn case_with_error(&self, recorded: &Recorded, error: &SignalError) -> Case<NX, E> {
         let window = if error.delay_s == 0.0 {
-            error.of_window(&self.window)
+            error.apply_to(&self.window)
         } else {
             // A delay needs the slope of the signal, and that the points between samples.
-            let late = error.of_window(recorded.window);
-            self.window.with_samples_of(error.signal, &late)
+            let delayed = error.apply_to(recorded.window);
+            self.window.with_samples_of(error.signal, &delayed)
         };
         let windows = [&self.window, &window];
         let nothing = Measurements::default();
@@ -194,7 +197,7 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Evaluation<'_, NX, E> {
 }
 
 /// Linear response of a filter to one error.
-struct LinearRun<'a, const NX: usize, E: InGusts<NX>, M: Fn(usize) -> [f64; OUTPUTS]> {
+struct ErrorPropagation<'a, const NX: usize, E: InGusts<NX>, M: Fn(usize) -> [f64; OUTPUTS]> {
     steps: &'a [RecordedStep<NX>],
     gains: &'a [PatternGain<NX>],
     /// Patterns, and the pattern of each sample.
@@ -210,24 +213,26 @@ struct LinearRun<'a, const NX: usize, E: InGusts<NX>, M: Fn(usize) -> [f64; OUTP
     equations: std::marker::PhantomData<E>,
 }
 
-impl<const NX: usize, E: InGusts<NX>, M: Fn(usize) -> [f64; OUTPUTS]> LinearRun<'_, NX, E, M> {
+impl<const NX: usize, E: InGusts<NX>, M: Fn(usize) -> [f64; OUTPUTS]>
+    ErrorPropagation<'_, NX, E, M>
+{
     /// Changes of rates and outputs at a sample.
     #[inline(always)]
     fn input_changes(&self, k: usize) -> ([f64; NX], [f64; OUTPUTS]) {
-        let [exact, misread] = self.inputs.map(|values| &values[k]);
+        let [exact, in_error] = self.inputs.map(|values| &values[k]);
         let (mut rates, mut outputs) = ([0.0; NX], [0.0; OUTPUTS]);
         for i in 0..NX {
-            rates[i] = misread.rates[i] - exact.rates[i];
+            rates[i] = in_error.rates[i] - exact.rates[i];
         }
         for o in 0..OUTPUTS {
-            outputs[o] = misread.outputs[o] - exact.outputs[o];
+            outputs[o] = in_error.outputs[o] - exact.outputs[o];
         }
         (rates, outputs)
     }
 }
 
 impl<const NX: usize, E: InGusts<NX>, M: Fn(usize) -> [f64; OUTPUTS]> WithSimd
-    for LinearRun<'_, NX, E, M>
+    for ErrorPropagation<'_, NX, E, M>
 {
     type Output = ();
 

@@ -8,17 +8,18 @@ use nalgebra::SMatrix;
 use pulp::{Simd, WithSimd};
 
 use super::gains::{
-    ParameterSlope, Pattern, PatternGain, gains, steady_variance_slopes, steady_variances,
+    ParameterSlope, Pattern, PatternGain, gains_of_patterns, steady_variance_slopes,
+    steady_variances,
 };
 use super::input_noise::InputNoise;
 use super::linearised::{Discrete, DiscreteSystem, Linearised};
 use super::noise::{Noise, NoiseParameter};
-use super::riccati::{NoisySystem, States, SteadyFilter};
+use super::riccati::{NoisySystem, StateMatrix, SteadyFilter};
 use crate::dynamics::{InGusts, OUTPUTS};
 use crate::numerics::small::product;
 
 /// Computation of the gains, compiled for the processor at hand.
-pub(super) struct GainsAt<'a, const NX: usize, E: InGusts<NX>> {
+pub(super) struct GainComputation<'a, const NX: usize, E: InGusts<NX>> {
     pub linearised: &'a Linearised<NX>,
     pub input_noise: &'a InputNoise<NX>,
     pub patterns: &'a [Pattern],
@@ -34,7 +35,7 @@ pub(super) struct GainsAt<'a, const NX: usize, E: InGusts<NX>> {
     pub equations: PhantomData<E>,
 }
 
-impl<const NX: usize, E: InGusts<NX>> WithSimd for GainsAt<'_, NX, E> {
+impl<const NX: usize, E: InGusts<NX>> WithSimd for GainComputation<'_, NX, E> {
     type Output = Option<Vec<PatternGain<NX>>>;
 
     #[inline(always)]
@@ -53,13 +54,13 @@ impl<const NX: usize, E: InGusts<NX>> WithSimd for GainsAt<'_, NX, E> {
         } else {
             Vec::new()
         };
-        let is_still = self.noise.is_still() && self.input_noise.is_zero();
-        let filter = if is_still {
-            SteadyFilter::still(system)
+        let has_no_noise = self.noise.has_no_gusts() && self.input_noise.is_zero();
+        let filter = if has_no_noise {
+            SteadyFilter::without_process_noise(system)
         } else {
             SteadyFilter::solve_system(system)?
         };
-        gains(
+        gains_of_patterns(
             &filter,
             &self.noise,
             &slopes,
@@ -69,10 +70,14 @@ impl<const NX: usize, E: InGusts<NX>> WithSimd for GainsAt<'_, NX, E> {
     }
 }
 
-impl<const NX: usize, E: InGusts<NX>> GainsAt<'_, NX, E> {
+impl<const NX: usize, E: InGusts<NX>> GainComputation<'_, NX, E> {
     /// Slopes of the system along all parameters.
     #[inline(always)]
-    fn slopes(&self, discrete: &DiscreteSystem<NX>, decay: &States<NX>) -> Vec<ParameterSlope<NX>> {
+    fn slopes(
+        &self,
+        discrete: &DiscreteSystem<NX>,
+        decay: &StateMatrix<NX>,
+    ) -> Vec<ParameterSlope<NX>> {
         let of_inputs = self.input_noise.covariance_slopes(self.derivatives);
         let mut slopes = Vec::with_capacity(self.derivatives.len() + self.noise_parameters.len());
         for (parameter, (slope, q)) in discrete.slopes().iter().zip(of_inputs).enumerate() {
@@ -104,21 +109,21 @@ impl<const NX: usize, E: InGusts<NX>> GainsAt<'_, NX, E> {
 }
 
 /// Matrix T by which the rotary gusts of the state decay in a step.
-fn decay_matrix<const NX: usize, E: InGusts<NX>>(decay: f64) -> States<NX> {
-    let mut t = States::identity();
-    for &(rate, felt) in E::FELT_RATES {
-        t[(felt, felt)] = decay;
-        t[(felt, rate)] = 1.0 - decay;
+fn decay_matrix<const NX: usize, E: InGusts<NX>>(decay: f64) -> StateMatrix<NX> {
+    let mut t = StateMatrix::identity();
+    for &(rate, relative) in E::AIR_RELATIVE_RATES {
+        t[(relative, relative)] = decay;
+        t[(relative, rate)] = 1.0 - decay;
     }
     t
 }
 
 /// Slope of T along a parameter, from the slope of the decay.
-fn decay_matrix_slope<const NX: usize, E: InGusts<NX>>(slope: f64) -> States<NX> {
-    let mut t = States::zeros();
-    for &(rate, felt) in E::FELT_RATES {
-        t[(felt, felt)] = slope;
-        t[(felt, rate)] = -slope;
+fn decay_matrix_slope<const NX: usize, E: InGusts<NX>>(slope: f64) -> StateMatrix<NX> {
+    let mut t = StateMatrix::zeros();
+    for &(rate, relative) in E::AIR_RELATIVE_RATES {
+        t[(relative, relative)] = slope;
+        t[(relative, rate)] = -slope;
     }
     t
 }
@@ -127,8 +132,8 @@ fn decay_matrix_slope<const NX: usize, E: InGusts<NX>>(slope: f64) -> States<NX>
 #[inline(always)]
 fn derivative_slope<const NX: usize>(
     slope: &Discrete<NX>,
-    q: States<NX>,
-    decay: &States<NX>,
+    q: StateMatrix<NX>,
+    decay: &StateMatrix<NX>,
 ) -> NoisySystem<NX> {
     NoisySystem {
         a: product(&slope.step, decay),

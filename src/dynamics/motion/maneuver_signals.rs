@@ -1,4 +1,4 @@
-//! Window of a record: its signals at the samples and halfway between them.
+//! Signals of a maneuver, cut out of a record: values at the samples and halfway between them.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -38,10 +38,10 @@ const MASS_PROPERTIES: &[&str] = &[
 /// Angular rates, whose slopes are the angular accelerations.
 const RATES: [&str; 3] = [signal::P, signal::Q, signal::R];
 
-/// Signals of a window of a record at samples and half-samples.
+/// Signals of a maneuver at samples and half-samples.
 #[derive(Clone, Debug)]
-pub struct Window {
-    /// Values at the points by signal. Windows that differ in few signals share the others.
+pub struct ManeuverSignals {
+    /// Values at the points by signal. Copies that differ in few signals share the others.
     points: BTreeMap<String, Arc<Vec<f64>>>,
     sensors: Sensors,
     /// α and β at the c.g. at every point, rad. Inverting the vanes is the most expensive part of a
@@ -49,11 +49,11 @@ pub struct Window {
     flow: Arc<Vec<[f64; 2]>>,
     pub step_s: f64,
     pub samples: usize,
-    /// Two, or one in a window without the points between samples.
+    /// Two, or one without the points between samples.
     points_per_sample: usize,
 }
 
-impl Window {
+impl ManeuverSignals {
     /// Cuts `range` out of the record: the named signals besides those the equations need.
     ///
     /// # Errors
@@ -64,7 +64,7 @@ impl Window {
         range: Range<usize>,
         surfaces: impl IntoIterator<Item = &'a str>,
         mass_properties: MassProperties,
-    ) -> Result<Window, String> {
+    ) -> Result<ManeuverSignals, String> {
         let mut points = BTreeMap::new();
         for name in signal::REQUIRED.iter().copied().chain(surfaces) {
             let values = checked_values(record, name, &range)?;
@@ -82,7 +82,7 @@ impl Window {
             let slope = slope(values, &range, record.step_s);
             points.insert(slope_name(name), Arc::new(with_half_samples(&slope)));
         }
-        let mut window = Window {
+        let mut signals = ManeuverSignals {
             points,
             sensors: aircraft.sensors.clone(),
             flow: Arc::default(),
@@ -90,8 +90,8 @@ impl Window {
             samples: range.len(),
             points_per_sample: 2,
         };
-        window.flow = Arc::new(window.flow_at_cg());
-        Ok(window)
+        signals.flow = Arc::new(signals.flow_at_cg());
+        Ok(signals)
     }
 
     /// α and β at the c.g. at every point, from the vanes.
@@ -118,30 +118,30 @@ impl Window {
         (per_sample * self.samples).saturating_sub(per_sample - 1)
     }
 
-    /// Returns true if a point is a sample.
+    /// `true` if a point is a sample.
     #[must_use]
     pub fn is_sample(&self, point: usize) -> bool {
         point.is_multiple_of(self.points_per_sample)
     }
 
-    /// Window with the samples of a signal from another window of the maneuver.
+    /// Signals with the samples of a signal from other signals of the maneuver.
     #[must_use]
-    pub fn with_samples_of(&self, name: &str, other: &Window) -> Window {
-        let mut window = self.clone();
+    pub fn with_samples_of(&self, name: &str, other: &ManeuverSignals) -> ManeuverSignals {
+        let mut signals = self.clone();
         if let Some(points) = other.points.get(name) {
             let stride = other.points_per_sample / self.points_per_sample;
-            window.set(name, points.iter().step_by(stride).copied().collect());
+            signals.set(name, points.iter().step_by(stride).copied().collect());
         }
-        window
+        signals
     }
 
-    /// Window without the points between samples, for equations at the samples alone.
+    /// Signals without the points between samples, for equations at the samples alone.
     #[must_use]
-    pub fn at_samples(&self) -> Window {
+    pub fn at_samples(&self) -> ManeuverSignals {
         let stride = self.points_per_sample;
         let every = |points: &Vec<f64>| points.iter().step_by(stride).copied().collect();
         let points = self.points.iter();
-        Window {
+        ManeuverSignals {
             points: points
                 .map(|(name, points)| (name.clone(), Arc::new(every(points))))
                 .collect(),
@@ -157,9 +157,9 @@ impl Window {
         self.samples == 0
     }
 
-    /// Returns true if all signals of the motion are those of another window: only surfaces differ.
+    /// `true` if all signals of the motion are those of the other: only surfaces differ.
     #[must_use]
-    pub fn shares_motion_with(&self, other: &Window) -> bool {
+    pub fn shares_motion_with(&self, other: &ManeuverSignals) -> bool {
         let slopes = RATES.map(slope_name);
         let slopes = slopes.iter().map(String::as_str);
         let is_same = |name: &str| match (self.points.get(name), other.points.get(name)) {
@@ -187,25 +187,25 @@ impl Window {
             .collect()
     }
 
-    /// Window as a sensor in error would have recorded it: a signal's values times `1 + scale`,
+    /// Signals as a sensor in error would have recorded it: a signal's values times `1 + scale`,
     /// plus `bias`.
     #[must_use]
-    pub fn misread(&self, name: &str, scale: f64, bias: f64) -> Window {
-        let mut window = self.clone();
+    pub fn with_error(&self, name: &str, scale: f64, bias: f64) -> ManeuverSignals {
+        let mut signals = self.clone();
         for (name, bias) in [(name, bias), (slope_name(name).as_str(), 0.0)] {
             if let Some(points) = self.points.get(name) {
-                let misread = points.iter().map(|value| value + (scale * value + bias));
-                window.set(name, misread.collect());
+                let in_error = points.iter().map(|value| value + (scale * value + bias));
+                signals.set(name, in_error.collect());
             }
         }
-        window
+        signals
     }
 
-    /// Window as a recorder would have recorded it with a signal late by `delay_s`, to first order in
+    /// Signals as a recorder would have recorded it with a signal late by `delay_s`, to first order in
     /// the delay.
     #[must_use]
-    pub fn late(&self, name: &str, delay_s: f64) -> Window {
-        let mut window = self.clone();
+    pub fn delayed(&self, name: &str, delay_s: f64) -> ManeuverSignals {
+        let mut signals = self.clone();
         if let Some(points) = self.points.get(name) {
             // Time between the points on either side of a point.
             let between_s = 2.0 * self.step_s / self.points_per_sample as f64;
@@ -215,42 +215,42 @@ impl Window {
                 let difference = points[(i + 1).min(last)] - points[i.saturating_sub(1)];
                 value - per_difference * difference
             };
-            window.set(name, points.iter().enumerate().map(value).collect());
+            signals.set(name, points.iter().enumerate().map(value).collect());
         }
-        window
+        signals
     }
 
-    /// Window with a further signal, given at the samples.
+    /// Signals with a further signal, given at the samples.
     #[must_use]
-    pub fn with_samples(&self, name: &str, values: &[f64]) -> Window {
-        let mut window = self.clone();
-        window.set(name, with_half_samples(values));
-        window
+    pub fn with_samples(&self, name: &str, values: &[f64]) -> ManeuverSignals {
+        let mut signals = self.clone();
+        signals.set(name, with_half_samples(values));
+        signals
     }
 
-    /// Window with all signals linear between samples, as other estimators take them.
+    /// Signals with all signals linear between samples, as other estimators take them.
     #[must_use]
-    pub fn linear_between_samples(&self) -> Window {
-        let mut window = self.clone();
-        for points in window.points.values_mut() {
+    pub fn linear_between_samples(&self) -> ManeuverSignals {
+        let mut signals = self.clone();
+        for points in signals.points.values_mut() {
             let points = Arc::make_mut(points);
             for middle in (1..points.len()).step_by(2) {
                 points[middle] = 0.5 * (points[middle - 1] + points[middle + 1]);
             }
         }
-        window.flow = Arc::new(window.flow_at_cg());
-        window
+        signals.flow = Arc::new(signals.flow_at_cg());
+        signals
     }
 
-    /// Window with a further, constant signal.
+    /// Signals with a further, constant signal.
     #[must_use]
-    pub fn with_constant(&self, name: &str, value: f64) -> Window {
-        let mut window = self.clone();
-        window.set(name, vec![value; self.len()]);
-        window
+    pub fn with_constant(&self, name: &str, value: f64) -> ManeuverSignals {
+        let mut signals = self.clone();
+        signals.set(name, vec![value; self.len()]);
+        signals
     }
 
-    /// Measured motion along the window.
+    /// Measured motion of the maneuver.
     #[must_use]
     pub fn motion<'a>(
         &'a self,
@@ -318,7 +318,7 @@ fn slope_name(name: &str) -> String {
     format!("slope of {name}")
 }
 
-/// Returns true if a value is missing. One pass over all values vectorises; a search does not.
+/// `true` if a value is missing. One pass over all values vectorises; a search does not.
 fn has_missing(values: &[f64]) -> bool {
     Arch::new().dispatch(|| {
         values
