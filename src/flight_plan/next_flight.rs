@@ -179,6 +179,7 @@ fn rehearse(
         config,
         simulator: &simulator,
         instruments: &instruments,
+        remaining_errors: &rehearsal::remaining_errors(&campaign.instruments),
         delays: &campaign.delays,
         limits: &cards.cards.next.limits,
     };

@@ -10,13 +10,14 @@ use crate::aero::WindTunnel;
 use crate::aero::wind_tunnel::TunnelPoint;
 use crate::config::Config;
 use crate::estimate::Estimated;
+use crate::flight::{RemainingError, RemainingErrors};
 use crate::lab::campaign::FlightLimits;
 use crate::lab::simulator::{Instrument, Instruments, Simulator};
 use crate::maneuver::Maneuver;
 use crate::numerics::order_statistics::median;
 use crate::pipeline::estimate_maneuver;
 use crate::surfaces::DelayCorrection;
-use crate::tables::{ChannelRow, EstimateRow, Outcome};
+use crate::tables::{ChannelRow, EstimateRow, InstrumentError, InstrumentRow, Outcome};
 
 /// A card as it will be flown.
 #[derive(Clone, Debug)]
@@ -32,6 +33,8 @@ pub struct RehearsalBasis<'a> {
     pub config: &'a Config,
     pub simulator: &'a Simulator,
     pub instruments: &'a Instruments,
+    /// Errors that remain in the signals of a flight.
+    pub remaining_errors: &'a BTreeMap<String, RemainingErrors>,
     pub delays: &'a [DelayCorrection],
     pub limits: &'a FlightLimits,
 }
@@ -52,7 +55,8 @@ impl RehearsalBasis<'_> {
             maneuver_id: format!("{} {}", card.flight_id, card.seed),
             ..flown.maneuver.clone()
         };
-        let record = flown.recorded(self.instruments, card.seed);
+        let mut record = flown.recorded(self.instruments, card.seed);
+        record.remaining_errors.clone_from(self.remaining_errors);
         let estimated = estimate_maneuver(self.config, &record, &maneuver, self.delays);
         let fit = &estimated.fit;
         if fit.outcome != Outcome::Converged || estimated.covariance.is_none() {
@@ -96,6 +100,29 @@ pub fn instruments(of_cards: &Instruments, channels: &[ChannelRow]) -> Instrumen
             .map(|(signal, noise)| (signal, instrument(noise)))
             .collect(),
     )
+}
+
+/// Errors that remain in the signals of a flight like those of the campaign: the median bound of each
+/// error that its flights determine.
+#[must_use]
+pub fn remaining_errors(rows: &[InstrumentRow]) -> BTreeMap<String, RemainingErrors> {
+    let mut rows_by_signal: BTreeMap<&str, Vec<&InstrumentRow>> = BTreeMap::new();
+    for row in rows {
+        rows_by_signal.entry(&row.signal).or_default().push(row);
+    }
+    let errors = rows_by_signal.into_iter().map(|(signal, rows)| {
+        let remaining = |error: InstrumentError| {
+            let bounds = rows.iter().filter_map(|row| row.error(error));
+            let bound = median(bounds.map(|(_, bound)| bound))?;
+            Some(RemainingError::Corrected { bound })
+        };
+        let errors = RemainingErrors {
+            bias: remaining(InstrumentError::Bias),
+            scale: remaining(InstrumentError::Scale),
+        };
+        (signal.to_owned(), errors)
+    });
+    errors.collect()
 }
 
 /// Standard deviation of a channel's samples: that of its noise, and at least that of its rounding, which
@@ -150,7 +177,7 @@ fn medians(name: &str, estimates: &[EstimateRow]) -> Vec<TunnelPoint> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tables::ChannelVerdict;
+    use crate::tables::{ChannelVerdict, InstrumentVerdict};
     use approx::assert_relative_eq;
 
     fn channel(noise: Option<f64>, quantisation: Option<f64>) -> ChannelRow {
@@ -184,5 +211,32 @@ mod tests {
         );
         assert_relative_eq!(noise(channel(Some(0.5), Some(0.6))), 0.5);
         assert_relative_eq!(noise(channel(Some(0.02), None)), 0.02);
+    }
+
+    #[test]
+    fn a_planned_flight_has_the_remaining_errors_of_the_flown_ones() {
+        let row = |bias_bound: Option<f64>| InstrumentRow {
+            flight_id: "f".to_owned(),
+            channel: "Q".to_owned(),
+            signal: "q_deg_s".to_owned(),
+            unit: "deg/s".to_owned(),
+            bias: bias_bound.map(|_| 0.5),
+            bias_bound,
+            scale: None,
+            scale_bound: None,
+            delay_s: None,
+            delay_bound_s: None,
+            applied: String::new(),
+            verdict: InstrumentVerdict::Ok,
+        };
+        let rows = [Some(0.01), Some(0.03), Some(0.02), None].map(row);
+        let expected = RemainingErrors {
+            bias: Some(RemainingError::Corrected { bound: 0.02 }),
+            scale: None,
+        };
+        assert_eq!(
+            remaining_errors(&rows),
+            [("q_deg_s".to_owned(), expected)].into()
+        );
     }
 }

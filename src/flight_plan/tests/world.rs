@@ -119,6 +119,8 @@ impl World {
             config,
             simulator: &simulator,
             instruments: &self.instruments,
+            // The records of these worlds are not reconstructed.
+            remaining_errors: &BTreeMap::new(),
             delays: &[],
             limits: &FlightLimits::default(),
         };
