@@ -10,7 +10,7 @@
 //!    and flags each sample with a [`flight::Mark`].
 //! 3. **Record.** A [`flight::Record`] holds the signals of a flight on one clock.
 //!    [`ingest::compatibility`] estimates the errors of its instruments; a [`flight::Correction`]
-//!    removes them.
+//!    removes them, and states what remains as [`flight::RemainingErrors`].
 //! 4. **Maneuver.** [`segment::maneuvers`] finds each [`maneuver::Maneuver`] in the record and its
 //!    [`maneuver::Class`]. The equations of motion give the delays of the surfaces, from all
 //!    maneuvers together.
@@ -29,6 +29,23 @@
 //!    posterior against the tunnel ([`tables::ComparisonRow`]).
 //! 8. **Report.** [`report::html`] makes the page of all results, [`pdf::pdf`] its PDF, and
 //!    [`night::run`] publishes both with the tables.
+//!
+//! # Parts of time
+//!
+//! | word | part |
+//! |---|---|
+//! | stretch | of a flight, on one clock |
+//! | piece | consecutive rows of one file |
+//! | run | rows that are consecutive samples |
+//! | spell | 16,384 samples for which a channel's character is estimated |
+//! | window | over which relations are checked or the motion is reconstructed |
+//! | block | short interval whose samples are averaged |
+//! | sequence | steps in close succession |
+//! | segment | of a sequence, between two cuts |
+//! | maneuver | a segment with lead-in (trimmed flight before it) and decay (response after it) |
+//! | chunk | points of a maneuver that the kernel computes at a time |
+//!
+//! # Order
 //!
 //! [`pipeline`] runs the stages over flights and maneuvers; [`cli`] is the command line.
 //!
