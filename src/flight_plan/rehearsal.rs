@@ -102,8 +102,8 @@ pub fn instruments(of_cards: &Instruments, channels: &[ChannelRow]) -> Instrumen
     )
 }
 
-/// Errors that remain in the signals of a flight like those of the campaign: the median bound of each
-/// error that its flights determine.
+/// Errors that remain in the signals of a flight like those of the campaign: the median bound and scatter
+/// of each error that its flights determine.
 #[must_use]
 pub fn remaining_errors(rows: &[InstrumentRow]) -> BTreeMap<String, RemainingErrors> {
     let mut rows_by_signal: BTreeMap<&str, Vec<&InstrumentRow>> = BTreeMap::new();
@@ -112,9 +112,13 @@ pub fn remaining_errors(rows: &[InstrumentRow]) -> BTreeMap<String, RemainingErr
     }
     let errors = rows_by_signal.into_iter().map(|(signal, rows)| {
         let remaining = |error: InstrumentError| {
-            let bounds = rows.iter().filter_map(|row| row.error(error));
-            let bound = median(bounds.map(|(_, bound)| bound))?;
-            Some(RemainingError::Corrected { bound })
+            let determined = rows.iter().filter(|row| row.error(error).is_some());
+            let bounds = determined.clone().filter_map(|row| row.error(error));
+            Some(RemainingError {
+                uncorrected: None,
+                bound: median(bounds.map(|(_, bound)| bound))?,
+                scatter: median(determined.map(|row| row.scatter(error)))?,
+            })
         };
         let errors = RemainingErrors {
             bias: remaining(InstrumentError::Bias),
@@ -222,8 +226,10 @@ mod tests {
             unit: "deg/s".to_owned(),
             bias: bias_bound.map(|_| 0.5),
             bias_bound,
+            bias_scatter: None,
             scale: None,
             scale_bound: None,
+            scale_scatter: None,
             delay_s: None,
             delay_bound_s: None,
             applied: String::new(),
@@ -231,7 +237,7 @@ mod tests {
         };
         let rows = [Some(0.01), Some(0.03), Some(0.02), None].map(row);
         let expected = RemainingErrors {
-            bias: Some(RemainingError::Corrected { bound: 0.02 }),
+            bias: Some(RemainingError::corrected(0.02)),
             scale: None,
         };
         assert_eq!(

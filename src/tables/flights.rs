@@ -151,10 +151,14 @@ table! {
         pub bias: Option<f64>,
         /// Standard deviation of the bias, in the column `unit`.
         pub bias_bound: Option<f64>,
+        /// Scatter of the bias within the flight beyond the noise, such as a drift, in the column `unit`.
+        pub bias_scatter: Option<f64>,
         /// Scale factor of the reading: 1 where right.
         pub scale: Option<f64> ["1"],
         /// Standard deviation of the scale factor.
         pub scale_bound: Option<f64> ["1"],
+        /// Scatter of the scale factor within the flight beyond the noise.
+        pub scale_scatter: Option<f64> ["1"],
         /// Delay against the other channels; negative: ahead of them.
         pub delay_s: Option<f64> ["s"],
         /// Standard deviation of the delay.
@@ -188,6 +192,17 @@ impl InstrumentRow {
             InstrumentError::Scale => self.scale.map(|scale| scale - 1.0).zip(self.scale_bound),
             InstrumentError::Delay => self.delay_s.zip(self.delay_bound_s),
         }
+    }
+
+    /// Scatter of an error within the flight; zero where it is not determined.
+    #[must_use]
+    pub fn scatter(&self, error: InstrumentError) -> f64 {
+        let scatter = match error {
+            InstrumentError::Bias => self.bias_scatter,
+            InstrumentError::Scale => self.scale_scatter,
+            InstrumentError::Delay => None,
+        };
+        scatter.unwrap_or(0.0)
     }
 
     /// Sets an error with its bound, the scale as a difference from one.

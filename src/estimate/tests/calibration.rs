@@ -65,11 +65,11 @@ fn an_error_that_the_flight_determines_replaces_the_stated_one() {
         row(&estimated, "Cm_de").bound_calibration.unwrap()
     };
     let by_calibration = part(None);
-    let by_flight = part(Some(RemainingError::Corrected { bound: 0.001 }));
+    let by_flight = part(Some(RemainingError::corrected(0.001)));
     assert_relative_eq!(by_flight, by_calibration / 5.0, max_relative = 1e-2);
-    let left = RemainingError::Uncorrected {
-        value: 0.0,
-        bound: 0.005,
+    let left = RemainingError {
+        uncorrected: Some(0.0),
+        ..RemainingError::corrected(0.005)
     };
     let by_both = part(Some(left));
     assert_relative_eq!(
@@ -90,7 +90,7 @@ fn a_bias_without_calibration_has_a_prior_where_the_flight_determines_it() {
         let estimated = bench.estimate(&record, &maneuver("m", 20.0));
         row(&estimated, "an_bias").bound.unwrap()
     };
-    let corrected = |bound| Some(RemainingError::Corrected { bound });
+    let corrected = |bound| Some(RemainingError::corrected(bound));
     let without = bound(None);
     assert!(without > 2e-4, "{without}");
     // The ordinary size is the prior, and the flight's own bound where it is wider.

@@ -31,6 +31,9 @@ pub struct ErrorBounds {
     /// Contribution of gusts and of the equations' own error, which no number of windows or flights
     /// averages out.
     pub systematic: Parameters,
+    /// Scatter of the errors between the windows beyond that of their noise: an error that is not
+    /// constant, such as a drift or a position error that varies with the flow.
+    pub scatter: Parameters,
     /// Share of the information on each parameter that comes from the data and not from the prior.
     pub data_shares: Parameters,
 }
@@ -47,11 +50,16 @@ impl JointState<'_> {
             systematic[j] += (MODEL_SCALE * ratio).powi(2);
         }
         self.add_gust_errors(&self.moves_by_errors(&inverse), &mut systematic);
-        let variance = |j: usize| inverse[(j, j)].max(jackknife[j]) + systematic[j];
+        // The variance of few windows is itself uncertain, so it is enlarged as Student's intervals are.
+        let windows = self.windows.len() as f64;
+        let widening = student::widening_95(windows - 1.0).powi(2);
+        let variance = |j: usize| inverse[(j, j)].max(widening * jackknife[j]) + systematic[j];
+        let scatter = |j: usize| windows * (jackknife[j] - inverse[(j, j)]).max(0.0);
         let total: Parameters = std::array::from_fn(variance);
         Some(ErrorBounds {
             total: total.map(f64::sqrt),
             systematic: systematic.map(f64::sqrt),
+            scatter: std::array::from_fn(|j| scatter(j).sqrt()),
             data_shares: std::array::from_fn(|j| self.data_share(&inverse, j)),
         })
     }
@@ -102,8 +110,6 @@ impl JointState<'_> {
     }
 
     /// Variances of the shared parameters from the scatter between windows: each left out in turn.
-    /// The variance of few windows is itself uncertain, so it is enlarged as Student's intervals
-    /// are.
     fn jackknife(&self) -> Parameters {
         let (information, gradient) = (self.evidence_information(), self.evidence_gradient());
         let steps_without: Vec<DVector<f64>> = self
@@ -115,11 +121,10 @@ impl JointState<'_> {
             })
             .collect();
         let count = steps_without.len() as f64;
-        let widening = student::widening_95(count - 1.0).powi(2);
         std::array::from_fn(|j| {
             let mean = steps_without.iter().map(|d| d[j]).sum::<f64>() / count.max(1.0);
             let scatter = steps_without.iter().map(|d| (d[j] - mean).powi(2));
-            widening * scatter.sum::<f64>() * (count - 1.0) / count.max(1.0)
+            scatter.sum::<f64>() * (count - 1.0) / count.max(1.0)
         })
     }
 }

@@ -52,6 +52,8 @@ pub struct ErrorEstimate {
     pub value: f64,
     /// Standard deviation.
     pub bound: f64,
+    /// Scatter of the error within the flight, no larger than an ordinary error.
+    pub scatter: f64,
     /// `true` if the error is many times its bound, and larger than any ordinary error.
     pub fault: bool,
     /// `true` if the error is as large as a fault but less certain: it is neither named nor
@@ -131,9 +133,11 @@ pub fn estimate(
     } else {
         settings.corrects(instrument_error(kind), value, bound) && !doubtful
     };
+    let ordinary = settings.ordinary.of(instrument, kind);
     Some(ErrorEstimate {
         value,
         bound,
+        scatter: errors.scatter[j].min(ordinary),
         fault,
         doubtful,
         at_limit,
@@ -184,6 +188,7 @@ pub mod tests {
             values: [0.0; PARAMETERS],
             bounds: [bound; PARAMETERS],
             systematic: [0.0; PARAMETERS],
+            scatter: [0.0; PARAMETERS],
             data_shares: [1.0; PARAMETERS],
             prior: [1.0; PARAMETERS],
             speed_ft_s: Some(170.0),

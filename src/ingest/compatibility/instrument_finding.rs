@@ -171,6 +171,7 @@ impl InstrumentFinding {
         let of = |kind: Kind| self.estimates[kind as usize];
         let value = |kind: Kind| of(kind).map(|e| e.value);
         let bound = |kind: Kind| of(kind).map(|e| e.bound);
+        let scatter = |kind: Kind| of(kind).map(|e| e.scatter);
         let applied: Vec<&str> = ALL_KINDS
             .into_iter()
             .filter(|k| of(*k).is_some_and(|e| e.applied))
@@ -192,8 +193,10 @@ impl InstrumentFinding {
             unit: self.unit().to_owned(),
             bias: value(Kind::Bias),
             bias_bound: bound(Kind::Bias),
+            bias_scatter: scatter(Kind::Bias),
             scale: value(Kind::Scale).map(|s| 1.0 + s),
             scale_bound: bound(Kind::Scale),
+            scale_scatter: scatter(Kind::Scale),
             delay_s: value(Kind::Delay),
             delay_bound_s: bound(Kind::Delay),
             applied: applied.join(" "),

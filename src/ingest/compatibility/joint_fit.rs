@@ -60,6 +60,8 @@ pub struct FittedErrors {
     pub bounds: Parameters,
     /// Part of the bounds that no number of windows or flights averages out.
     pub systematic: Parameters,
+    /// Scatter of the errors between the windows beyond that of their noise.
+    pub scatter: Parameters,
     /// Share of the information on each parameter that comes from the flight and not from the prior.
     pub data_shares: Parameters,
     /// Standard deviations of the prior, √P.
@@ -113,6 +115,7 @@ pub fn fit(
         values: posterior.values,
         bounds: bounds.total,
         systematic: bounds.systematic,
+        scatter: bounds.scatter,
         data_shares: bounds.data_shares,
         prior: state.prior,
         speed_ft_s: mean_speed_ft_s(windows),

@@ -34,11 +34,13 @@ fn remaining(
     settings: &Compatibility,
 ) -> Option<RemainingError> {
     let (value, bound) = row.error(error)?;
-    if row.is_applied(error) {
-        return Some(RemainingError::Corrected { bound });
-    }
+    let uncorrected = (!row.is_applied(error)).then_some(value);
     let is_chance = value.abs() <= settings.standard_errors * bound;
-    is_chance.then_some(RemainingError::Uncorrected { value, bound })
+    (uncorrected.is_none() || is_chance).then(|| RemainingError {
+        uncorrected,
+        bound,
+        scatter: row.scatter(error),
+    })
 }
 
 #[cfg(test)]
@@ -54,8 +56,10 @@ mod tests {
             unit: "deg/s".to_owned(),
             bias: Some(bias),
             bias_bound: Some(0.01),
+            bias_scatter: None,
             scale: None,
             scale_bound: None,
+            scale_scatter: None,
             delay_s: None,
             delay_bound_s: None,
             applied: applied.to_owned(),
@@ -71,11 +75,11 @@ mod tests {
             bias: Some(bias),
             scale: None,
         };
-        let corrected = RemainingError::Corrected { bound: 0.01 };
+        let corrected = RemainingError::corrected(0.01);
         assert_eq!(of(row(0.05, "bias")), Some((0.05, remaining(corrected))));
-        let small = RemainingError::Uncorrected {
-            value: 0.015,
-            bound: 0.01,
+        let small = RemainingError {
+            uncorrected: Some(0.015),
+            ..RemainingError::corrected(0.01)
         };
         assert_eq!(of(row(0.015, "")), Some((0.0, remaining(small))));
     }

@@ -21,8 +21,8 @@ settings! {
         /// it, `refuse` names it and refuses the flight.
         pub fault: OnFault = OnFault::Apply,
         /// Size from which an error is corrected, standard errors: chance exceeds the default once in
-        /// twenty errors. Larger: fewer corrections, and the errors that stay in the record are in no
-        /// bound.
+        /// twenty errors. Larger: fewer corrections, and the errors that stay in the record widen
+        /// `bound_corrected`.
         pub standard_errors: f64 = 2.0,
     }
     split expert {

@@ -776,6 +776,38 @@ fn a_scale_error_beyond_the_ordinary_is_named_and_corrected() {
 }
 
 #[test]
+fn the_scatter_of_a_bias_is_that_of_its_drift() {
+    const DRIFT_DEG_S: f64 = 0.12;
+    let exact = flight(185.0);
+    let scatter_of_roll_rate = |drift: f64| {
+        let mut record = recorded(&exact, &ordinary(61), 12);
+        let middle = 0.5 * record.samples as f64;
+        let series = record.signals.get_mut(s::P).unwrap();
+        for (k, value) in series.values.iter_mut().enumerate() {
+            *value += drift * (k as f64 / middle - 1.0);
+        }
+        let settings = Compatibility {
+            windows: 12,
+            ..settings()
+        };
+        let findings = examined(&record, &settings).0.into_iter();
+        let mut estimates = findings
+            .filter(|finding| finding.signal == s::P)
+            .filter_map(|finding| finding.estimates[Kind::Bias as usize]);
+        estimates.next().unwrap().scatter
+    };
+    let (steady, drifting) = (scatter_of_roll_rate(0.0), scatter_of_roll_rate(DRIFT_DEG_S));
+    // A line from −a to a has the root mean square a/√3. The noise of the outputs is that of the
+    // residuals, which contain a part of the drift, so the scatter is a little small.
+    let expected = DRIFT_DEG_S / 3.0_f64.sqrt();
+    assert!(steady < 0.15 * expected, "{steady}");
+    assert!(
+        (0.5 * expected..=1.2 * expected).contains(&drifting),
+        "{drifting}, {expected} expected"
+    );
+}
+
+#[test]
 fn an_error_as_large_as_a_fault_but_not_as_sure_is_not_corrected() {
     let exact = flight(65.0);
     let (vane, j) = (INPUTS, place(INPUTS, Kind::Scale));
@@ -932,6 +964,7 @@ fn marks_move_with_an_applied_correction() {
         Some(ErrorEstimate {
             value,
             bound: 0.0,
+            scatter: 0.0,
             fault: true,
             doubtful: false,
             at_limit: false,
