@@ -53,7 +53,7 @@ const VERSION: &str = concat!(
 );
 
 const AFTER: &str = "\
-Every stage first brings its predecessors up to date. Work that is up to date is not repeated, and a run that was killed
+Every stage first brings its predecessors up to date. Work that is up to date is not repeated, and a run that was killed \
 continues where it stopped. The results of a run are published at once, as a night; the last nights stay.
 
 Examples:
@@ -73,8 +73,8 @@ Examples:
   harvest lab simulate pipelines/harv/cards.yaml --out data/simulation/campaign
                                                  a campaign whose derivatives are known
 
-Archive and store may lie in an object store (s3://bucket/prefix) where harvest was built for it (cargo build --release
---features s3). Credentials and endpoint are read from the environment alone: AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY,
+Archive and store may lie in an object store (s3://bucket/prefix) where harvest was built for it (cargo build --release \
+--features s3). Credentials and endpoint are read from the environment alone: AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, \
 AWS_SESSION_TOKEN, AWS_REGION, AWS_ENDPOINT_URL; AWS_ALLOW_HTTP=true for an endpoint without encryption.
 
 Exit codes:
