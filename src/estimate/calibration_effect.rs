@@ -22,10 +22,7 @@ pub(super) fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
     prepared: &PreparedCase<NX, E>,
     fit: &mut Fit,
 ) {
-    if fit.covariance_corrected.is_none() {
-        return;
-    }
-    if task.has_exact_signals() {
+    if fit.covariance_corrected.is_none() || task.has_exact_signals() {
         return;
     }
     let errors = signal_errors(&[task], &prepared.window);

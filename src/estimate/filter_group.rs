@@ -287,14 +287,15 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
             covariance_corrected: Some(bounds.corrected(&self.joint(slope_fit), scored)),
             shared_errors: vec![],
         };
-        self.add_held(slope_fit, &mut fit);
+        self.add_held_and_slopes(slope_fit, &mut fit);
         self.add_calibration(slope_fit, &mut fit);
         fit
     }
 
-    /// Adds the effect of the tunnel's errors on the estimates, and that of the derivatives' change
-    /// over the angles of attack of the maneuvers. Both are common to all maneuvers.
-    fn add_held(&self, slope_fit: &SlopeFit<NG, G>, fit: &mut Fit<Vec<Response>>) {
+    /// Moves the estimates by what the slopes still change in them, and adds the effects of the tunnel's
+    /// errors and of the derivatives' change over α to the covariances. Both are common to all
+    /// maneuvers.
+    fn add_held_and_slopes(&self, slope_fit: &SlopeFit<NG, G>, fit: &mut Fit<Vec<Response>>) {
         let Some(first) = self.members.first() else {
             return;
         };

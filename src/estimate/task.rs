@@ -70,7 +70,7 @@ impl<'a> Task<'a> {
         self.class.status(name, self.maneuver.alpha_deg)
     }
 
-    /// True for the constant of a coefficient.
+    /// `true` for the constant of a coefficient.
     pub(super) fn is_constant(&self, name: &str) -> bool {
         self.context
             .aero_model
@@ -146,14 +146,14 @@ impl<'a> Task<'a> {
         accelerations.find(|output| needs && self.is_absent(*output))
     }
 
-    /// Returns true if the regressor of a derivative follows from recorded signals.
+    /// `true` if the regressor of a derivative follows from recorded signals.
     fn has_regressor(&self, derivative: &Derivative) -> bool {
         let mut signals = derivative.regressor.signals();
         self.absent_of_regressor(derivative).is_none()
             && signals.all(|signal| self.record.signals.contains_key(signal))
     }
 
-    /// Returns true for an output that is not recorded: the record has a stand-in for it.
+    /// `true` for an output that is not recorded: the record has a stand-in for it.
     pub(super) fn is_absent(&self, output: Output) -> bool {
         self.record.is_assumed(output.signal())
     }

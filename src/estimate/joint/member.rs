@@ -37,13 +37,13 @@ impl<'a, const NX: usize, E: Equations<NX>> Member<'a, NX, E> {
         })
     }
 
-    /// Returns true if filter error is to estimate the maneuver.
+    /// `true` if filter error is to estimate the maneuver.
     pub fn needs_filter(&self) -> bool {
         let method = self.task.context.settings.method;
         needs_filter(method, &self.prepared.case.measurements, &self.alone)
     }
 
-    /// Returns true if the residuals of output error show no motion of the air.
+    /// `true` if the residuals of output error show no motion of the air.
     pub fn is_white(&self) -> bool {
         is_white(&self.prepared.case.measurements, &self.alone)
     }
@@ -86,7 +86,7 @@ impl Fitted {
     }
 }
 
-/// Returns true for a derivative that each maneuver keeps to itself.
+/// `true` for a derivative that each maneuver keeps to itself.
 pub fn is_unshared(task: &Task, name: &str) -> bool {
     let joint = task.context.settings.joint.as_ref();
     let share_constants = joint.is_some_and(|settings| settings.share_constants);
