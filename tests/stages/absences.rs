@@ -94,8 +94,9 @@ fn an_acceleration_that_is_not_recorded_costs_its_derivatives_only() {
             let apart = (number(own, "value") - number(with_all, "value")).abs();
             let bound = number(own, "bound_corrected");
             assert!(apart < 2.0 * bound, "{channel}: {own:?} {with_all:?}");
+            // The part of the instruments is estimated with and without the channel, and varies.
             assert!(
-                bound > 0.9 * number(with_all, "bound_corrected"),
+                number(own, "bound") > 0.9 * number(with_all, "bound"),
                 "{own:?} {with_all:?}"
             );
         }
