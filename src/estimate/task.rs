@@ -40,7 +40,9 @@ impl<'a> Task<'a> {
 
     /// `true` if no signal has a stated or found error, and no surface a delay.
     pub(super) fn has_exact_signals(&self) -> bool {
-        self.error_sizes().next().is_none() && self.context.delays.is_empty()
+        self.context.settings.calibration.is_empty()
+            && self.record.remaining_errors.is_empty()
+            && self.context.delays.is_empty()
     }
 
     /// Errors of one signal, as [`Self::error_sizes`] has them; zero for a signal that counts as

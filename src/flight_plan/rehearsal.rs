@@ -220,20 +220,9 @@ mod tests {
     #[test]
     fn a_planned_flight_has_the_remaining_errors_of_the_flown_ones() {
         let row = |bias_bound: Option<f64>| InstrumentRow {
-            flight_id: "f".to_owned(),
-            channel: "Q".to_owned(),
-            signal: "q_deg_s".to_owned(),
-            unit: "deg/s".to_owned(),
             bias: bias_bound.map(|_| 0.5),
             bias_bound,
-            bias_scatter: None,
-            scale: None,
-            scale_bound: None,
-            scale_scatter: None,
-            delay_s: None,
-            delay_bound_s: None,
-            applied: String::new(),
-            verdict: InstrumentVerdict::Ok,
+            ..InstrumentRow::undetermined("f", "Q", "q_deg_s", "deg/s", InstrumentVerdict::Ok)
         };
         let rows = [Some(0.01), Some(0.03), Some(0.02), None].map(row);
         let expected = RemainingErrors {

@@ -120,20 +120,18 @@ mod tests {
 
     fn row(flight: usize, scale: Option<f64>, applied: &str) -> InstrumentRow {
         InstrumentRow {
-            flight_id: format!("f{flight}"),
-            channel: "Q".to_owned(),
-            signal: "q_deg_s".to_owned(),
-            unit: "deg/s".to_owned(),
             bias: Some(0.04),
             bias_bound: Some(0.002),
-            bias_scatter: None,
             scale: scale.map(|scale| 1.0 + scale),
             scale_bound: scale.map(|_| 0.001),
-            scale_scatter: None,
-            delay_s: None,
-            delay_bound_s: None,
             applied: applied.to_owned(),
-            verdict: InstrumentVerdict::Ok,
+            ..InstrumentRow::undetermined(
+                &format!("f{flight}"),
+                "Q",
+                "q_deg_s",
+                "deg/s",
+                InstrumentVerdict::Ok,
+            )
         }
     }
 

@@ -167,21 +167,12 @@ fn row(
         InstrumentVerdict::NotExcited
     };
     let told = delay.is_determined();
+    let unit = Unit::of_signal(&delay.surface).name;
     Some(InstrumentRow {
-        flight_id: flight_id.to_owned(),
-        channel: channel.clone(),
-        signal: delay.surface.clone(),
-        unit: Unit::of_signal(&delay.surface).name.to_owned(),
-        bias: None,
-        bias_bound: None,
-        bias_scatter: None,
-        scale: None,
-        scale_bound: None,
-        scale_scatter: None,
         delay_s: told.then_some(delay.delay_s),
         delay_bound_s: told.then_some(delay.bound_s),
         applied: if is_shifted { "delay" } else { "" }.to_owned(),
-        verdict,
+        ..InstrumentRow::undetermined(flight_id, channel, &delay.surface, unit, verdict)
     })
 }
 

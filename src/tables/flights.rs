@@ -184,6 +184,33 @@ words! {
 }
 
 impl InstrumentRow {
+    /// Row of an instrument whose flight determines none of its errors.
+    #[must_use]
+    pub fn undetermined(
+        flight_id: &str,
+        channel: &str,
+        signal: &str,
+        unit: &str,
+        verdict: InstrumentVerdict,
+    ) -> InstrumentRow {
+        InstrumentRow {
+            flight_id: flight_id.to_owned(),
+            channel: channel.to_owned(),
+            signal: signal.to_owned(),
+            unit: unit.to_owned(),
+            bias: None,
+            bias_bound: None,
+            bias_scatter: None,
+            scale: None,
+            scale_bound: None,
+            scale_scatter: None,
+            delay_s: None,
+            delay_bound_s: None,
+            applied: String::new(),
+            verdict,
+        }
+    }
+
     /// An error with its bound, the scale as a difference from one; `None` where it is not determined.
     #[must_use]
     pub fn error(&self, error: InstrumentError) -> Option<(f64, f64)> {

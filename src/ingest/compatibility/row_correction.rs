@@ -50,20 +50,10 @@ mod tests {
 
     fn row(bias: f64, applied: &str) -> InstrumentRow {
         InstrumentRow {
-            flight_id: "f".to_owned(),
-            channel: "Q".to_owned(),
-            signal: "q_deg_s".to_owned(),
-            unit: "deg/s".to_owned(),
             bias: Some(bias),
             bias_bound: Some(0.01),
-            bias_scatter: None,
-            scale: None,
-            scale_bound: None,
-            scale_scatter: None,
-            delay_s: None,
-            delay_bound_s: None,
             applied: applied.to_owned(),
-            verdict: InstrumentVerdict::Ok,
+            ..InstrumentRow::undetermined("f", "Q", "q_deg_s", "deg/s", InstrumentVerdict::Ok)
         }
     }
 

@@ -134,20 +134,15 @@ mod tests {
 
     fn row(flight: usize, scale: f64) -> InstrumentRow {
         InstrumentRow {
-            flight_id: format!("f{flight}"),
-            channel: "Q".into(),
-            signal: "q_deg_s".into(),
-            unit: "deg/s".into(),
-            bias: None,
-            bias_bound: None,
-            bias_scatter: None,
             scale: Some(scale),
             scale_bound: Some(0.001),
-            scale_scatter: None,
-            delay_s: None,
-            delay_bound_s: None,
-            applied: String::new(),
-            verdict: InstrumentVerdict::Ok,
+            ..InstrumentRow::undetermined(
+                &format!("f{flight}"),
+                "Q",
+                "q_deg_s",
+                "deg/s",
+                InstrumentVerdict::Ok,
+            )
         }
     }
 
