@@ -4,22 +4,22 @@ use std::collections::BTreeMap;
 
 use nalgebra::DMatrix;
 
-use super::air_motion::{Air, Filtered, needs_filter};
+use super::assessment::credibility::{Credibility, ExplainedMotion};
+use super::assessment::diagnostics::Diagnostics;
+use super::assessment::second_opinion::add_second_opinion;
 use super::calibration_effect::add_calibration_errors;
 use super::context::Context;
-use super::credibility::{Credibility, ExplainedMotion};
-use super::diagnostics::Diagnostics;
 use super::estimated::{Covariance, Estimated};
-use super::filter_minimum::NoMinimum;
 use super::fitting::{StartingPoints, fit_output_error};
-use super::held_by_evidence::{choose_held, undetermined_without_tunnel};
-use super::maneuver_class::class_of_maneuver;
+use super::holding::held_by_evidence::{choose_held, undetermined_without_tunnel};
+use super::holding::maneuver_class::class_of_maneuver;
+use super::moving_air::air_motion::{Air, Filtered, needs_filter};
+use super::moving_air::filter_minimum::NoMinimum;
+use super::moving_air::whiteness::{is_white, lag_one, largest_correlation};
 use super::prepared_case::PreparedCase;
 use super::rows::RowMaker;
-use super::second_opinion::add_second_opinion;
 use super::settings::Hold;
 use super::task::{Task, values_by_name};
-use super::whiteness::{is_white, lag_one, largest_correlation};
 use crate::aero::Axis;
 use crate::dynamics::{
     Equations, InGusts, Lateral, LateralInGusts, Longitudinal, LongitudinalInGusts,

@@ -2,14 +2,14 @@
 
 use super::member::{Fitted, Member, is_unshared, mean_of_own_estimates};
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
-use crate::estimate::air_motion::Air;
-use crate::estimate::filter_group::{FilterStart, Group, SlopeFit};
-use crate::estimate::filter_minimum::NoMinimum;
-use crate::estimate::group_member::GroupMember;
-use crate::estimate::gust_size::{gust_ft_s, rotary_gust_deg_s};
-use crate::estimate::maneuver_filter::least_deviations;
+use crate::estimate::moving_air::air_motion::Air;
+use crate::estimate::moving_air::filter_group::{FilterStart, Group, SlopeFit};
+use crate::estimate::moving_air::filter_minimum::NoMinimum;
+use crate::estimate::moving_air::group_member::GroupMember;
+use crate::estimate::moving_air::gust_size::{gust_ft_s, rotary_gust_deg_s};
+use crate::estimate::moving_air::maneuver_filter::least_deviations;
+use crate::estimate::moving_air::whiteness::{lag_one, largest_correlation};
 use crate::estimate::task::Task;
-use crate::estimate::whiteness::{lag_one, largest_correlation};
 use crate::filter_error::noise::Noise;
 use crate::output_error::sharing::SharedParameters;
 use crate::output_error::{Case, Fit, Outcome, Response};

@@ -5,8 +5,8 @@ use nalgebra::DVector;
 use super::member::{Fitted, Member, is_unshared, mean_of_own_estimates};
 use crate::dynamics::Equations;
 use crate::estimate::calibration_effect::{NOT_COUNTED, gradient_shifts, signal_errors};
+use crate::estimate::moving_air::whiteness::{lag_one, largest_correlation};
 use crate::estimate::task::{Task, values_by_name};
-use crate::estimate::whiteness::{lag_one, largest_correlation};
 use crate::output_error::consider::{self, Considered};
 use crate::output_error::sharing::{add_vector, values_at};
 use crate::output_error::{

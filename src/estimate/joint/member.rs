@@ -3,13 +3,13 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::dynamics::Equations;
-use crate::estimate::air_motion::needs_filter;
 use crate::estimate::estimated::{Covariance, Estimated};
 use crate::estimate::fitting::{StartingPoints, fit_output_error};
+use crate::estimate::moving_air::air_motion::needs_filter;
+use crate::estimate::moving_air::whiteness::is_white;
 use crate::estimate::prepared_case::PreparedCase;
 use crate::estimate::rows::RowMaker;
 use crate::estimate::task::Task;
-use crate::estimate::whiteness::is_white;
 use crate::maneuver::Status;
 use crate::output_error::{Fit, estimation, mean};
 use crate::tables::{EstimateRow, StartingValues};

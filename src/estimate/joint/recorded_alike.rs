@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 
 use crate::aero::Output;
-use crate::estimate::absent_outputs::class_of_recorded_outputs;
 use crate::estimate::context::Context;
+use crate::estimate::holding::absent_outputs::class_of_recorded_outputs;
 use crate::estimate::task::Task;
 use crate::flight::Record;
 use crate::maneuver::{Class, Maneuver};

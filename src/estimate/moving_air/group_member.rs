@@ -2,13 +2,13 @@
 
 use nalgebra::DVector;
 
-use super::alpha_slopes::AlphaSlopes;
-use super::fitting::start_from_tunnel;
-use super::held_slopes::HeldSlopes;
 use super::maneuver_filter::{bias_uncertainties, least_deviations, new_filter, noisy_inputs};
-use super::prepared_case::{PreparedCase, all_free};
-use super::task::{Task, values_by_name};
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
+use crate::estimate::fitting::start_from_tunnel;
+use crate::estimate::prepared_case::{PreparedCase, all_free};
+use crate::estimate::slopes::alpha_slopes::AlphaSlopes;
+use crate::estimate::slopes::held_slopes::HeldSlopes;
+use crate::estimate::task::{Task, values_by_name};
 use crate::filter_error::bounds::WidePass;
 use crate::filter_error::calibration_gradients::Recorded;
 use crate::filter_error::filter::Filter;
@@ -16,7 +16,7 @@ use crate::output_error::calibration_errors::SignalError;
 use crate::output_error::{Case, Diverged, Model, equation_error};
 
 /// Maneuver of a group.
-pub(super) struct GroupMember<'g, 'a, const NX: usize, E: Equations<NX>> {
+pub(in crate::estimate) struct GroupMember<'g, 'a, const NX: usize, E: Equations<NX>> {
     pub task: Task<'a>,
     pub prepared: &'g PreparedCase<'a, NX, E>,
     /// Slopes over α that act in the maneuver.

@@ -2,11 +2,11 @@
 
 use nalgebra::DMatrix;
 
-use super::estimated::Estimated;
-use super::task::Task;
 use crate::aero::{Derivative, Regressor};
 use crate::dynamics::Equations;
 use crate::dynamics::motion::ManeuverSignals;
+use crate::estimate::estimated::Estimated;
+use crate::estimate::task::Task;
 use crate::flight::signal;
 use crate::maneuver::Status;
 use crate::output_error::identifiability::{Collinearity, collinearity, correlation, excitation};
@@ -23,7 +23,7 @@ struct RegressorHistory<'a> {
 }
 
 /// A fit whose diagnostics are to be made.
-pub(super) struct Diagnostics<'d, 'm, const NX: usize, E: Equations<NX>> {
+pub(in crate::estimate) struct Diagnostics<'d, 'm, const NX: usize, E: Equations<NX>> {
     pub task: &'d Task<'m>,
     pub case: &'d Case<NX, E>,
     pub window: &'d ManeuverSignals,

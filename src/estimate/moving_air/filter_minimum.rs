@@ -7,7 +7,7 @@ use crate::filter_error::bounds::FilterBounds;
 use crate::filter_error::scoring::Scored;
 
 /// Minimum of a filter's cost with its bounds.
-pub(super) struct Minimum {
+pub(in crate::estimate) struct Minimum {
     pub scored: Scored,
     pub bounds: FilterBounds,
 }
@@ -25,7 +25,7 @@ impl Minimum {
 }
 
 /// Reason why a start leads to no estimates by filter error.
-pub(super) enum NoMinimum {
+pub(in crate::estimate) enum NoMinimum {
     /// The state leaves its bounds, or the filter has no finite gain.
     Diverges,
     /// The iteration ends at this point, before a minimum.

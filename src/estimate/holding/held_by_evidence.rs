@@ -9,11 +9,11 @@
 
 use std::collections::BTreeMap;
 
-use super::fitting::{StartingPoints, fit_output_error};
-use super::task::Task;
 use crate::aero::{Derivative, Regressor};
 use crate::dynamics::Equations;
 use crate::dynamics::motion::ManeuverSignals;
+use crate::estimate::fitting::{StartingPoints, fit_output_error};
+use crate::estimate::task::Task;
 use crate::maneuver::{Class, Status};
 use crate::numerics::digits::rounded;
 use crate::output_error::coloured::ResidualNoise;
@@ -23,7 +23,7 @@ use crate::output_error::{Case, Fit, Model, Outcome};
 
 /// Derivatives that a maneuver holds, with the reasons in words.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct HeldChoice {
+pub(in crate::estimate) struct HeldChoice {
     pub reasons: BTreeMap<String, String>,
 }
 
@@ -291,7 +291,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
 ///
 /// # Errors
 /// The reason why the maneuver is rejected, as in its estimation.
-pub(super) fn choose_held<const NX: usize, E: Equations<NX>>(
+pub(in crate::estimate) fn choose_held<const NX: usize, E: Equations<NX>>(
     task: &Task,
 ) -> Result<HeldChoice, String> {
     Choosing::<NX, E>::new(task)?.choose()
@@ -311,7 +311,7 @@ fn tunnel_uncertainty(task: &Task, name: &str) -> Option<f64> {
 
 /// Names the undetermined derivatives of a fit that have no tunnel value to be held at; empty
 /// without any.
-pub(super) fn undetermined_without_tunnel<const NX: usize, E: Equations<NX>>(
+pub(in crate::estimate) fn undetermined_without_tunnel<const NX: usize, E: Equations<NX>>(
     task: &Task,
     case: &Case<NX, E>,
     fit: &Fit,

@@ -17,11 +17,11 @@
 //! standard uncertainty of a derivative's change per degree. Filter error estimates the slopes
 //! ([`filter_error::slopes`](crate::filter_error::slopes)).
 
-use super::task::Task;
 use super::tunnel_change::{AlphaRange, TunnelChange};
 use crate::aero::{Coefficient, Derivative, Regressor};
 use crate::dynamics::Equations;
 use crate::dynamics::motion::ManeuverSignals;
+use crate::estimate::task::Task;
 use crate::filter_error::bounds::WidePass;
 use crate::filter_error::slopes::SlopePrior;
 use crate::numerics::mean::mean;
@@ -30,7 +30,7 @@ use crate::units::DEG;
 
 /// Slopes over α that act in a maneuver, with its window.
 #[derive(Clone)]
-pub(super) struct AlphaSlopes {
+pub(in crate::estimate) struct AlphaSlopes {
     pub slopes: Vec<AlphaSlope>,
     /// Derivatives along α and constants, one pair per coefficient, that take the slopes' lines.
     lines: Vec<[Derivative; 2]>,
@@ -40,7 +40,7 @@ pub(super) struct AlphaSlopes {
 
 /// Slope of a coefficient or derivative.
 #[derive(Clone)]
-pub(super) struct AlphaSlope {
+pub(in crate::estimate) struct AlphaSlope {
     /// Derivative along the change less its line, which is a signal of the window.
     pub term: Derivative,
     pub prior: SlopePrior,

@@ -9,7 +9,7 @@ use crate::filter_error::slopes::{SlopeEffect, SlopePrior};
 /// Slopes of the derivatives over α, and the values at which a fit holds them. Slopes of one name are
 /// common to the maneuvers.
 #[derive(Clone)]
-pub(super) struct HeldSlopes {
+pub(in crate::estimate) struct HeldSlopes {
     names: Vec<String>,
     values: Vec<f64>,
     priors: Vec<SlopePrior>,

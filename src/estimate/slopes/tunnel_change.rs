@@ -1,7 +1,7 @@
 //! Change of the wind tunnel's derivatives over the angles of attack that a maneuver sweeps.
 
-use super::task::Task;
 use crate::aero::{Condition, Derivative, Regressor};
+use crate::estimate::task::Task;
 use crate::numerics::cubic_curve::CubicCurve;
 use crate::numerics::mean::mean;
 use crate::numerics::trapezoid::running_integral;

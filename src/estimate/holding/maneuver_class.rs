@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::absent_outputs::class_of_recorded_outputs;
 use super::resting_surfaces::class_of_moving_surfaces;
-use super::task::Task;
+use crate::estimate::task::Task;
 use crate::maneuver::Class;
 
 /// Reason why a derivative that the class estimates is inactive in a maneuver.
@@ -12,7 +12,7 @@ const RESTS: &str = "its surface rests";
 
 /// The class without the derivatives of resting surfaces and without those that need an absent
 /// output, and the reason for each derivative left out.
-pub(super) fn class_of_maneuver(task: &Task) -> (Class, BTreeMap<String, String>) {
+pub(in crate::estimate) fn class_of_maneuver(task: &Task) -> (Class, BTreeMap<String, String>) {
     let (class, mut reasons) = class_of_recorded_outputs(task);
     let seen = Task {
         class: &class,

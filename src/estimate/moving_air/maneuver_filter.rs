@@ -1,17 +1,22 @@
 //! Filter of one maneuver: its inputs' noise, the prior of its biases, and the sensors' noise.
 
-use super::prepared_case::PreparedCase;
-use super::task::Task;
 use super::whiteness::sample_noise;
 use crate::aero::Output;
 use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
+use crate::estimate::prepared_case::PreparedCase;
+use crate::estimate::task::Task;
 use crate::filter_error::filter::Filter;
 use crate::output_error::surface_noise::noisy_surfaces;
 use crate::output_error::{Measurements, Model, NoisyInputs};
 
 /// Filter of a model in a window of the maneuver.
-pub(super) fn new_filter<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
+pub(in crate::estimate) fn new_filter<
+    const NX: usize,
+    E: Equations<NX>,
+    const NG: usize,
+    G: InGusts<NG>,
+>(
     task: &Task,
     prepared: &PreparedCase<NX, E>,
     window: &ManeuverSignals,
@@ -24,7 +29,7 @@ pub(super) fn new_filter<const NX: usize, E: Equations<NX>, const NG: usize, G: 
 }
 
 /// Noise of the inputs of a model in a window of the maneuver.
-pub(super) fn noisy_inputs<const NX: usize, E: Equations<NX>>(
+pub(in crate::estimate) fn noisy_inputs<const NX: usize, E: Equations<NX>>(
     task: &Task,
     prepared: &PreparedCase<NX, E>,
     window: &ManeuverSignals,
@@ -61,7 +66,10 @@ fn bias_uncertainty(task: &Task, output: Output) -> Option<f64> {
 
 /// Standard deviations of the outputs' own noise: of the second differences of the measured
 /// values, and at least the configured resolution.
-pub(super) fn least_deviations(task: &Task, measurements: &Measurements) -> [f64; OUTPUTS] {
+pub(in crate::estimate) fn least_deviations(
+    task: &Task,
+    measurements: &Measurements,
+) -> [f64; OUTPUTS] {
     let resolution = task.resolution();
     std::array::from_fn(|o| sample_noise(measurements, o).max(resolution[o]))
 }

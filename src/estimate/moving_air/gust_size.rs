@@ -1,7 +1,7 @@
 //! Size of the gusts that filter error found in a maneuver.
 
-use super::task::Task;
 use crate::aero::Axis;
+use crate::estimate::task::Task;
 use crate::filter_error::noise::Noise;
 use crate::flight::signal;
 use crate::numerics::mean::mean;
@@ -12,7 +12,7 @@ use crate::units::DEG;
 const GUST_SCALE_FT: f64 = 1750.0;
 
 /// Speed of the gusts across the flight path, ft/s rms.
-pub(super) fn gust_ft_s(task: &Task, noise: &Noise, step_s: f64) -> f64 {
+pub(in crate::estimate) fn gust_ft_s(task: &Task, noise: &Noise, step_s: f64) -> f64 {
     let maneuver = task.record.values(signal::VELOCITY).unwrap_or_default();
     let velocities = maneuver.get(task.range()).unwrap_or_default();
     let velocity = mean(velocities.iter().copied());
@@ -21,7 +21,7 @@ pub(super) fn gust_ft_s(task: &Task, noise: &Noise, step_s: f64) -> f64 {
 }
 
 /// Rotary gust, deg/s rms: the larger one of the axis.
-pub(super) fn rotary_gust_deg_s(axis: Axis, noise: &Noise) -> f64 {
+pub(in crate::estimate) fn rotary_gust_deg_s(axis: Axis, noise: &Noise) -> f64 {
     DEG * match axis {
         Axis::Longitudinal => noise.gusts[0],
         Axis::Lateral => noise.gusts[0].max(noise.gusts[1]),

@@ -6,12 +6,12 @@ use super::filter_group::{FilterStart, Group, SlopeFit};
 use super::filter_minimum::{Minimum, NoMinimum};
 use super::group_member::GroupMember;
 use super::gust_size::{gust_ft_s, rotary_gust_deg_s};
-use super::prepared_case::PreparedCase;
 use super::sensor_noise;
-use super::settings::Method;
-use super::task::Task;
 use super::whiteness::{is_white, lag_one, largest_correlation, white_cost};
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
+use crate::estimate::prepared_case::PreparedCase;
+use crate::estimate::settings::Method;
+use crate::estimate::task::Task;
 use crate::filter_error::filter::Filter;
 use crate::filter_error::noise::Noise;
 use crate::output_error::equation_error::Regression;
@@ -23,7 +23,7 @@ use crate::tables::{EstimationMethod, FitRow};
 const MOSTLY: f64 = 0.5;
 
 /// Filter error's result on a maneuver.
-pub(super) struct Filtered {
+pub(in crate::estimate) struct Filtered {
     pub fit: Fit,
     /// Information of derivatives, biases and initial states.
     pub information: DMatrix<f64>,
@@ -45,7 +45,7 @@ pub(super) struct Filtered {
 }
 
 /// Air of a maneuver by filter error.
-pub(super) enum Air {
+pub(in crate::estimate) enum Air {
     /// The air moves: the estimates are those of filter error.
     Moves(Box<Filtered>),
     /// Coloured noise of the sensors explains the residuals of output error better than moving air.
@@ -56,7 +56,11 @@ pub(super) enum Air {
 }
 
 /// `true` if filter error is to estimate a maneuver with this fit by output error.
-pub(super) fn needs_filter(method: Method, measurements: &Measurements, fit: &Fit) -> bool {
+pub(in crate::estimate) fn needs_filter(
+    method: Method,
+    measurements: &Measurements,
+    fit: &Fit,
+) -> bool {
     match method {
         Method::OutputError => false,
         Method::FilterError => true,

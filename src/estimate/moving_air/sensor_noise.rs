@@ -17,7 +17,7 @@ const VERY_STRONG: f64 = 5.0;
 
 /// `true` if coloured noise of the sensors explains the residuals of output error better than
 /// moving air does. It is never so if the innovations of the filter are white.
-pub(super) fn explains(
+pub(in crate::estimate) fn explains(
     measurements: &Measurements,
     output_error: &Fit,
     filter: &FilterResponse,

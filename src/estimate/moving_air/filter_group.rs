@@ -5,12 +5,12 @@ use std::marker::PhantomData;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::calibration_effect::{NOT_COUNTED, signal_errors};
 use super::filter_minimum::{Minimum, NoMinimum};
 use super::group_member::GroupMember;
-use super::held_slopes::HeldSlopes;
-use super::task::Task;
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
+use crate::estimate::calibration_effect::{NOT_COUNTED, signal_errors};
+use crate::estimate::slopes::held_slopes::HeldSlopes;
+use crate::estimate::task::Task;
 use crate::filter_error::bounds::{self, WidePass};
 use crate::filter_error::filter::Filter;
 use crate::filter_error::joint_filter::JointFilter;
@@ -39,8 +39,14 @@ const ALLOWED_RISE: f64 = 1.0;
 const LEAST_SHARE: f64 = 0.5;
 
 /// Maneuvers that filter error estimates together.
-pub(super) struct Group<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
-{
+pub(in crate::estimate) struct Group<
+    'g,
+    'a,
+    const NX: usize,
+    E: Equations<NX>,
+    const NG: usize,
+    G: InGusts<NG>,
+> {
     /// The maneuver, or the group as a whole.
     pub task: Task<'a>,
     pub members: Vec<GroupMember<'g, 'a, NX, E>>,
@@ -366,7 +372,7 @@ fn add_covariance(sum: &mut Option<DMatrix<f64>>, part: &DMatrix<f64>) {
 
 /// Fit with the derivatives' slopes held, and the effect that the difference from the estimated
 /// slopes would have.
-pub(super) struct SlopeFit<const NG: usize, G: InGusts<NG>> {
+pub(in crate::estimate) struct SlopeFit<const NG: usize, G: InGusts<NG>> {
     pub held: HeldSlopes,
     filters: Vec<Filter<NG, G>>,
     found: Minimum,
@@ -405,7 +411,7 @@ impl<const NG: usize, G: InGusts<NG>> SlopeFit<NG, G> {
 }
 
 /// Start of a filter's iteration.
-pub(super) struct FilterStart {
+pub(in crate::estimate) struct FilterStart {
     /// Derivatives, biases and initial states.
     pub own: Vec<f64>,
     /// Noise of each maneuver.

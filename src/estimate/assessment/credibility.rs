@@ -1,13 +1,13 @@
 //! Reasons to doubt a fit that converged: it explains less than a constant, contradicts equation
 //! error, or needs an error that no instrument has.
 
-use super::estimated::Estimated;
-use super::rows::RowMaker;
 use super::second_opinion::Distance;
-use super::settings::Doubtful;
-use super::task::Task;
 use crate::aero::Output;
 use crate::dynamics::{Equations, OUTPUTS};
+use crate::estimate::estimated::Estimated;
+use crate::estimate::rows::RowMaker;
+use crate::estimate::settings::Doubtful;
+use crate::estimate::task::Task;
 use crate::numerics::normal::NORMAL_95;
 use crate::output_error::equation_error::Regression;
 use crate::output_error::theil::OutputAgreement;
@@ -15,7 +15,7 @@ use crate::output_error::{Case, Fit, InitialState, Outcome};
 use crate::units::{DEG, Unit};
 
 /// Motion that a fit explains without the corrections of a filter, and the second opinion on it.
-pub(super) struct ExplainedMotion<'a> {
+pub(in crate::estimate) struct ExplainedMotion<'a> {
     /// Outputs of the equations; `None` if they diverge.
     pub outputs: Option<&'a [[f64; OUTPUTS]]>,
     /// `true` if gusts explain a drift of the attitude: it integrates the rates, and the rotary
@@ -25,7 +25,7 @@ pub(super) struct ExplainedMotion<'a> {
 }
 
 /// A fit that is to be judged.
-pub(super) struct Credibility<'c, 'a, const NX: usize, E: Equations<NX>> {
+pub(in crate::estimate) struct Credibility<'c, 'a, const NX: usize, E: Equations<NX>> {
     pub task: &'c Task<'a>,
     pub case: &'c Case<NX, E>,
     pub fit: &'c Fit,

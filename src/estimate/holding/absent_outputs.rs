@@ -7,14 +7,16 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::settings::Hold;
-use super::task::Task;
 use crate::aero::{Coefficient, Derivative, Output};
+use crate::estimate::settings::Hold;
+use crate::estimate::task::Task;
 use crate::maneuver::{Class, Status};
 
 /// The class without what the maneuver cannot estimate because of outputs that are not recorded, and
 /// the reason for each derivative and bias.
-pub(super) fn class_of_recorded_outputs(task: &Task) -> (Class, BTreeMap<String, String>) {
+pub(in crate::estimate) fn class_of_recorded_outputs(
+    task: &Task,
+) -> (Class, BTreeMap<String, String>) {
     let reasons = unseen(task);
     let is_held = |name: &String| {
         let is_by_table = task.context.settings.hold == Hold::Table;

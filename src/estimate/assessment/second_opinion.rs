@@ -9,7 +9,11 @@ use crate::output_error::equation_error::Regression;
 use crate::tables::EstimateRow;
 
 /// Adds the estimates by equation error, with their bounds, to the rows of a fit.
-pub(super) fn add_second_opinion(names: &[String], second: &Regression, rows: &mut [EstimateRow]) {
+pub(in crate::estimate) fn add_second_opinion(
+    names: &[String],
+    second: &Regression,
+    rows: &mut [EstimateRow],
+) {
     for row in rows {
         let Some(j) = names.iter().position(|name| *name == row.derivative) else {
             continue;

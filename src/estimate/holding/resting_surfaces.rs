@@ -6,8 +6,8 @@
 
 use std::collections::BTreeSet;
 
-use super::settings::Hold;
-use super::task::Task;
+use crate::estimate::settings::Hold;
+use crate::estimate::task::Task;
 use crate::flight::signal;
 use crate::maneuver::{Class, Status};
 use crate::output_error::identifiability::excitation;

@@ -22,7 +22,7 @@ pub(super) fn sample_noise(measurements: &Measurements, output: usize) -> f64 {
 }
 
 /// `true` for a fit by output error whose residuals show no motion of the air.
-pub(super) fn is_white(measurements: &Measurements, fit: &Fit) -> bool {
+pub(in crate::estimate) fn is_white(measurements: &Measurements, fit: &Fit) -> bool {
     fit.outcome == Outcome::Converged && are_white(measurements, &fit.response.outputs)
 }
 
@@ -33,7 +33,10 @@ pub(super) fn are_white(measurements: &Measurements, computed: &[[f64; OUTPUTS]]
 }
 
 /// Correlation of neighbouring residuals, output by output.
-pub(super) fn lag_one(measurements: &Measurements, computed: &[[f64; OUTPUTS]]) -> [f64; OUTPUTS] {
+pub(in crate::estimate) fn lag_one(
+    measurements: &Measurements,
+    computed: &[[f64; OUTPUTS]],
+) -> [f64; OUTPUTS] {
     let residual = |k: usize, o: usize| {
         let (z, y) = (measurements.values.get(k)?, computed.get(k)?);
         measurements.used[k][o].then(|| z[o] - y[o])
@@ -51,7 +54,7 @@ pub(super) fn lag_one(measurements: &Measurements, computed: &[[f64; OUTPUTS]]) 
 }
 
 /// Largest of the outputs' correlations.
-pub(super) fn largest_correlation(values: [f64; OUTPUTS]) -> Option<f64> {
+pub(in crate::estimate) fn largest_correlation(values: [f64; OUTPUTS]) -> Option<f64> {
     values.into_iter().reduce(f64::max)
 }
 
