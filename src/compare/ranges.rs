@@ -4,8 +4,8 @@
 use super::judgement::Agreement;
 use super::settings::Settings;
 use crate::aero::WindTunnel;
-use crate::numerics::mean::mean;
-use crate::numerics::order_statistics::median;
+use crate::numerics::statistics::mean::mean;
+use crate::numerics::statistics::order_statistics::median;
 use crate::tables::{ChangeRow, ComparisonRow, DisagreementRow, Verdict, VerdictRow};
 
 /// Comparison at one angle of attack, with the tunnel or an earlier campaign.

@@ -9,7 +9,7 @@ use super::settings::Settings;
 use crate::aero::wind_tunnel::TunnelValue;
 use crate::aero::{Condition, WindTunnel};
 use crate::maneuver::{Maneuver, Status};
-use crate::numerics::mean::mean;
+use crate::numerics::statistics::mean::mean;
 use crate::tables::{
     ComparisonRow, EstimateRow, ManeuverComparisonRow, PosteriorRow, TunnelDifference,
     TunnelVerdict,

@@ -3,7 +3,7 @@
 use crate::aero::AeroModel;
 use crate::flight::{Record, signal};
 use crate::maneuver::{Maneuver, Means};
-use crate::numerics::mean::finite_mean;
+use crate::numerics::statistics::mean::finite_mean;
 
 /// Means over a maneuver's finite samples; `None` if a signal of the equations has none.
 #[must_use]

@@ -16,8 +16,8 @@ use super::response::FilterResponse;
 use super::scoring::Scored;
 use super::slopes::{SlopeEffect, SlopeInformation, SlopePrior};
 use crate::dynamics::{InGusts, OUTPUTS};
-use crate::numerics::matrix::AlignedMatrix;
-use crate::numerics::symmetric;
+use crate::numerics::linear_algebra::matrix::AlignedMatrix;
+use crate::numerics::linear_algebra::symmetric;
 
 use crate::output_error::bounds::block_series::BlockSeries;
 use crate::output_error::bounds::coloured;

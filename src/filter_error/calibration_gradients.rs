@@ -30,7 +30,7 @@ use super::response::FilterResponse;
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
-use crate::numerics::matrix::AlignedMatrix;
+use crate::numerics::linear_algebra::matrix::AlignedMatrix;
 use crate::output_error::calibration_errors::SignalError;
 use crate::output_error::{Case, Diverged, InitialState, Measurements, Model};
 

@@ -20,7 +20,7 @@ use super::response::FilterResponse;
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{InGusts, OUTPUTS};
-use crate::numerics::simd::AlignedBuffer;
+use crate::numerics::vectors::simd::AlignedBuffer;
 use crate::output_error::case::blocks::samples_per_block;
 use crate::output_error::case::layout::LaneLayout;
 use crate::output_error::kernel::normal_equations::NormalSums;

@@ -16,7 +16,7 @@ use super::linearised::{Discrete, DiscreteSystem, Linearised};
 use super::noise::{Noise, NoiseParameter};
 use super::riccati::{NoisySystem, StateMatrix, SteadyFilter};
 use crate::dynamics::{InGusts, OUTPUTS};
-use crate::numerics::small::product;
+use crate::numerics::linear_algebra::small::product;
 
 /// Computation of the gains, compiled for the processor at hand.
 pub(super) struct GainComputation<'a, const NX: usize, E: InGusts<NX>> {

@@ -6,7 +6,7 @@ use nalgebra::{Cholesky, SMatrix};
 use super::noise::{Noise, NoiseParameter};
 use super::riccati::{OutputSlopes, StateMatrix, SteadyFilter, SystemSlope};
 use crate::dynamics::OUTPUTS;
-use crate::numerics::small::{product, product_transposed, sandwich};
+use crate::numerics::linear_algebra::small::{product, product_transposed, sandwich};
 
 /// Square matrix over the outputs, such as a covariance.
 pub(super) type OutputMatrix = SMatrix<f64, OUTPUTS, OUTPUTS>;

@@ -6,7 +6,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
-use crate::numerics::small::product;
+use crate::numerics::linear_algebra::small::product;
 use crate::output_error::Case;
 
 /// Stride of the samples at which the slopes are computed: enough for a mean.

@@ -20,9 +20,9 @@ use pulp::{Simd, WithSimd};
 
 use super::gains::{Gain, OutputMatrix, Pattern, PatternGain};
 use crate::dynamics::{InGusts, OUTPUTS};
-use crate::numerics::matrix::AlignedMatrix;
-use crate::numerics::row_products::Idle;
-use crate::numerics::simd::{AlignedBuffer, VECTOR, load};
+use crate::numerics::linear_algebra::matrix::AlignedMatrix;
+use crate::numerics::vectors::row_products::Idle;
+use crate::numerics::vectors::simd::{AlignedBuffer, VECTOR, load};
 use crate::output_error::case::Case;
 use crate::output_error::case::build_up::ValuedTerm;
 use crate::output_error::case::chunking::{CHUNK, POINTS, Strided};

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::gains::{OutputMatrix, Pattern, PatternGain};
 use super::noise::{NoiseParameter, RotaryCost};
 use crate::dynamics::OUTPUTS;
-use crate::numerics::matrix::AlignedMatrix;
+use crate::numerics::linear_algebra::matrix::AlignedMatrix;
 use crate::output_error::kernel::normal_equations::NormalSums;
 
 /// Result of one pass of the filter over the maneuver.

@@ -20,7 +20,7 @@
 use nalgebra::SMatrix;
 
 use crate::dynamics::OUTPUTS;
-use crate::numerics::small::{product, product_transposed, sandwich};
+use crate::numerics::linear_algebra::small::{product, product_transposed, sandwich};
 
 /// Largest number of rounds: 2²⁴ steps.
 const ROUNDS: usize = 24;

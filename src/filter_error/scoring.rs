@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use super::joint_filter::{JointFilter, JointResponse};
 use crate::dynamics::InGusts;
 use crate::numerics::damping::{next_damping, raised_damping};
-use crate::numerics::symmetric::solve_damped;
+use crate::numerics::linear_algebra::symmetric::solve_damped;
 use crate::settings::settings;
 
 settings! {

@@ -7,7 +7,7 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use super::remaining_errors::RemainingErrors;
-use crate::numerics::sample_count::nearest;
+use crate::numerics::series::sample_count::nearest;
 
 /// Repair or fault of one sample of one signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

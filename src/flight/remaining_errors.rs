@@ -59,7 +59,7 @@ mod tests {
     use approx::assert_abs_diff_eq;
 
     use super::*;
-    use crate::numerics::random::RandomStream;
+    use crate::numerics::statistics::random::RandomStream;
 
     #[test]
     fn the_error_that_remains_follows_from_the_estimate_and_from_calibration() {

@@ -3,7 +3,7 @@
 use crate::config::Config;
 use crate::lab::campaign::{Cards, FlightCard, TestPoint};
 use crate::lab::simulator::{Card, FlightCondition};
-use crate::numerics::random::derived_seed;
+use crate::numerics::statistics::random::derived_seed;
 
 /// Name of the flight of all candidates, so that their random numbers differ from those of
 /// simulated campaigns.

@@ -20,7 +20,7 @@ use nalgebra::{Cholesky, DMatrix, Dyn};
 
 use crate::lab::campaign::NextFlight;
 use crate::model::PlannedRows;
-use crate::numerics::triangular::solve_lower;
+use crate::numerics::linear_algebra::triangular::solve_lower;
 
 /// Worth below which a card adds nothing, nats.
 const LEAST_WORTH: f64 = 1e-6;

@@ -41,7 +41,7 @@
 //! For one limit at a distance d from m, and ν = 0, the sum is Φ((d − zσ′)/τ) + Φ(−(d + zσ′)/τ).
 
 use crate::numerics::bisection::last_that_holds;
-use crate::numerics::normal;
+use crate::numerics::statistics::normal;
 
 /// Halvings of an interval in a search: to 2⁻⁶⁰ of its length, the last digit.
 const HALVINGS: usize = 60;

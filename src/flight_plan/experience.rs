@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 
 use crate::estimate::Covariance;
 use crate::maneuver::Maneuver;
-use crate::numerics::mean::finite_mean;
-use crate::numerics::order_statistics::median;
+use crate::numerics::statistics::mean::finite_mean;
+use crate::numerics::statistics::order_statistics::median;
 use crate::output_error::error_effect::{ErrorEffect, SharedError};
 use crate::tables::{ContributionRow, FitRow, Outcome};
 

@@ -10,7 +10,7 @@ use super::plan::Plan;
 use crate::config::Config;
 use crate::lab::campaign::{Cards, FlightLimits};
 use crate::lab::simulator::{Program, TestInput};
-use crate::numerics::order_statistics::median;
+use crate::numerics::statistics::order_statistics::median;
 use crate::report::{
     angle, count, fixed, number, power_of_ten, symbol, unit, well_formed, without_unit,
 };

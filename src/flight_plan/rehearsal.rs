@@ -14,7 +14,7 @@ use crate::flight::{RemainingError, RemainingErrors};
 use crate::lab::campaign::FlightLimits;
 use crate::lab::simulator::{Instrument, Instruments, Simulator};
 use crate::maneuver::Maneuver;
-use crate::numerics::order_statistics::median;
+use crate::numerics::statistics::order_statistics::median;
 use crate::pipeline::estimate_maneuver;
 use crate::surfaces::DelayCorrection;
 use crate::tables::{ChannelRow, EstimateRow, InstrumentError, InstrumentRow, Outcome};

@@ -4,8 +4,8 @@ use super::recording::{Recording, column_names};
 use super::vocabulary::meanings;
 use super::words::Spelling;
 use crate::flight::signal;
-use crate::numerics::mean::finite_mean;
-use crate::numerics::order_statistics::{median, quantile};
+use crate::numerics::statistics::mean::finite_mean;
+use crate::numerics::statistics::order_statistics::{median, quantile};
 use crate::units::{Quantity, Unit};
 
 /// Least share of steps that go forwards in a column that counts time.

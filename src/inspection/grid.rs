@@ -7,7 +7,7 @@ use std::ops::Range;
 use super::clock::ClockColumn;
 use super::recording::{Recording, column_names};
 use crate::flight::signal;
-use crate::numerics::order_statistics::median;
+use crate::numerics::statistics::order_statistics::median;
 use crate::units::Unit;
 
 /// Step of the grid, s: aircraft move at up to about 2 Hz.

@@ -351,7 +351,7 @@ mod tests {
     use crate::inspection::assignment::Choice;
     use crate::inspection::plausible::facts;
     use crate::inspection::recording::{Column, Recording};
-    use crate::numerics::sample_count::whole_steps;
+    use crate::numerics::series::sample_count::whole_steps;
 
     const STEP_S: f64 = 0.1;
 

@@ -6,7 +6,7 @@ use super::quantity::Quantity;
 use super::recording::{Recording, column_names};
 use super::vocabulary::{input, is_one_side, meanings};
 use super::words::Spelling;
-use crate::numerics::order_statistics::quantile;
+use crate::numerics::statistics::order_statistics::quantile;
 use crate::units::Unit;
 
 /// Shares of a column's values that are ignored at each end of its range, as spikes.

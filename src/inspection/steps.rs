@@ -5,8 +5,8 @@ use std::ops::Range;
 
 use super::grid::Grid;
 use super::vocabulary::Input;
-use crate::numerics::differences;
-use crate::numerics::order_statistics::{median, quantile};
+use crate::numerics::series::differences;
+use crate::numerics::statistics::order_statistics::{median, quantile};
 use crate::units::{Quantity, Unit};
 
 /// Range of a surface that moves, deg.
@@ -166,7 +166,7 @@ fn rare_share(grid: &Grid) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::sample_count::whole_steps;
+    use crate::numerics::series::sample_count::whole_steps;
 
     const STEP_S: f64 = 0.1;
 

@@ -16,7 +16,7 @@ use super::self_check::{self, Agreement};
 use super::term::{PosteriorTerm, TermSources};
 use super::unknowns::Unknowns;
 use crate::aero::WindTunnel;
-use crate::numerics::root::EXACT;
+use crate::numerics::linear_algebra::root::EXACT;
 
 /// Number of reweightings: weights follow from scales, and scales from weights.
 const REWEIGHTINGS: usize = 2;

@@ -5,8 +5,8 @@ use nalgebra::{DMatrix, DVector};
 use super::campaign_model::Model;
 use super::coefficient::CoefficientPosterior;
 use super::published::PublishedDerivative;
-use crate::numerics::random::RandomStream;
-use crate::numerics::root::{EXACT, root};
+use crate::numerics::linear_algebra::root::{EXACT, root};
+use crate::numerics::statistics::random::RandomStream;
 use crate::tables::PosteriorRow;
 
 /// Correlation below which derivatives count as independent: the sampling error of a few hundred draws.

@@ -18,7 +18,7 @@ use super::evidence::ManeuverResults;
 use super::term::PosteriorTerm;
 use crate::aero::{Condition, WindTunnel};
 use crate::maneuver::Status;
-use crate::numerics::symmetric::{scale, scaled};
+use crate::numerics::linear_algebra::symmetric::{scale, scaled};
 use crate::output_error::error_effect::{ErrorEffect, SharedError};
 
 /// Least eigenvalue of a noise covariance scaled to unit diagonal, so that it stays invertible.

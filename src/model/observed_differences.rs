@@ -8,9 +8,9 @@ use super::prior_covariance::PriorCovariance;
 use super::scale_prior::{Scale, ScalePrior};
 use super::term::PosteriorTerm;
 use super::unknowns::Unknowns;
-use crate::numerics::root::{BlockRoot, root, root_of_some};
-use crate::numerics::symmetric::square;
-use crate::numerics::triangular::solve_lower;
+use crate::numerics::linear_algebra::root::{BlockRoot, root, root_of_some};
+use crate::numerics::linear_algebra::symmetric::square;
+use crate::numerics::linear_algebra::triangular::solve_lower;
 
 /// Differences on which the data depend, term by term, with the information on them.
 #[derive(Clone, Debug)]

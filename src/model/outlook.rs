@@ -25,7 +25,7 @@ use super::settings::Settings;
 use super::term::{PosteriorTerm, TermSources, between_points};
 use super::unknowns::{SparseRow, Unknowns, covariance_between, is_of_campaign};
 use crate::aero::{AeroModel, Condition, WindTunnel};
-use crate::numerics::root::EXACT;
+use crate::numerics::linear_algebra::root::EXACT;
 use crate::output_error::error_effect::SharedError;
 
 /// Quantity at a flight condition.

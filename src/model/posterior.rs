@@ -8,9 +8,9 @@ use super::flight_data::{FlightData, Information};
 use super::scale_prior::Scale;
 use super::term::PosteriorTerm;
 use super::unknowns::Unknowns;
-use crate::numerics::root::{BlockRoot, EXACT};
-use crate::numerics::symmetric::square;
-use crate::numerics::triangular::{cholesky, solve_lower};
+use crate::numerics::linear_algebra::root::{BlockRoot, EXACT};
+use crate::numerics::linear_algebra::symmetric::square;
+use crate::numerics::linear_algebra::triangular::{cholesky, solve_lower};
 
 /// Share of the information that may be lost by rounding: with data a million times more accurate
 /// than the prior, matrices stay positive definite.

@@ -9,7 +9,7 @@ use super::published::PublishedDerivative;
 use super::self_check::Agreement;
 use super::unknowns::covariance_between;
 use crate::aero::Coefficient;
-use crate::numerics::normal::NORMAL_95;
+use crate::numerics::statistics::normal::NORMAL_95;
 use crate::tables::{
     ContributionRow, CovarianceRow, LeftOutKind, PosteriorRow, ScaleRow, SelfCheckRow,
 };

@@ -7,8 +7,8 @@ use super::flight_data::FlightData;
 use super::posterior::{
     Gaussian, LeaveOneOut, LeaveOneOutDifference, SolvedPosterior, information,
 };
-use crate::numerics::normal::NORMAL_95;
-use crate::numerics::root::BlockRoot;
+use crate::numerics::linear_algebra::root::BlockRoot;
+use crate::numerics::statistics::normal::NORMAL_95;
 
 /// Agreement of omitted data with their prediction.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

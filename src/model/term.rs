@@ -13,7 +13,7 @@ use super::scale_prior::Scale;
 use super::settings::Settings;
 use crate::aero::{AeroModel, Coefficient, Condition, Derivative, Regressor, WindTunnel};
 use crate::maneuver::Status;
-use crate::numerics::order_statistics::median;
+use crate::numerics::statistics::order_statistics::median;
 use crate::tables::PriorSource;
 
 /// Derivative or sum of one coefficient, whose difference from the tunnel is unknown over its grid.

@@ -14,7 +14,7 @@ use super::prior_covariance::matern_3_2;
 use super::scale_prior::Scale;
 use super::term::PosteriorTerm;
 use crate::aero::Condition;
-use crate::numerics::root::{BlockRoot, root};
+use crate::numerics::linear_algebra::root::{BlockRoot, root};
 use crate::output_error::error_effect::SharedError;
 
 /// Distance over which a class's errors fade, deg; also the spacing of their grid.

@@ -9,7 +9,7 @@ use crate::config::Config;
 use crate::error::{Problem, Result};
 use crate::export::{self, ExportContents, daveml, jsbsim};
 use crate::lineage::Stage;
-use crate::numerics::random::RandomStream;
+use crate::numerics::statistics::random::RandomStream;
 use crate::pipeline::{Campaign, Conductor, Progress};
 use crate::store::table::TableFolder;
 use crate::store::{atomic, table};

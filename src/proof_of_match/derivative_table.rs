@@ -2,7 +2,7 @@
 //! closely for the inner loop.
 
 use crate::aero::{AeroModel, Condition, Regressor, WindTunnel};
-use crate::numerics::trapezoid::running_integral;
+use crate::numerics::series::trapezoid::running_integral;
 
 /// Spacing of the table, deg. Between its points the table is linear, as most databases are.
 const STEP_DEG: f64 = 1.0;

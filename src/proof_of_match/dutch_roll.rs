@@ -14,8 +14,8 @@ use crate::aero::{AeroModel, Axis, Derivative, Regressor, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::maneuver::{Maneuver, Means};
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
-use crate::numerics::random::RandomStream;
-use crate::numerics::root::continuous_root;
+use crate::numerics::linear_algebra::root::continuous_root;
+use crate::numerics::statistics::random::RandomStream;
 use crate::qualities::{Controls, Differentiation, FlownConditions, LinearModel, SteadyFlight};
 use crate::tables::{FlyingQuality, MatchedQuantity};
 

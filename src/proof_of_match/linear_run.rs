@@ -13,9 +13,9 @@ use super::aerodynamics::COEFFICIENTS;
 use super::free_run::{FreeRun, RunEquations, STATES, Simulation, StageObserver, Start};
 use super::load_changes::LoadSlopes;
 use super::outputs::COUNT;
-use crate::numerics::lanes::{Lanes, each};
 use crate::numerics::runge_kutta::{self, STAGES};
-use crate::numerics::simd::{AlignedBuffer, VECTOR};
+use crate::numerics::vectors::lanes::{Lanes, each};
+use crate::numerics::vectors::simd::{AlignedBuffer, VECTOR};
 use crate::rigid_body::{
     AirSlopes, BodySlopes, BodyState, CHANGING, Instant, ReadingSlopes, StateChange,
 };

@@ -9,7 +9,7 @@ use std::array::from_fn;
 use pulp::Simd;
 
 use super::aerodynamics::{AeroInputs, Aerodynamics, COEFFICIENTS, FORCE, FlowSlopes, MOMENT};
-use crate::numerics::lanes::{Lanes, combination, each};
+use crate::numerics::vectors::lanes::{Lanes, combination, each};
 use crate::rigid_body::{AirChange, BodySlopes, Instant, StateChange};
 use crate::units::DEG;
 

@@ -10,7 +10,7 @@ use super::recording::ManeuverRecording;
 use super::start::MatchedStart;
 use crate::aero::{AeroModel, Axis, Regressor};
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
-use crate::numerics::sample_count::whole_steps;
+use crate::numerics::series::sample_count::whole_steps;
 
 /// Longest step of the run with slopes, s. Probabilities differ by 0.2 % rms from those of steps of a quarter.
 const LONGEST_STEP_S: f64 = 0.1;

@@ -8,8 +8,8 @@ use crate::dynamics::Motion;
 use crate::dynamics::motion::{ManeuverSignals, MassProperties};
 use crate::flight::Record;
 use crate::maneuver::Maneuver;
-use crate::numerics::differences;
-use crate::numerics::order_statistics::median;
+use crate::numerics::series::differences;
+use crate::numerics::statistics::order_statistics::median;
 use crate::rigid_body::{Loading, Mass};
 
 /// Least number of samples of a maneuver that can be flown again.

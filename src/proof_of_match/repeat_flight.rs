@@ -24,9 +24,9 @@ use super::specification::Tolerance;
 use super::start::MatchedStart;
 use crate::aero::{AeroModel, Axis};
 use crate::model::LocalPosterior;
-use crate::numerics::normal;
-use crate::numerics::random::RandomStream;
-use crate::numerics::root::continuous_root;
+use crate::numerics::linear_algebra::root::continuous_root;
+use crate::numerics::statistics::normal;
+use crate::numerics::statistics::random::RandomStream;
 
 /// Seed of the draws.
 const SEED: u64 = 60;

@@ -14,8 +14,8 @@ use super::outputs::COUNT;
 use super::recording::ManeuverRecording;
 use crate::dynamics::{Equations, Lateral, Longitudinal, Motion};
 use crate::earth::air;
-use crate::numerics::mean::mean;
-use crate::numerics::symmetric;
+use crate::numerics::linear_algebra::symmetric;
+use crate::numerics::statistics::mean::mean;
 use crate::units::DEG;
 
 /// Number of parameters of a start.

@@ -14,9 +14,9 @@ use super::trim::Trim;
 use crate::aero::Axis;
 use crate::model::LocalPosterior;
 use crate::numerics::dual::Dual;
-use crate::numerics::normal::NORMAL_95;
-use crate::numerics::random::RandomStream;
-use crate::numerics::root::continuous_root;
+use crate::numerics::linear_algebra::root::continuous_root;
+use crate::numerics::statistics::normal::NORMAL_95;
+use crate::numerics::statistics::random::RandomStream;
 use crate::tables::{
     ALL_PARAGRAPHS, Airframe, DeviationBasis, FlyingQuality, Level, LevelRow, QualityRow, RootRow,
 };

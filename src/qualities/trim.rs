@@ -13,7 +13,7 @@ use crate::dynamics::Motion;
 use crate::earth::gravity_ft_s2;
 use crate::flight::signal;
 use crate::maneuver::{Maneuver, Means};
-use crate::numerics::mean::finite_mean;
+use crate::numerics::statistics::mean::finite_mean;
 use crate::units::RAD;
 
 /// Angles of attack within which maneuvers count as one condition, deg.

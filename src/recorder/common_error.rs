@@ -1,8 +1,8 @@
 //! Mean of an error over the flights, its scatter between them, and flights far from the others.
 
 use super::error_series::{ErrorSample, ErrorSeries};
-use crate::numerics::random_effects::{Observation, RandomEffects};
-use crate::numerics::student;
+use crate::numerics::statistics::random_effects::{Observation, RandomEffects};
+use crate::numerics::statistics::student;
 
 /// Least number of flights with a common error: with fewer, the scatter is less certain than its
 /// own size.
@@ -105,7 +105,7 @@ mod tests {
 
     use super::super::fixture;
     use super::*;
-    use crate::numerics::random::RandomStream;
+    use crate::numerics::statistics::random::RandomStream;
 
     fn scales(values: &[(f64, f64)]) -> ErrorSeries {
         fixture::scales(values.iter().copied(), 0.0)

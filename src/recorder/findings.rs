@@ -207,7 +207,7 @@ impl ExaminedSeries {
 mod tests {
     use super::super::fixture;
     use super::*;
-    use crate::numerics::random::RandomStream;
+    use crate::numerics::statistics::random::RandomStream;
 
     fn scales(values: &[f64]) -> ErrorSeries {
         fixture::scales(values.iter().map(|value| (*value, 0.004)), 0.002)

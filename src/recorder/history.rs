@@ -8,8 +8,8 @@
 
 use super::common_error::CommonError;
 use super::error_series::{ErrorSample, ErrorSeries};
-use crate::numerics::random_effects::{Observation, RandomEffects};
-use crate::numerics::student;
+use crate::numerics::statistics::random_effects::{Observation, RandomEffects};
+use crate::numerics::statistics::student;
 
 /// Least number of flights on either side of a step.
 const FEWEST_BESIDE: usize = 2;
@@ -107,7 +107,7 @@ fn second_coefficient(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::random::RandomStream;
+    use crate::numerics::statistics::random::RandomStream;
     use crate::tables::InstrumentError;
 
     /// Twelve flights whose truth is a function of the flight, with scatter and errors.

@@ -14,7 +14,7 @@ use super::air_data::AirData;
 use super::body::BodyState;
 use super::loading::Mass;
 use crate::earth::air_gradients;
-use crate::numerics::lanes::{Lanes, combination, each};
+use crate::numerics::vectors::lanes::{Lanes, combination, each};
 
 /// Number of states whose changes change the motion: u v w, p q r, the attitude, and the height.
 pub(crate) const CHANGING: usize = 11;

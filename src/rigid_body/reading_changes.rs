@@ -10,7 +10,7 @@ use pulp::Simd;
 use super::changes::{AirChange, DownDirection, StateChange};
 use super::readings::Instant;
 use crate::aircraft::{Aircraft, Position, Reading, VaneFlow};
-use crate::numerics::lanes::{Lanes, combination, each};
+use crate::numerics::vectors::lanes::{Lanes, combination, each};
 use crate::units::{DEG, G0_FT_S2};
 
 /// Changes of the readings, as in [`super::Readings`] without the heading.

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::aircraft::{Aircraft, Position, Sensors, Vane, VaneModel};
 use crate::earth;
-use crate::numerics::lanes::Lanes;
+use crate::numerics::vectors::lanes::Lanes;
 
 const LOADING: Loading = Loading {
     mass_slug: 1025.0,

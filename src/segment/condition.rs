@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use crate::aircraft::{Aircraft, Position, VaneFlow};
 use crate::flight::{Record, signal};
 use crate::maneuver::{Class, Maneuver, ManeuverOrigin, Quality, Recognised};
-use crate::numerics::mean::finite_mean;
+use crate::numerics::statistics::mean::finite_mean;
 use crate::units::DEG;
 
 use super::quality;

@@ -8,8 +8,8 @@ use super::settings::{Actuator, QualityLimits};
 use crate::aero::{Axis, Output};
 use crate::flight::{Record, signal};
 use crate::maneuver::{Acceptance, Class, Maneuver, Quality};
-use crate::numerics::differences::white_noise;
-use crate::numerics::sample_count::nearest;
+use crate::numerics::series::differences::white_noise;
+use crate::numerics::series::sample_count::nearest;
 use crate::units::RAD;
 
 /// Time before the first input that is excluded from the lead-in, s. The detected time of a step is

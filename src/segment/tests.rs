@@ -12,7 +12,7 @@ use crate::flight::record::Series;
 use crate::flight::{Mark, signal};
 use crate::maneuver::Quality;
 use crate::maneuver::{Acceptance, Event, Maneuver, Pulses, Recognition, StepCount, Sweep};
-use crate::numerics::random::RandomStream;
+use crate::numerics::statistics::random::RandomStream;
 use crate::tables::EventVerdict;
 
 const STEP_S: f64 = 0.025;

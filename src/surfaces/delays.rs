@@ -13,8 +13,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::evidence::{DelayEvidence, FlightEvidence, SurfaceDelay};
-use crate::numerics::random_effects::{Observation, RandomEffects};
-use crate::numerics::symmetric;
+use crate::numerics::linear_algebra::symmetric;
+use crate::numerics::statistics::random_effects::{Observation, RandomEffects};
 
 /// Error that linear interpolation between samples leaves in a delay, as a share of the sampling
 /// interval. In simulated campaigns without delay the estimate is 0.45 ms at a sampling interval of

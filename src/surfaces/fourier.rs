@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 
 use nalgebra::Complex;
 
-use crate::numerics::harmonics::Harmonics;
+use crate::numerics::series::harmonics::Harmonics;
 
 /// Fourier sums at the frequencies of a band.
 pub type Spectrum = Vec<Complex<f64>>;

@@ -7,7 +7,7 @@
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::fourier::Spectrum;
-use crate::numerics::symmetric;
+use crate::numerics::linear_algebra::symmetric;
 
 /// Half width of the band over which the residuals' power is averaged, Hz. Turbulence and sensor
 /// noise change little over the band, and a maneuver of 15 s has 15 frequencies in it.

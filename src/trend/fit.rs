@@ -64,8 +64,8 @@ use super::point::{TrendPoint, flown_alphas};
 use super::robust::{Residual, RobustSolution, inverse_variances, weighted_solution};
 use super::scatter::{floored_variances, strata};
 use super::settings::{Criterion, Settings};
-use crate::numerics::order_statistics::upper_median;
-use crate::numerics::student;
+use crate::numerics::statistics::order_statistics::upper_median;
+use crate::numerics::statistics::student;
 
 /// Distance from the trend beyond which a residual has no further influence on the choice of the
 /// order, standard deviations.

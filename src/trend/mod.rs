@@ -24,7 +24,7 @@ use rayon::prelude::*;
 
 use crate::error::{Problem, ProblemStage};
 use crate::maneuver::Status;
-use crate::numerics::normal::NORMAL_95;
+use crate::numerics::statistics::normal::NORMAL_95;
 use crate::tables::{EstimateRow, OutlierRow, TrendRow};
 
 use fit::Trend;

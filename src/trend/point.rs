@@ -1,6 +1,6 @@
 //! Points of a trend.
 
-use crate::numerics::mean::mean;
+use crate::numerics::statistics::mean::mean;
 
 /// One maneuver's estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -23,7 +23,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::scatter::{HUBER, total_variances};
-use crate::numerics::symmetric;
+use crate::numerics::linear_algebra::symmetric;
 
 /// Largest number of steps of the iteration between coefficients, τ² and Huber's weights; about ten
 /// suffice.

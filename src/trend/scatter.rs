@@ -1,11 +1,11 @@
 //! Scatter between maneuvers beyond their bounds, by Paule and Mandel's equation with Huber's cut.
-//! [`crate::numerics::random_effects`] solves the equation without the cut, and with the fit in it.
+//! [`crate::numerics::statistics::random_effects`] solves the equation without the cut, and with the fit in it.
 
 use nalgebra::DVector;
 
 use super::point::TrendPoint;
 use crate::numerics::bisection::last_that_holds;
-use crate::numerics::order_statistics::upper_median;
+use crate::numerics::statistics::order_statistics::upper_median;
 
 /// Standard deviations beyond which the influence of a residual stays constant: Huber's weights. The
 /// fit then tolerates a quarter of outliers, and loses 4% of efficiency where there are none.

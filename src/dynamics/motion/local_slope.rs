@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::numerics::sample_count::nearest;
+use crate::numerics::series::sample_count::nearest;
 
 /// Half the length of the local straight line whose slope is the derivative. It is short against the
 /// airframe's modes. It is long enough to keep the gyros' noise, times the accelerometers' arms, below

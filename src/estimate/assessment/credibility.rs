@@ -8,7 +8,7 @@ use crate::estimate::estimated::Estimated;
 use crate::estimate::rows::RowMaker;
 use crate::estimate::settings::Doubtful;
 use crate::estimate::task::Task;
-use crate::numerics::normal::NORMAL_95;
+use crate::numerics::statistics::normal::NORMAL_95;
 use crate::output_error::equation_error::Regression;
 use crate::output_error::theil::OutputAgreement;
 use crate::output_error::{Case, Fit, InitialState, Outcome};

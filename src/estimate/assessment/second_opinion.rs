@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::numerics::chi_squared::exceedance;
-use crate::numerics::symmetric::inverse;
+use crate::numerics::linear_algebra::symmetric::inverse;
+use crate::numerics::statistics::chi_squared::exceedance;
 use crate::output_error::Fit;
 use crate::output_error::equation_error::Regression;
 use crate::tables::EstimateRow;

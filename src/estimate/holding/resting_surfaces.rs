@@ -61,7 +61,7 @@ fn is_noise(samples: &[f64]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::random::RandomStream;
+    use crate::numerics::statistics::random::RandomStream;
 
     /// Ten seconds of a transducer with noise of 0.02 deg, of a surface with a doublet of this size.
     fn transducer(doublet_deg: f64) -> Vec<f64> {

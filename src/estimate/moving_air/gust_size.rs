@@ -4,7 +4,7 @@ use crate::aero::Axis;
 use crate::estimate::task::Task;
 use crate::filter_error::noise::Noise;
 use crate::flight::signal;
-use crate::numerics::mean::mean;
+use crate::numerics::statistics::mean::mean;
 use crate::units::DEG;
 
 /// Scale of turbulence at altitude, ft (MIL-F-8785C, Dryden). It relates the random walk of the

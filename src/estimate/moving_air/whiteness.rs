@@ -1,8 +1,8 @@
 //! Residuals of a fit as white noise: their correlation, cost, and the noise of the samples.
 
 use crate::dynamics::OUTPUTS;
-use crate::numerics::differences;
-use crate::numerics::order_statistics::median;
+use crate::numerics::series::differences;
+use crate::numerics::statistics::order_statistics::median;
 use crate::output_error::{Fit, Measurements, Outcome};
 
 /// Correlation of neighbouring residuals above which the air is assumed to move; white residuals of
@@ -81,7 +81,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     use super::*;
-    use crate::numerics::random::RandomStream;
+    use crate::numerics::statistics::random::RandomStream;
 
     #[test]
     fn the_noise_of_a_slow_output_is_that_of_its_own_samples() {

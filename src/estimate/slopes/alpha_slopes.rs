@@ -24,7 +24,7 @@ use crate::dynamics::motion::ManeuverSignals;
 use crate::estimate::task::Task;
 use crate::filter_error::bounds::WidePass;
 use crate::filter_error::slopes::SlopePrior;
-use crate::numerics::mean::mean;
+use crate::numerics::statistics::mean::mean;
 use crate::output_error::{Case, Model};
 use crate::units::DEG;
 

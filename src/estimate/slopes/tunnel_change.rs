@@ -3,8 +3,8 @@
 use crate::aero::{Condition, Derivative, Regressor};
 use crate::estimate::task::Task;
 use crate::numerics::cubic_curve::CubicCurve;
-use crate::numerics::mean::mean;
-use crate::numerics::trapezoid::running_integral;
+use crate::numerics::series::trapezoid::running_integral;
+use crate::numerics::statistics::mean::mean;
 
 /// Intervals of the swept angles of attack, in each of which the tunnel's change is linear.
 const INTERVALS: usize = 200;

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::aero::wind_tunnel::TunnelPoint;
-use crate::numerics::normal::NORMAL_95;
+use crate::numerics::statistics::normal::NORMAL_95;
 use crate::tables::Weights;
 
 /// A bench with a bias of `ax`, and a tunnel with the true axial force known to a tenth.

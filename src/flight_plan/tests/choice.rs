@@ -7,7 +7,7 @@ use crate::flight_plan::choice::{
     Aim, AimPart, Budget, CardChoice, CardSet, CoefficientCovariance, Price,
 };
 use crate::model::PlannedRows;
-use crate::numerics::random::RandomStream;
+use crate::numerics::statistics::random::RandomStream;
 
 const CARDS: usize = 12;
 

@@ -5,7 +5,7 @@ use approx::{assert_relative_eq, relative_eq};
 use crate::flight_plan::choice::Aim;
 use crate::flight_plan::decision::Decision;
 use crate::flight_plan::goal_points::Target;
-use crate::numerics::random::RandomStream;
+use crate::numerics::statistics::random::RandomStream;
 
 fn decision(mean: f64, limits: &[f64], rest: f64) -> Decision {
     Decision {

@@ -8,7 +8,7 @@ use super::world::{FlownCard, World, evidence};
 use crate::aero::WindTunnel;
 use crate::maneuver::{Maneuver, Means};
 use crate::model::{Model, model};
-use crate::numerics::forecasts::reliability;
+use crate::numerics::statistics::forecasts::reliability;
 use crate::qualities::{JudgedAircraft, Qualities, qualities};
 use crate::tables::{Airframe, FlyingQuality, Level, LevelRow, QualityRow};
 

@@ -2,8 +2,8 @@
 
 use super::world::{FlownCard, World, evidence};
 use crate::flight_plan::candidate::{CandidateCard, reach_deg};
-use crate::numerics::mean::finite_mean;
-use crate::numerics::order_statistics::median;
+use crate::numerics::statistics::mean::finite_mean;
+use crate::numerics::statistics::order_statistics::median;
 use crate::tables::PosteriorRow;
 
 const UP_TO_40: &[f64] = &[10.0, 20.0, 30.0, 40.0];

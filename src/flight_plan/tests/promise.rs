@@ -4,7 +4,7 @@
 use super::world::{FlownCard, World, deviation, evidence};
 use crate::flight_plan::candidate::CandidateCard;
 use crate::flight_plan::choice::Budget;
-use crate::numerics::order_statistics::{median, quantile};
+use crate::numerics::statistics::order_statistics::{median, quantile};
 
 impl World {
     /// Bounds after a planned flight over the predicted ones, where the flight changes a bound by a

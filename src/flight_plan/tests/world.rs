@@ -18,7 +18,7 @@ use crate::lab::campaign::{FlightLimits, SimulatedCampaign, TestPoint, tunnel_ro
 use crate::lab::simulator::{Instruments, Simulator};
 use crate::maneuver::Maneuver;
 use crate::model::{ManeuverResults, Model, model};
-use crate::numerics::random::derived_seed;
+use crate::numerics::statistics::random::derived_seed;
 use crate::pipeline::estimate_maneuver;
 use crate::proof_of_match::of_posterior;
 use crate::tables::{NextGoalRow, PosteriorRow};

@@ -6,7 +6,7 @@ use std::ops::Range;
 use crate::ingest::clock::{Clock, Run};
 use crate::ingest::column_source::ColumnSource;
 use crate::ingest::refusal::Refusal;
-use crate::numerics::sample_count::nearest;
+use crate::numerics::series::sample_count::nearest;
 
 /// Gap between two runs, in rows, above which they are read separately; the rows of a smaller gap
 /// are read and dropped. A column's page holds some ten thousand rows.

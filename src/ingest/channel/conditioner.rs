@@ -19,7 +19,9 @@ use super::update_rate::{LONGEST_PERIOD, UpdateRate};
 use crate::flight::record::Series;
 use crate::flight::{Channel, Mark};
 use crate::ingest::settings::Settings;
-use crate::numerics::order_statistics::{upper_median_in_place, upper_median_of_counts};
+use crate::numerics::statistics::order_statistics::{
+    upper_median_in_place, upper_median_of_counts,
+};
 use crate::units::Conversion;
 
 /// Unit of a 0/1 channel, whose values are never smoothed or interpolated.

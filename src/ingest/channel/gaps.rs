@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::flight::Mark;
 use crate::flight::signal as s;
-use crate::numerics::sample_count::whole_steps;
+use crate::numerics::series::sample_count::whole_steps;
 
 /// Method of bridging a short gap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

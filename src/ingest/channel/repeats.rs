@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::update_rate::neighbours;
 use crate::ingest::settings::Stuck;
-use crate::numerics::sample_count::nearest;
+use crate::numerics::series::sample_count::nearest;
 
 /// Least number of samples from which the probability of a repeat by noise is estimated.
 const LEAST_SAMPLES: usize = 200;

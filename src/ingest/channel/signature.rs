@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::flight::Mark;
 use crate::flight::record::Series;
 use crate::ingest::clock::Clock;
-use crate::numerics::sample_count::nearest;
+use crate::numerics::series::sample_count::nearest;
 
 /// Interval between the times of a signature, s: a flight has some hundreds of them.
 const INTERVAL_S: f64 = 10.0;

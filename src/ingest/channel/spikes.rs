@@ -11,8 +11,8 @@ use std::ops::Range;
 use pulp::Arch;
 
 use crate::ingest::settings::Spikes;
-use crate::numerics::order_statistics::{SIGMA_PER_MAD, lower_quantile_in_place};
-use crate::numerics::sample_count::whole_steps;
+use crate::numerics::series::sample_count::whole_steps;
+use crate::numerics::statistics::order_statistics::{SIGMA_PER_MAD, lower_quantile_in_place};
 
 /// Variance of a sample minus its neighbours' mean, in variances of white noise: 1 + 1/4 + 1/4.
 const MEAN_VARIANCE: f64 = 1.5;

@@ -2,7 +2,7 @@
 
 use crate::flight::Channel;
 use crate::ingest::settings::Settings;
-use crate::numerics::sample_count::whole_steps;
+use crate::numerics::series::sample_count::whole_steps;
 use crate::units::{Quantity, Unit};
 
 /// Smallest jump that counts as a wrap if the channel map states the period, as a fraction of the

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use crate::earth::air;
 use crate::flight::{Correction, signal};
 use crate::ingest::settings::Checks;
-use crate::numerics::order_statistics::upper_median;
-use crate::numerics::sample_count::whole_steps;
+use crate::numerics::series::sample_count::whole_steps;
+use crate::numerics::statistics::order_statistics::upper_median;
 
 /// Signals that the relations and the checks of mass, inertias and engines use.
 const USED: &[&str] = &[

@@ -3,7 +3,7 @@
 use super::gusts::Gusts;
 use super::relations::{Relation, Selection};
 use super::windows::WindowPair;
-use crate::numerics::order_statistics::{SIGMA_PER_MAD, upper_median};
+use crate::numerics::statistics::order_statistics::{SIGMA_PER_MAD, upper_median};
 
 /// Number of standard deviations that gusts reach in one of many windows: normal gusts in one of 370, about as
 /// many as a flight has.

@@ -43,7 +43,7 @@ mod tests {
     use super::super::block_means::BlockAverager;
     use super::*;
     use crate::ingest::settings::Checks;
-    use crate::numerics::random::RandomStream;
+    use crate::numerics::statistics::random::RandomStream;
 
     const BLOCKS: usize = 500;
     const SAMPLES_PER_BLOCK: usize = 8;

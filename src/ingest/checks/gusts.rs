@@ -17,8 +17,8 @@
 
 use super::relations::{BODY_AXES, Relation};
 use super::windows::{RelationPairs, WindowPair};
-use crate::numerics::order_statistics::quantile;
-use crate::numerics::sample_count::whole_steps;
+use crate::numerics::series::sample_count::whole_steps;
+use crate::numerics::statistics::order_statistics::quantile;
 
 /// Share of the second differences below the one from which their variance is computed. Maneuvers
 /// disturb fewer than a quarter; gusts in a quarter of the flight are detected.

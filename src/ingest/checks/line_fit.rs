@@ -1,7 +1,7 @@
 //! Line fits of a kinematic relation: measured side against predicted side, one point per window.
 
 use super::windows::WindowPair;
-use crate::numerics::order_statistics::{upper_median, weighted_median};
+use crate::numerics::statistics::order_statistics::{upper_median, weighted_median};
 
 /// Least-squares line through the origin, measured over predicted.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,8 +9,8 @@ use super::block_means::BlockMeans;
 use crate::aircraft::Aircraft;
 use crate::flight::signal;
 use crate::ingest::settings::Checks;
-use crate::numerics::order_statistics::upper_median;
-use crate::numerics::sample_count::whole_steps;
+use crate::numerics::series::sample_count::whole_steps;
+use crate::numerics::statistics::order_statistics::upper_median;
 use crate::units::{G0_FT_S2, RAD, Unit};
 
 /// A signal with values that no aircraft has.

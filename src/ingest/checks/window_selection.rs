@@ -4,7 +4,7 @@ use super::line_fit::median_slope;
 use super::relations::{GustEffect, Relation, Selection};
 use super::windows::WindowPair;
 use crate::ingest::settings::Checks;
-use crate::numerics::order_statistics::{SIGMA_PER_MAD, upper_median};
+use crate::numerics::statistics::order_statistics::{SIGMA_PER_MAD, upper_median};
 
 /// Number of windows that a relation selects in a short flight if it selects the largest, as a
 /// multiple of the smallest number for a verdict. They suffice for the slope of a relation whose

@@ -5,7 +5,7 @@ use super::block_motion::{BlockMotion, Motions};
 use super::relations::{Relation, Side};
 use crate::aircraft::Aircraft;
 use crate::ingest::settings::Checks;
-use crate::numerics::sample_count::whole_steps;
+use crate::numerics::series::sample_count::whole_steps;
 
 /// Both sides of a relation in one window.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,7 +5,7 @@
 //! out. A jump of the time, back or far ahead, begins a new piece. [`super::merge`] decides about
 //! the jump when all pieces are scanned.
 
-use crate::numerics::order_statistics::upper_median;
+use crate::numerics::statistics::order_statistics::upper_median;
 
 /// Consecutive rows of one file, from the first time to the last.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use super::merge::{PiecePart, PieceSequence};
 use crate::ingest::settings::Settings;
-use crate::numerics::sample_count::nearest;
+use crate::numerics::series::sample_count::nearest;
 
 /// Consecutive rows that are consecutive samples: row `row + i` of the file is sample `sample + i`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

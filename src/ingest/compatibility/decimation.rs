@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::flight::{Mark, Record};
-use crate::numerics::mean::mean;
+use crate::numerics::statistics::mean::mean;
 use crate::output_error::surface_noise::white_variance;
 
 /// Samples of the record that are averaged into one sample of a window, alike for all channels. At

@@ -10,7 +10,7 @@ use super::parameters::{
 use super::window::Window;
 use super::window_fit::{Squares, squares_about_mean};
 use crate::flight::signal;
-use crate::numerics::student;
+use crate::numerics::statistics::student;
 
 /// Relative error of the equations themselves: the accuracy of gravity, arms and positions.
 pub const MODEL_SCALE: f64 = 0.002;

@@ -51,7 +51,7 @@ use super::parameters::{
 use super::reconstruction::{DRIVING, LOCAL, ROW, Row};
 use super::window::Window;
 use super::window_sums::{ALL, LinearisedWindow, ReducedInformation, place_among_all};
-use crate::numerics::symmetric;
+use crate::numerics::linear_algebra::symmetric;
 
 /// Length of the blocks of samples that share one g, s: short against the periods of an aircraft's
 /// motion, 1 s and more.

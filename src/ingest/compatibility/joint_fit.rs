@@ -18,7 +18,7 @@ use super::settings::Compatibility;
 use super::window::{Window, margin};
 use super::window_fit::{FitContext, WindowFit};
 use crate::aircraft::Aircraft;
-use crate::numerics::mean::finite_mean;
+use crate::numerics::statistics::mean::finite_mean;
 
 /// Largest number of rounds in which R and P are estimated anew; the fit usually settles earlier.
 const ROUNDS: usize = 8;

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::parameters::{ALL_KINDS, KINDS, Kind, PARAMETERS, Parameters};
 use super::settings::Compatibility;
 use super::window_fit::{FitContext, WindowFit};
-use crate::numerics::symmetric;
+use crate::numerics::linear_algebra::symmetric;
 
 /// Largest number of halvings of a step that raises the cost; after them the step is dropped. A Gauss-Newton
 /// step that raises the cost at 1/32 of its length is wrong in its direction, and not in its length.

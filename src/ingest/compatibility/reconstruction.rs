@@ -35,7 +35,7 @@ use super::window::Window;
 use crate::aircraft::Aircraft;
 use crate::flight::interpolation_kernel::InterpolationKernel;
 use crate::numerics::runge_kutta::{POINT, STAGES, reaches_s, weights_s};
-use crate::numerics::simd::{VECTOR, load, store};
+use crate::numerics::vectors::simd::{VECTOR, load, store};
 
 /// Number of parameters of a window alone: its initial state, and the rates of change of the wind.
 pub const LOCAL: usize = STATES + WIND;

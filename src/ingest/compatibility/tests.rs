@@ -24,7 +24,7 @@ use super::*;
 use crate::aircraft::{Position, Sensors, Vane, VaneModel};
 use crate::flight::record::Series;
 use crate::flight::{Mark, StandIn, signal as s};
-use crate::numerics::random::RandomStream;
+use crate::numerics::statistics::random::RandomStream;
 use crate::tables::InstrumentVerdict;
 use crate::units::{DEG, G0_FT_S2};
 

@@ -12,7 +12,7 @@ use super::settings::Compatibility;
 use crate::aircraft::Aircraft;
 use crate::flight::Record;
 use crate::flight::interpolation_kernel::WIDTH;
-use crate::numerics::sample_count::nearest;
+use crate::numerics::series::sample_count::nearest;
 use crate::units::DEG;
 
 /// Step of the integration from point to point, s: a twentieth of the period at 1 Hz. An aircraft

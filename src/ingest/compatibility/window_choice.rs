@@ -7,7 +7,7 @@ use super::parameters::{INPUTS, SIGNALS};
 use super::settings::Compatibility;
 use super::window::margin;
 use crate::flight::{Record, signal as s};
-use crate::numerics::sample_count::nearest;
+use crate::numerics::series::sample_count::nearest;
 
 /// Largest pitch attitude, deg: beyond it the Euler angles are close to their singularity.
 const STEEPEST_DEG: f64 = 75.0;

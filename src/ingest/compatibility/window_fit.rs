@@ -16,7 +16,7 @@ use super::settings::Compatibility;
 use super::window::Window;
 use super::window_sums::{Comparison, LinearisedWindow, ReducedInformation, weighted_gradient};
 use crate::aircraft::Aircraft;
-use crate::numerics::mean::mean;
+use crate::numerics::statistics::mean::mean;
 use crate::output_error::coloured;
 
 /// Least standard deviation of an output's residuals, as a share of its ordinary bias: keeps the

@@ -17,8 +17,8 @@ use super::reconstruction::{
 };
 use super::window::Window;
 use crate::flight::interpolation_kernel::InterpolationKernel;
-use crate::numerics::row_products::StridedRows;
-use crate::numerics::simd::{AlignedBuffer, VECTOR, load, store};
+use crate::numerics::vectors::row_products::StridedRows;
+use crate::numerics::vectors::simd::{AlignedBuffer, VECTOR, load, store};
 
 /// Rows of an output that are summed together: they stay in the processor's first cache.
 const CHUNK: usize = 16;

@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use super::coverage::{MeasuredPoint, TrueAndEstimated};
 use super::recordings::Realisation;
 use crate::aero::{AeroModel, Regressor, WindTunnel};
-use crate::numerics::normal::NORMAL_95;
-use crate::numerics::order_statistics::median;
+use crate::numerics::statistics::normal::NORMAL_95;
+use crate::numerics::statistics::order_statistics::median;
 use crate::tables::ConditionRow;
 
 /// Class of the row of all classes.

@@ -5,9 +5,9 @@ use rayon::prelude::*;
 use super::recordings::{Realisation, StudyManeuver};
 use crate::error::Problem;
 use crate::maneuver::Status;
-use crate::numerics::mean::mean;
-use crate::numerics::normal::NORMAL_95;
-use crate::numerics::random::derived_seed;
+use crate::numerics::statistics::mean::mean;
+use crate::numerics::statistics::normal::NORMAL_95;
+use crate::numerics::statistics::random::derived_seed;
 use crate::output_error::Outcome;
 use crate::tables::{CoverageRow, EstimateRow};
 

@@ -18,7 +18,7 @@ use crate::error::{Problem, Result};
 use crate::lab::campaign::{RecordNoise, SimulatedCampaign, StudyCondition};
 use crate::lab::simulator::{Card, DerivativeLookup};
 use crate::maneuver::Class;
-use crate::numerics::random::derived_seed;
+use crate::numerics::statistics::random::derived_seed;
 use crate::output_error::estimation::Weights;
 use crate::pipeline::Progress;
 use crate::store::{atomic, table};

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use super::condition_rows::ALL_CLASSES;
 use crate::lab::campaign::StudyCondition;
-use crate::numerics::order_statistics::upper_median;
+use crate::numerics::statistics::order_statistics::upper_median;
 use crate::tables::{ConditionRow, CoverageRow, StartRow, StartVariant};
 
 /// Criterion for the bias of a derivative: below this share of the scatter.

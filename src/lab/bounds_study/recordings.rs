@@ -11,7 +11,7 @@ use crate::estimate::{self, Context, Estimated};
 use crate::lab::campaign::{RecordNoise, SimulatedCampaign, StudyCondition};
 use crate::lab::simulator::{Card, FlownManeuver, Instrument, Instruments, TrueDerivative};
 use crate::maneuver::Class;
-use crate::numerics::random::derived_seed;
+use crate::numerics::statistics::random::derived_seed;
 
 /// A test point of the study under one condition.
 #[derive(Clone, Debug)]

@@ -9,7 +9,7 @@ use crate::aero::{AeroModel, WindTunnel};
 use crate::error::Problem;
 use crate::estimate::{Estimated, Method, Start};
 use crate::lab::simulator::{FlownManeuver, TrueDerivative};
-use crate::numerics::random::derived_seed;
+use crate::numerics::statistics::random::derived_seed;
 use crate::output_error::Outcome;
 use crate::tables::{EstimateRow, StartRow, StartVariant, StartingValues};
 

@@ -6,7 +6,7 @@ use super::test_point::TestPoint;
 use crate::error::Problem;
 use crate::flight::Record;
 use crate::lab::simulator::{Card, FlownManeuver, Instruments};
-use crate::numerics::random::derived_seed;
+use crate::numerics::statistics::random::derived_seed;
 
 /// Record time of a flight's first sample.
 const FIRST_S: f64 = 100.0;

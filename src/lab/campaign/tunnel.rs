@@ -4,7 +4,7 @@ use super::cards::TunnelErrors;
 use super::simulated_campaign::SimulatedCampaign;
 use crate::aero::Combined;
 use crate::aero::wind_tunnel::key;
-use crate::numerics::random::RandomStream;
+use crate::numerics::statistics::random::RandomStream;
 use crate::store::files::TunnelRow;
 
 /// Rows of the database. Each derivative has an error common to its table and a further error at

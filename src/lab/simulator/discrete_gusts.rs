@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use serde::{Deserialize, Serialize};
 
 use super::gust::{Gust, GustPath};
-use crate::numerics::random::RandomStream;
+use crate::numerics::statistics::random::RandomStream;
 
 /// Size, length and frequency of discrete gusts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

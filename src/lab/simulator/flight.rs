@@ -16,8 +16,8 @@ use crate::error::did_you_mean;
 use crate::flight::record::Series;
 use crate::flight::{Mark, Record, signal};
 use crate::maneuver::{Maneuver, ManeuverOrigin, Quality, Recognised};
-use crate::numerics::mean::mean;
-use crate::numerics::sample_count::nearest;
+use crate::numerics::series::sample_count::nearest;
+use crate::numerics::statistics::mean::mean;
 use crate::rigid_body::{BodyState, DEPARTURE_DEG};
 use crate::units::DEG;
 

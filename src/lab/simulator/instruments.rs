@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::flight::record::Series;
 use crate::flight::{Correction, Mark, Record};
-use crate::numerics::random::RandomStream;
+use crate::numerics::statistics::random::RandomStream;
 
 /// Errors of one signal's instrument, in the signal's unit. All zero: a perfect instrument.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -7,7 +7,7 @@
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use crate::numerics::random::RandomStream;
+use crate::numerics::statistics::random::RandomStream;
 
 /// A stable filter in continuous time.
 #[derive(Clone, Debug, PartialEq)]

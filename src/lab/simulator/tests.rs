@@ -23,7 +23,7 @@ use crate::estimate::{self, Context, Estimated, Method};
 use crate::flight::{Record, signal};
 use crate::lab::campaign::SimulatedCampaign;
 use crate::maneuver::{Maneuver, Status};
-use crate::numerics::random::RandomStream;
+use crate::numerics::statistics::random::RandomStream;
 use crate::rigid_body::{AirData, BodyState, Euler};
 use crate::surfaces::{self, AircraftModel};
 use crate::tables::Outcome;

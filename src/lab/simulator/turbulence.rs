@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 
 use super::gust::{Gust, GustPath};
 use super::shaping_filter::ShapingFilter;
-use crate::numerics::random::RandomStream;
+use crate::numerics::statistics::random::RandomStream;
 
 /// Form of the spectra.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -13,7 +13,7 @@ use crate::dynamics::motion::{ManeuverSignals, MassProperties};
 use crate::dynamics::{Longitudinal, OUTPUTS};
 use crate::error::{Error, Result};
 use crate::flight::Record;
-use crate::numerics::symmetric;
+use crate::numerics::linear_algebra::symmetric;
 use crate::output_error::cost::Sums;
 use crate::output_error::newton_raphson::{self, Settings};
 use crate::output_error::surface_noise::noisy_surfaces;

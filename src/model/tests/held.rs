@@ -7,7 +7,7 @@ use super::parts::{campaign, data, scales};
 use crate::model::Settings;
 use crate::model::other_flights::OtherFlights;
 use crate::model::posterior::{gaussian, information};
-use crate::numerics::root::EXACT;
+use crate::numerics::linear_algebra::root::EXACT;
 use crate::output_error::error_effect::SharedError;
 use crate::tables::EstimateRow;
 

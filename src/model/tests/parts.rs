@@ -16,8 +16,8 @@ use crate::model::scales::{logarithms_of, most_probable, negative_log_posterior,
 use crate::model::term::{PosteriorTerm, TermSources};
 use crate::model::unknowns::root_of_differences;
 use crate::model::{ManeuverResults, Settings};
-use crate::numerics::random::RandomStream;
-use crate::numerics::root::EXACT;
+use crate::numerics::linear_algebra::root::EXACT;
+use crate::numerics::statistics::random::RandomStream;
 use crate::output_error::error_effect::SharedError;
 
 /// Ten maneuvers in four flights, with everything that they can share.

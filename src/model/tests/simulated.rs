@@ -5,9 +5,9 @@ use nalgebra::DVector;
 
 use super::fixture::{Flown, at, diagonal, exact, maneuver, posterior, tunnel};
 use crate::model::Settings;
-use crate::numerics::normal;
-use crate::numerics::random::RandomStream;
-use crate::numerics::root::{EXACT, root};
+use crate::numerics::linear_algebra::root::{EXACT, root};
+use crate::numerics::statistics::normal;
+use crate::numerics::statistics::random::RandomStream;
 
 /// Draws truth and estimates of one campaign; returns the rank of the truth of the slope at 20 deg.
 fn rank(noise: &mut RandomStream, settings: &Settings) -> f64 {

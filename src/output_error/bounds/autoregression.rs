@@ -125,7 +125,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     use super::*;
-    use crate::numerics::matrix::AlignedMatrix;
+    use crate::numerics::linear_algebra::matrix::AlignedMatrix;
 
     /// Autocovariances of v_k = c v_{k−1} + e_k with unit variance.
     fn first_order(c: f64, lags: i32) -> Vec<f64> {

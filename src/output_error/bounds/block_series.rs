@@ -10,7 +10,7 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 use super::autoregression::Autoregression;
-use crate::numerics::matrix::{AlignedMatrix, LONGEST_LAG};
+use crate::numerics::linear_algebra::matrix::{AlignedMatrix, LONGEST_LAG};
 use crate::output_error::case::blocks::{BlockSums, samples_per_block};
 
 /// Highest order of a process.

@@ -14,7 +14,7 @@ use crate::aero::{Coefficient, Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{Equations, OUTPUTS};
-use crate::numerics::symmetric::inverse;
+use crate::numerics::linear_algebra::symmetric::inverse;
 use crate::output_error::case::{Case, InitialState, Model};
 use crate::output_error::kernel::pass::Diverged;
 use crate::output_error::kernel::response::Sensitivities;

@@ -39,8 +39,8 @@ use nalgebra::DMatrix;
 use super::autoregression::Autoregression;
 use super::block_series::{BlockSeries, HIGHEST_ORDER};
 use super::degrees_of_freedom::{ColouredPart, VarianceEstimates};
-use crate::numerics::matrix::AlignedMatrix;
-use crate::numerics::student;
+use crate::numerics::linear_algebra::matrix::AlignedMatrix;
+use crate::numerics::statistics::student;
 use crate::output_error::case::blocks::BlockSums;
 
 /// Largest number of rounds in which the absorbed part is added back.

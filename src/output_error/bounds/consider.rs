@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use crate::dynamics::{Equations, OUTPUTS};
-use crate::numerics::symmetric::inverse;
+use crate::numerics::linear_algebra::symmetric::inverse;
 use crate::output_error::case::Case;
 use crate::output_error::likelihood::cost::sums;
 use crate::output_error::likelihood::error_effect::{ErrorEffect, SharedError, covariance_of};

@@ -14,8 +14,8 @@ use nalgebra::DMatrix;
 
 use super::bounded::Bounded;
 use super::coloured::{self, ResidualNoise};
-use crate::numerics::matrix::AlignedMatrix;
-use crate::numerics::symmetric::raise_variances;
+use crate::numerics::linear_algebra::matrix::AlignedMatrix;
+use crate::numerics::linear_algebra::symmetric::raise_variances;
 use crate::output_error::likelihood::information::Identification;
 use crate::output_error::likelihood::outcome::Fit;
 

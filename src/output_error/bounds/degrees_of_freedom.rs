@@ -20,7 +20,7 @@
 //! The sum has ν = 2 (Σ V)²/Σ var V degrees of freedom (Satterthwaite 1946).
 
 use super::autoregression::Autoregression;
-use crate::numerics::matrix::AlignedMatrix;
+use crate::numerics::linear_algebra::matrix::AlignedMatrix;
 
 /// Estimated variance of each parameter, with the variance of that estimate.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -20,8 +20,8 @@ use pulp::{Arch, Simd, WithSimd};
 
 use super::block_series::BlockSeries;
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
-use crate::numerics::row_products::StridedRows;
-use crate::numerics::simd::{AlignedBuffer, VECTOR, load, store};
+use crate::numerics::vectors::row_products::StridedRows;
+use crate::numerics::vectors::simd::{AlignedBuffer, VECTOR, load, store};
 use crate::output_error::case::Case;
 use crate::output_error::case::blocks::samples_per_block;
 use crate::output_error::case::chunking::CHUNK;

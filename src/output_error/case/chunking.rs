@@ -4,7 +4,7 @@
     reason = "compiled into the kernel for the processor at hand"
 )]
 
-use crate::numerics::simd::VECTOR;
+use crate::numerics::vectors::simd::VECTOR;
 
 /// Samples between two calls of the sink: a whole number of vectors, whose rows fit into the
 /// first-level cache.

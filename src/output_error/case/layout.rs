@@ -35,7 +35,7 @@ use std::ops::Range;
 
 use super::build_up::BuildUpTerm;
 use crate::dynamics::COEFFICIENTS;
-use crate::numerics::simd::VECTOR;
+use crate::numerics::vectors::simd::VECTOR;
 
 /// Largest number of products of states that are regressors of an axis: with the states themselves
 /// they fit into one vector.

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use super::surface_noise::white_variance;
 use crate::flight::{Mark, Record, signal};
-use crate::numerics::mean::mean;
+use crate::numerics::statistics::mean::mean;
 
 /// Variance of white noise with the same effect on slow motion as the noise of a slow dynamic
 /// pressure. It is relative to the square of the dynamic pressure. Zero for a dynamic pressure

@@ -7,8 +7,8 @@ use crate::aero::{Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::ManeuverSignals;
 use crate::flight::signal;
-use crate::numerics::differences;
-use crate::numerics::order_statistics::upper_median_of_magnitudes;
+use crate::numerics::series::differences;
+use crate::numerics::statistics::order_statistics::upper_median_of_magnitudes;
 
 /// Surface with noise on its measured deflection.
 #[derive(Clone, Debug, PartialEq)]

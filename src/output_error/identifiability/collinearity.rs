@@ -14,8 +14,8 @@
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
-use crate::numerics::mean::{mean, root_mean_square};
-use crate::numerics::symmetric::{inverse, scale, scaled};
+use crate::numerics::linear_algebra::symmetric::{inverse, scale, scaled};
+use crate::numerics::statistics::mean::{mean, root_mean_square};
 use crate::settings::settings;
 
 settings! {

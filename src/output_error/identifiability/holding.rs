@@ -19,7 +19,7 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use crate::dynamics::{Equations, OUTPUTS};
-use crate::numerics::symmetric::{inverse, scale, scaled};
+use crate::numerics::linear_algebra::symmetric::{inverse, scale, scaled};
 use crate::output_error::bounds::bounded::Bounded;
 use crate::output_error::bounds::coloured::{self, ResidualNoise};
 use crate::output_error::case::Case;

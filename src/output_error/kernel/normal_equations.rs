@@ -16,8 +16,8 @@ use pulp::{Arch, Simd};
 
 use super::pass::Sink;
 use crate::dynamics::OUTPUTS;
-use crate::numerics::row_products::{Interleaved, StridedRows};
-use crate::numerics::simd::AlignedBuffer;
+use crate::numerics::vectors::row_products::{Interleaved, StridedRows};
+use crate::numerics::vectors::simd::AlignedBuffer;
 use crate::output_error::case::Measurements;
 use crate::output_error::case::blocks::BlockSums;
 use crate::output_error::case::chunking::{CHUNK, Strided};

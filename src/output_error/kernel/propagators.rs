@@ -29,7 +29,7 @@ use super::chunk::ChunkBuildUp;
 use super::trajectory::StageHistory;
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
 use crate::numerics::runge_kutta::{STAGES, reaches_s, weights_s};
-use crate::numerics::simd::{load, store};
+use crate::numerics::vectors::simd::{load, store};
 use crate::output_error::case::Case;
 use crate::output_error::case::chunking::CHUNK;
 

@@ -13,9 +13,9 @@ use nalgebra::SVector;
 
 use super::chunk::ChunkBuildUp;
 use crate::dynamics::{COEFFICIENTS, Equations};
-use crate::numerics::row_products::Interleaved;
 use crate::numerics::runge_kutta::{POINT, STAGES, reaches_s, weights_s};
-use crate::numerics::simd::VECTOR;
+use crate::numerics::vectors::row_products::Interleaved;
+use crate::numerics::vectors::simd::VECTOR;
 use crate::output_error::case::Case;
 use crate::output_error::case::chunking::{CHUNK, Strided};
 

@@ -27,8 +27,8 @@ use super::cost::add_square;
 use super::whittle;
 use crate::dynamics::motion::slope_reach;
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
-use crate::numerics::harmonics::Harmonics;
-use crate::numerics::symmetric::solve_damped;
+use crate::numerics::linear_algebra::symmetric::solve_damped;
+use crate::numerics::series::harmonics::Harmonics;
 use crate::output_error::case::build_up::BuildUpTerm;
 use crate::output_error::case::{Case, Measurements};
 

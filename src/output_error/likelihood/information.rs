@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use crate::numerics::symmetric::{inverse, scale, scaled};
+use crate::numerics::linear_algebra::symmetric::{inverse, scale, scaled};
 
 /// Identifiability of the parameters together.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,7 +7,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::numerics::symmetric::{inverse, solve_damped};
+use crate::numerics::linear_algebra::symmetric::{inverse, solve_damped};
 
 /// Estimates of some of the wanted parameters, with their covariance.
 #[derive(Clone, Debug, PartialEq)]

@@ -12,7 +12,7 @@ use super::definition::Likelihood;
 use super::outcome::{Fit, Outcome};
 use crate::dynamics::OUTPUTS;
 use crate::numerics::damping::{next_damping, raised_damping};
-use crate::numerics::symmetric::solve_damped;
+use crate::numerics::linear_algebra::symmetric::solve_damped;
 use crate::output_error::kernel::response::Detail;
 use crate::settings::settings;
 

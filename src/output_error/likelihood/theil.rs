@@ -17,7 +17,7 @@
 //! for a perfect prediction and can be negative.
 
 use crate::dynamics::OUTPUTS;
-use crate::numerics::mean::mean;
+use crate::numerics::statistics::mean::mean;
 use crate::output_error::case::Measurements;
 
 /// Theil's inequality coefficient and the shares of its parts.

@@ -9,8 +9,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::information::Identification;
-use crate::numerics::student::widening_95;
-use crate::numerics::symmetric::raise_variances;
+use crate::numerics::linear_algebra::symmetric::raise_variances;
+use crate::numerics::statistics::student::widening_95;
 
 /// Rounds of parameters and spectrum. Simulated estimates and their coverage are the same after 3, 5
 /// and 10.

@@ -7,7 +7,7 @@ use super::super::calibration_errors::{Calibration, FittedManeuver, SignalError}
 use super::super::cost;
 use super::super::likelihood::information::Identification;
 use super::*;
-use crate::numerics::symmetric;
+use crate::numerics::linear_algebra::symmetric;
 
 fn model(truth: &[(Derivative, f64)]) -> Model<'_> {
     Model {

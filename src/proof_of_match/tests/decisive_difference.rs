@@ -9,7 +9,7 @@ use super::repeat_flight::{drawn, posterior};
 use crate::aero::{Axis, WindTunnel};
 use crate::estimate;
 use crate::model::LocalPosterior;
-use crate::numerics::random::RandomStream;
+use crate::numerics::statistics::random::RandomStream;
 use crate::proof_of_match::outputs::output_index;
 use crate::proof_of_match::{ProofInputs, RecordedManeuver, decisive_difference};
 use crate::tables::{MatchedQuantity, ModelSource};

@@ -5,7 +5,7 @@ use approx::assert_relative_eq;
 use super::fixture::{estimated, flown, recording, shipped, simulation, truth};
 use crate::estimate;
 use crate::lab::simulator::FlownManeuver;
-use crate::numerics::random::RandomStream;
+use crate::numerics::statistics::random::RandomStream;
 use crate::proof_of_match::dutch_roll::LateralModes;
 use crate::tables::MatchedQuantity;
 

@@ -1,6 +1,6 @@
 //! Scale of one axis: round limits and ticks, not stretched by a few outliers.
 
-use crate::numerics::order_statistics::quantile;
+use crate::numerics::statistics::order_statistics::quantile;
 use crate::report::notation::power_of_ten;
 
 /// Limits at multiples of half a step, with ticks at the multiples of the step.

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::class_markers::ClassMarkers;
 use super::history_strips;
 use crate::aero::Axis;
-use crate::numerics::mean::{mean, root_mean_square};
+use crate::numerics::statistics::mean::{mean, root_mean_square};
 use crate::report::contents::{Contents, group_by};
 use crate::report::figure::legend::{LegendView, key, line};
 use crate::report::figure::scale::extent;

@@ -8,7 +8,7 @@ use super::class_markers::ClassMarkers;
 use super::derivative_results::DerivativeResults;
 use super::verdict_ranges;
 use crate::aero::Coefficient;
-use crate::numerics::normal::NORMAL_95;
+use crate::numerics::statistics::normal::NORMAL_95;
 use crate::report::contents::group_by;
 use crate::report::figure::derivative_figure::{self, ClassEstimates, DerivativeFigure};
 use crate::report::figure::legend::{LegendView, key, line};

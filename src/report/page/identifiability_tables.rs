@@ -5,7 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::maneuver::Status;
-use crate::numerics::order_statistics::median;
+use crate::numerics::statistics::order_statistics::median;
 use crate::report::contents::Contents;
 use crate::report::figure::scale::extent;
 use crate::report::notation::{DASH, fixed};

@@ -2,7 +2,7 @@
 //! far from the others in some flights.
 
 use super::quality_charts::QualityChart;
-use crate::numerics::normal::NORMAL_95;
+use crate::numerics::statistics::normal::NORMAL_95;
 use crate::report::contents::Contents;
 use crate::report::figure::chart_axis::ChartAxis;
 use crate::report::figure::scale::{Scale, extent};

@@ -8,7 +8,7 @@ use super::class_markers::ClassMarkers;
 use super::maneuver_page;
 use super::match_charts;
 use super::quality_charts::QualityChart;
-use crate::numerics::order_statistics::median;
+use crate::numerics::statistics::order_statistics::median;
 use crate::proof_of_match::Matched;
 use crate::report::contents::Contents;
 use crate::report::notation::{DASH, angle, count, fixed, number};

@@ -1,7 +1,7 @@
 //! Quality of prediction by class and output: medians, and the maneuver predicted worst.
 
 use crate::aero::Output;
-use crate::numerics::order_statistics::quantile;
+use crate::numerics::statistics::order_statistics::quantile;
 use crate::report::contents::Contents;
 use crate::report::notation::{DASH, fixed, number};
 use crate::report::table_view::TableView;

@@ -9,7 +9,7 @@ use super::qualities_section;
 use super::quality_charts::{QualityChart, level_in_words};
 use crate::aero::Axis;
 use crate::maneuver::Status;
-use crate::numerics::order_statistics::median;
+use crate::numerics::statistics::order_statistics::median;
 use crate::report::contents::{Contents, group_by};
 use crate::report::figure::chart_axis::ChartAxis;
 use crate::report::figure::scale::{Scale, extent};

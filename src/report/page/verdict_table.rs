@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::derivative_results::DerivativeResults;
 use super::verdict_ranges;
 use crate::aero::Axis;
-use crate::numerics::order_statistics::quantile;
+use crate::numerics::statistics::order_statistics::quantile;
 use crate::report::figure::scale::extent;
 use crate::report::figure::verdict_bar;
 use crate::report::notation::{self, DASH, angle, number};

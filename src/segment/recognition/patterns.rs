@@ -3,7 +3,7 @@
 
 use super::mismatch::Mismatch;
 use crate::maneuver::{Pulses, Sweep};
-use crate::numerics::mean::mean;
+use crate::numerics::statistics::mean::mean;
 use crate::segment::steps::step::Step;
 use crate::segment::steps::swings::Swing;
 

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::detections::Detections;
 use super::sequences::{Source, StepSequence};
 use crate::maneuver::Class;
-use crate::numerics::order_statistics::trimmed_range;
+use crate::numerics::statistics::order_statistics::trimmed_range;
 use crate::segment::steps::step::Step;
 
 /// Share of the samples at either end of a signal's range that may be spikes or a short excursion. Trade-off: of

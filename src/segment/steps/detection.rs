@@ -15,8 +15,8 @@
 
 use super::step::{SignalSteps, Step, Steps};
 use crate::flight::Record;
-use crate::numerics::differences::white_noise;
-use crate::numerics::order_statistics::{
+use crate::numerics::series::differences::white_noise;
+use crate::numerics::statistics::order_statistics::{
     SIGMA_PER_MAD, lower_quantile_in_place, upper_median_in_place,
 };
 use crate::segment::settings::Settings;
@@ -424,7 +424,7 @@ mod tests {
 
     #[test]
     fn noise_alone_is_the_same_by_its_quiet_tenth_as_by_its_median() {
-        let mut random = crate::numerics::random::RandomStream::new(5, "levels");
+        let mut random = crate::numerics::statistics::random::RandomStream::new(5, "levels");
         let levels: Vec<f64> = (0..20_000).map(|_| random.normal()).collect();
         let [median, quiet] = [false, true].map(|alone| noise(&levels, LENGTHS, alone));
         // Differences of white levels: √2 of their deviation.
@@ -434,7 +434,7 @@ mod tests {
 
     #[test]
     fn the_noise_of_levels_is_that_of_white_samples_whatever_the_motion() {
-        let mut random = crate::numerics::random::RandomStream::new(9, "samples");
+        let mut random = crate::numerics::statistics::random::RandomStream::new(9, "samples");
         let values: Vec<f64> = (0..20_000)
             .map(|k| 0.3 * random.normal() + 5.0 * (f64::from(k) / 60.0).sin())
             .collect();

@@ -10,9 +10,9 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::bisection::try_last_that_holds;
 use super::chi_squared;
 use super::normal::NORMAL_90;
+use crate::numerics::bisection::try_last_that_holds;
 
 /// Halvings of the interval of τ²: to 2⁻⁶⁰ of its length, the last digit. The ends are at most a
 /// factor of four apart, unless τ² is below the smallest variance.
@@ -157,8 +157,8 @@ mod tests {
     use approx::assert_relative_eq;
 
     use super::*;
-    use crate::numerics::random::RandomStream;
-    use crate::numerics::student;
+    use crate::numerics::statistics::random::RandomStream;
+    use crate::numerics::statistics::student;
 
     fn observations(values: &[f64], deviations: &[f64]) -> Vec<Observation> {
         let both = values.iter().zip(deviations);

@@ -11,8 +11,8 @@
 use nalgebra::DMatrix;
 use pulp::{Arch, Simd, WithSimd};
 
-use super::row_products::StridedRows;
-use super::simd::{AlignedBuffer, VECTOR, load, store};
+use crate::numerics::vectors::row_products::StridedRows;
+use crate::numerics::vectors::simd::{AlignedBuffer, VECTOR, load, store};
 
 /// Rows and lags that a loop computes side by side: enough independent sums to hide the latency of
 /// one.

@@ -3,7 +3,7 @@
 //! Motion at the aircraft's frequencies hardly contributes to second and third differences, and their
 //! median leaves out steps.
 
-use super::order_statistics::{SIGMA_PER_MAD, upper_median_in_place};
+use crate::numerics::statistics::order_statistics::{SIGMA_PER_MAD, upper_median_in_place};
 
 /// Second difference of three samples.
 #[must_use]
@@ -56,8 +56,8 @@ mod tests {
     use approx::assert_abs_diff_eq;
 
     use super::*;
-    use crate::numerics::order_statistics::median;
-    use crate::numerics::random::RandomStream;
+    use crate::numerics::statistics::order_statistics::median;
+    use crate::numerics::statistics::random::RandomStream;
 
     #[test]
     fn differences_of_a_cubic_are_its_derivatives() {
