@@ -2,54 +2,33 @@
 //! tunnel is the prior, and the maneuvers are the evidence.
 //!
 //! Each coefficient is one Gaussian problem. Its unknowns are the differences of its derivatives
-//! from the tunnel at the points of a grid ([`prior`]), linear between them. A maneuver counts with
+//! from the tunnel at the points of a grid ([`prior::derivative_prior`]), linear between them. A maneuver counts with
 //! its whole corrected covariance, the exact effect of its held values, and the calibration errors
-//! that it shares with its flight ([`observation`]). Sizes and lengths of the differences are the
-//! most probable ones ([`scales`]); their remaining uncertainty is added to the covariance
-//! ([`open_scales`]). A maneuver that the others contradict has a lower weight ([`posterior`]).
+//! that it shares with its flight ([`fusion::observation`]). Sizes and lengths of the differences are the
+//! most probable ones ([`fusion::scales`]); their remaining uncertainty is added to the covariance
+//! ([`fusion::open_scales`]). A maneuver that the others contradict has a lower weight ([`fusion::posterior`]).
 
+mod prior;
+mod fusion;
+mod results;
 mod settings;
 mod evidence;
-mod grid;
-mod scale_prior;
-mod prior_covariance;
-mod prior;
-mod term;
-mod observation;
-mod unknowns;
-mod flight_data;
-mod posterior;
-mod observed_differences;
-mod scales;
-mod open_scales;
-mod self_check;
-mod other_flights;
-mod held_values;
-mod coefficient;
-mod published;
-mod rows;
-mod campaign_model;
-mod with_held;
-mod lift_and_drag;
-mod draws;
-mod local;
-mod outlook;
 #[cfg(test)]
 mod tests;
 
 use rayon::prelude::*;
 
 use crate::aero::{AeroModel, Axis, Coefficient, WindTunnel};
-use coefficient::CoefficientPosterior;
 use evidence::in_order;
-use term::TermSources;
+use fusion::coefficient::CoefficientPosterior;
+use prior::term::TermSources;
 
-pub use campaign_model::{Failure, MOST_POINTS, Model};
-pub use draws::CorrelatedDerivatives;
 pub use evidence::ManeuverResults;
-pub use lift_and_drag::PublishedManeuver;
-pub use local::{LocalKind, LocalPosterior, LocalValue};
-pub use outlook::{Outlook, OutlookPoint, PlannedRows, PointQuantity};
+pub use results::campaign_model::{Failure, MOST_POINTS, Model};
+pub use results::draws::CorrelatedDerivatives;
+pub use results::lift_and_drag::PublishedManeuver;
+pub use results::local::{LocalKind, LocalPosterior, LocalValue};
+pub use results::outlook::{Outlook, OutlookPoint, PlannedRows, PointQuantity};
 pub use settings::Settings;
 
 /// Computes the posterior of every derivative. The order of the evidence within a flight, and of the

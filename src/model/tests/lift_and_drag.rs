@@ -9,7 +9,7 @@ use crate::aero::{AeroModel, Coefficient, Derivative, Regressor};
 use crate::dynamics::tests::aircraft;
 use crate::estimate::Covariance;
 use crate::maneuver::{Maneuver, Means, Status};
-use crate::model::lift_and_drag::PublishedManeuver;
+use crate::model::results::lift_and_drag::PublishedManeuver;
 use crate::model::{ManeuverResults, Model};
 use crate::output_error::error_effect::{ErrorEffect, SharedError};
 use crate::tables::{EstimateRow, LiftAndDragRow};

@@ -7,14 +7,16 @@ use super::fixture::{Flown, NAMES, aero_model, diagonal, exact, maneuver, poster
 use crate::aero::wind_tunnel::{self, Third};
 use crate::aero::{Coefficient, Condition, WindTunnel};
 use crate::maneuver::Maneuver;
-use crate::model::coefficient::Data;
-use crate::model::observed_differences::ObservedDifferences;
-use crate::model::open_scales::add_open_scales;
-use crate::model::posterior::{LeaveOneOut, gaussian, information, of_differences};
-use crate::model::scale_prior::Scale;
-use crate::model::scales::{logarithms_of, most_probable, negative_log_posterior, scales_of};
-use crate::model::term::{PosteriorTerm, TermSources};
-use crate::model::unknowns::root_of_differences;
+use crate::model::fusion::coefficient::Data;
+use crate::model::fusion::observed_differences::ObservedDifferences;
+use crate::model::fusion::open_scales::add_open_scales;
+use crate::model::fusion::posterior::{LeaveOneOut, gaussian, information, of_differences};
+use crate::model::fusion::scales::{
+    logarithms_of, most_probable, negative_log_posterior, scales_of,
+};
+use crate::model::fusion::unknowns::root_of_differences;
+use crate::model::prior::scale_prior::Scale;
+use crate::model::prior::term::{PosteriorTerm, TermSources};
 use crate::model::{ManeuverResults, Settings};
 use crate::numerics::linear_algebra::root::EXACT;
 use crate::numerics::statistics::random::RandomStream;

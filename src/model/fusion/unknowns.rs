@@ -8,12 +8,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, DVector};
 
-use super::grid::Grid;
 use super::observation::Observation;
-use super::prior_covariance::matern_3_2;
-use super::scale_prior::Scale;
-use super::term::PosteriorTerm;
 use crate::aero::Condition;
+use crate::model::prior::grid::Grid;
+use crate::model::prior::prior_covariance::matern_3_2;
+use crate::model::prior::scale_prior::Scale;
+use crate::model::prior::term::PosteriorTerm;
 use crate::numerics::linear_algebra::root::{BlockRoot, root};
 use crate::output_error::error_effect::SharedError;
 

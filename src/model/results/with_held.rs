@@ -10,11 +10,11 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::campaign_model::Model;
-use super::evidence::ManeuverResults;
-use super::held_values::HeldDifferences;
-use super::unknowns::{SparseRow, covariance_between, weighted_sum};
 use crate::aero::Combined;
 use crate::maneuver::Status;
+use crate::model::evidence::ManeuverResults;
+use crate::model::fusion::held_values::HeldDifferences;
+use crate::model::fusion::unknowns::{SparseRow, covariance_between, weighted_sum};
 use crate::output_error::error_effect::ErrorEffect;
 use crate::tables::EstimateRow;
 

@@ -2,10 +2,10 @@
 
 use nalgebra::DVector;
 
-use super::coefficient::CoefficientPosterior;
-use super::grid::Node;
-use super::term::PosteriorTerm;
-use super::unknowns::{SparseRow, covariance_between, weighted_sum};
+use crate::model::fusion::coefficient::CoefficientPosterior;
+use crate::model::fusion::unknowns::{SparseRow, covariance_between, weighted_sum};
+use crate::model::prior::grid::Node;
+use crate::model::prior::term::PosteriorTerm;
 use crate::tables::PriorSource;
 
 /// A published derivative or sum over the points of its grid: tunnel + rows · differences.

@@ -20,8 +20,8 @@ use nalgebra::DVector;
 
 use super::observed_differences::ObservedDifferences;
 use super::posterior::Gaussian;
-use super::scale_prior::{DEVIATION_OF_LOG_SIZE, Scale};
 use super::scales::{LEAST_VARIANCE, logarithms_of, negative_log_posterior, scales_of};
+use crate::model::prior::scale_prior::{DEVIATION_OF_LOG_SIZE, Scale};
 
 /// Least eigenvalue of H that is used, so that points stay where the prior allows scales. A scale's
 /// widest prior alone has the curvature 1/`DEVIATION_OF_LOG_SIZE`² = 1.56. The limit is 4 % lower.

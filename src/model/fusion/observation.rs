@@ -14,10 +14,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::evidence::ManeuverResults;
-use super::term::PosteriorTerm;
 use crate::aero::{Condition, WindTunnel};
 use crate::maneuver::Status;
+use crate::model::evidence::ManeuverResults;
+use crate::model::prior::term::PosteriorTerm;
 use crate::numerics::linear_algebra::symmetric::{scale, scaled};
 use crate::output_error::error_effect::{ErrorEffect, SharedError};
 

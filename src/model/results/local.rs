@@ -3,11 +3,11 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::campaign_model::Model;
-use super::coefficient::CoefficientPosterior;
-use super::posterior::Gaussian;
-use super::term::PosteriorTerm;
-use super::unknowns::{SparseRow, covariance_between, weighted_sum};
 use crate::aero::{Axis, Coefficient, Condition};
+use crate::model::fusion::coefficient::CoefficientPosterior;
+use crate::model::fusion::posterior::Gaussian;
+use crate::model::fusion::unknowns::{SparseRow, covariance_between, weighted_sum};
+use crate::model::prior::term::PosteriorTerm;
 
 /// Half of the step in Mach number over which slopes are taken. Tables are linear between their points.
 const MACH_STEP: f64 = 0.005;

@@ -6,9 +6,9 @@ use std::ops::Range;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::observation::Observation;
-use super::scale_prior::Scale;
-use super::term::{PosteriorTerm, between_points};
 use super::unknowns::{SparseRow, Unknowns, is_of_campaign};
+use crate::model::prior::scale_prior::Scale;
+use crate::model::prior::term::{PosteriorTerm, between_points};
 use crate::output_error::error_effect::SharedError;
 
 /// Evidence of a flight, y = A z + K u + e.

@@ -3,13 +3,13 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::evidence::ManeuverResults;
 use super::other_flights::OtherFlights;
 use super::posterior::Gaussian;
-use super::scale_prior::Scale;
-use super::term::{PosteriorTerm, between_points};
 use super::unknowns::Unknowns;
 use crate::aero::WindTunnel;
+use crate::model::evidence::ManeuverResults;
+use crate::model::prior::scale_prior::Scale;
+use crate::model::prior::term::{PosteriorTerm, between_points};
 use crate::output_error::error_effect::{ErrorEffect, SharedError};
 
 /// Differences from the tunnel of the derivatives of one coefficient that a maneuver holds, with

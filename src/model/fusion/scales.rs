@@ -34,8 +34,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::observed_differences::{MarginalLikelihood, ObservedDifferences, ObservedTerm};
-use super::scale_prior::Scale;
-use super::term::PosteriorTerm;
+use crate::model::prior::scale_prior::Scale;
+use crate::model::prior::term::PosteriorTerm;
 use crate::numerics::minimise::{LocalExpansion, minimum};
 
 /// Share of a term's largest prior variance below which a direction of its differences is ignored.

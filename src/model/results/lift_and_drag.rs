@@ -21,10 +21,10 @@
 use nalgebra::{DMatrix, DVector, Matrix2, RowDVector};
 
 use super::campaign_model::Model;
-use super::evidence::ManeuverResults;
 use crate::aero::{AeroModel, Axis, Coefficient, Derivative, DerivativeUnit, Regressor};
 use crate::aircraft::Aircraft;
 use crate::maneuver::{Maneuver, Means, Status};
+use crate::model::evidence::ManeuverResults;
 use crate::tables::{EstimateRow, LiftAndDragRow};
 use crate::units::RAD;
 

@@ -2,13 +2,13 @@
 
 use nalgebra::DMatrix;
 
-use super::coefficient::CoefficientPosterior;
-use super::evidence::ManeuverResults;
-use super::posterior::prior_covariance_of_terms;
 use super::published::PublishedDerivative;
-use super::self_check::Agreement;
-use super::unknowns::covariance_between;
 use crate::aero::Coefficient;
+use crate::model::evidence::ManeuverResults;
+use crate::model::fusion::coefficient::CoefficientPosterior;
+use crate::model::fusion::posterior::prior_covariance_of_terms;
+use crate::model::fusion::self_check::Agreement;
+use crate::model::fusion::unknowns::covariance_between;
 use crate::numerics::statistics::normal::NORMAL_95;
 use crate::tables::{
     ContributionRow, CovarianceRow, LeftOutKind, PosteriorRow, ScaleRow, SelfCheckRow,

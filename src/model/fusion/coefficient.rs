@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::evidence::ManeuverResults;
 use super::flight_data::{FlightData, Observed};
 use super::held_values::{HeldDifferences, TermsPosterior};
 use super::observation::Observation;
@@ -10,12 +9,13 @@ use super::observed_differences::ObservedDifferences;
 use super::open_scales::add_open_scales;
 use super::other_flights::OtherFlights;
 use super::posterior::{Gaussian, gaussian, information, of_differences, reweighted};
-use super::scale_prior::Scale;
 use super::scales::{centres, most_probable};
 use super::self_check::{self, Agreement};
-use super::term::{PosteriorTerm, TermSources};
 use super::unknowns::Unknowns;
 use crate::aero::WindTunnel;
+use crate::model::evidence::ManeuverResults;
+use crate::model::prior::scale_prior::Scale;
+use crate::model::prior::term::{PosteriorTerm, TermSources};
 use crate::numerics::linear_algebra::root::EXACT;
 
 /// Number of reweightings: weights follow from scales, and scales from weights.

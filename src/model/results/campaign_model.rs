@@ -1,8 +1,8 @@
 //! Posterior of a campaign.
 
-use super::coefficient::CoefficientPosterior;
 use super::rows::CoefficientTables;
 use crate::aero::Coefficient;
+use crate::model::fusion::coefficient::CoefficientPosterior;
 
 /// Posterior of all coefficients.
 #[derive(Clone, Debug, Default)]

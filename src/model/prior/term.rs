@@ -6,13 +6,13 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::evidence::ManeuverResults;
+use super::derivative_prior::{DerivativePrior, TableOnGrid};
 use super::grid::{Grid, refined};
-use super::prior::{DerivativePrior, TableOnGrid};
 use super::scale_prior::Scale;
-use super::settings::Settings;
 use crate::aero::{AeroModel, Coefficient, Condition, Derivative, Regressor, WindTunnel};
 use crate::maneuver::Status;
+use crate::model::evidence::ManeuverResults;
+use crate::model::settings::Settings;
 use crate::numerics::statistics::order_statistics::median;
 use crate::tables::PriorSource;
 

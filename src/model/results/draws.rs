@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::campaign_model::Model;
-use super::coefficient::CoefficientPosterior;
 use super::published::PublishedDerivative;
+use crate::model::fusion::coefficient::CoefficientPosterior;
 use crate::numerics::linear_algebra::root::{EXACT, root};
 use crate::numerics::statistics::random::RandomStream;
 use crate::tables::PosteriorRow;

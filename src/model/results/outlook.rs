@@ -16,15 +16,15 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 
 use super::campaign_model::Model;
-use super::coefficient::{CoefficientPosterior, Data};
-use super::evidence::{ManeuverResults, in_order};
 use super::local::{LocalValue, local_shares};
-use super::observation::Observation;
-use super::posterior::{gaussian, information};
-use super::settings::Settings;
-use super::term::{PosteriorTerm, TermSources, between_points};
-use super::unknowns::{SparseRow, Unknowns, covariance_between, is_of_campaign};
 use crate::aero::{AeroModel, Condition, WindTunnel};
+use crate::model::evidence::{ManeuverResults, in_order};
+use crate::model::fusion::coefficient::{CoefficientPosterior, Data};
+use crate::model::fusion::observation::Observation;
+use crate::model::fusion::posterior::{gaussian, information};
+use crate::model::fusion::unknowns::{SparseRow, Unknowns, covariance_between, is_of_campaign};
+use crate::model::prior::term::{PosteriorTerm, TermSources, between_points};
+use crate::model::settings::Settings;
 use crate::numerics::linear_algebra::root::EXACT;
 use crate::output_error::error_effect::SharedError;
 

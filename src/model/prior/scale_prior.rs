@@ -3,7 +3,7 @@
 use crate::tables::PriorSource;
 
 /// Standard deviation of the logarithm of the size.
-pub(super) const DEVIATION_OF_LOG_SIZE: f64 = 0.8;
+pub(in crate::model) const DEVIATION_OF_LOG_SIZE: f64 = 0.8;
 
 /// Standard deviation of the logarithm of the size of a table with stated uncertainties.
 const DEVIATION_OF_LOG_STATED_SIZE: f64 = 0.4;

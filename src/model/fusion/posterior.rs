@@ -5,9 +5,9 @@ use std::ops::Range;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::flight_data::{FlightData, Information};
-use super::scale_prior::Scale;
-use super::term::PosteriorTerm;
 use super::unknowns::Unknowns;
+use crate::model::prior::scale_prior::Scale;
+use crate::model::prior::term::PosteriorTerm;
 use crate::numerics::linear_algebra::root::{BlockRoot, EXACT};
 use crate::numerics::linear_algebra::symmetric::square;
 use crate::numerics::linear_algebra::triangular::{cholesky, solve_lower};

@@ -4,10 +4,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::flight_data::Information;
 use super::posterior::inner_root;
-use super::prior_covariance::PriorCovariance;
-use super::scale_prior::{Scale, ScalePrior};
-use super::term::PosteriorTerm;
 use super::unknowns::Unknowns;
+use crate::model::prior::prior_covariance::PriorCovariance;
+use crate::model::prior::scale_prior::{Scale, ScalePrior};
+use crate::model::prior::term::PosteriorTerm;
 use crate::numerics::linear_algebra::root::{BlockRoot, root, root_of_some};
 use crate::numerics::linear_algebra::symmetric::square;
 use crate::numerics::linear_algebra::triangular::solve_lower;
