@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use super::ingested::Flight;
+use super::records::ingested::Flight;
 use crate::error::Problem;
 use crate::estimate::Covariance;
 use crate::estimate::joint::Joined;

@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use super::campaign::Campaign;
 use super::conductor::Conductor;
-use super::estimate_step::estimate_maneuver;
-use super::ingested::Flight;
 use super::progress::Progress;
+use super::records::ingested::Flight;
+use super::steps::estimate_step::estimate_maneuver;
 use crate::config::Config;
 use crate::error::{Error, Problem, Result, did_you_mean};
 use crate::flight::is_stretch;

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use super::campaign::{Campaign, RepeatedRows};
 use super::ingested::{Flight, IngestedStretch};
-use super::problems::problem;
 use crate::error::ProblemStage;
 use crate::maneuver::Maneuver;
+use crate::pipeline::campaign::{Campaign, RepeatedRows};
+use crate::pipeline::problems::problem;
 
 /// Share of common rows from which a flight counts as a copy of another.
 const COPY_SHARE: f64 = 0.9;

@@ -1,10 +1,10 @@
 //! Flying qualities of the campaign. They are made anew each time from the posterior.
 
-use super::campaign::Campaign;
-use super::problems::problem;
 use crate::config::Config;
 use crate::error::ProblemStage;
 use crate::maneuver::{Maneuver, Means};
+use crate::pipeline::campaign::Campaign;
+use crate::pipeline::problems::problem;
 use crate::qualities::{self, JudgedAircraft};
 
 /// Version of the flying qualities.

@@ -4,9 +4,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::campaign::{Campaign, MissingArtefact};
 use super::estimate_step::LazyRecord;
-use super::ingested::Flight;
 use super::step::{ComputedArtefact, Step};
 use super::step_runner::StepRunner;
 use crate::aero::{AeroModel, WindTunnel};
@@ -17,6 +15,8 @@ use crate::flight::Record;
 use crate::ingest::ErrorEvidence;
 use crate::lineage::Stage;
 use crate::maneuver::Maneuver;
+use crate::pipeline::campaign::{Campaign, MissingArtefact};
+use crate::pipeline::records::ingested::Flight;
 use crate::recorder::{self, ErrorSeries, ExaminedSeries};
 use crate::store::{ArtefactName, Kind, Store};
 use crate::surfaces::{self, AircraftModel, FlightEvidence};

@@ -1,12 +1,12 @@
 //! Comparison of each flight's normal force with the tunnel's. No kinematic relation contains the
 //! mass, and a mass in another unit makes every force derivative wrong by one factor.
 
-use super::campaign::Campaign;
-use super::problems::problem;
 use crate::aero::{AeroModel, Coefficient, WindTunnel};
 use crate::config::Config;
 use crate::error::{Problem, ProblemStage};
 use crate::ingest::LiftPoint;
+use crate::pipeline::campaign::Campaign;
+use crate::pipeline::problems::problem;
 
 /// Ratio of flight to tunnel, or the inverse, above which the mass is reported if it is exceeded at
 /// every angle of attack. Pounds for kilograms make 2.2. Surfaces and errors of the tunnel change

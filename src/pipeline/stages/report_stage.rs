@@ -1,12 +1,12 @@
 //! The report of the campaign: the page and its printed form.
 
-use super::campaign::Campaign;
-use super::conductor::{Conductor, step_versions};
 use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::lineage::Changes;
 use crate::maneuver::Class;
 use crate::pdf;
+use crate::pipeline::campaign::Campaign;
+use crate::pipeline::conductor::{Conductor, step_versions};
 use crate::report;
 use crate::store::{ArtefactName, Kind};
 use crate::tables::{EstimateRow, History};

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::problems::problem;
-use super::progress::Progress;
 use crate::error::{Problem, ProblemStage};
+use crate::pipeline::problems::problem;
+use crate::pipeline::progress::Progress;
 use crate::report::SourceFile;
 use crate::store::archive::FlightFiles;
 use crate::store::{Digest, Fingerprint, InputDigests};

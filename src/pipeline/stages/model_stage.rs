@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use super::campaign::Campaign;
-use super::problems::problem;
 use crate::aero::{Coefficient, Combined};
 use crate::config::Config;
 use crate::error::{Problem, ProblemStage};
@@ -11,6 +9,8 @@ use crate::estimate::HeldValues;
 use crate::maneuver::Means;
 use crate::model::{self, Failure, MOST_POINTS, ManeuverResults, Model, PublishedManeuver};
 use crate::output_error::Outcome;
+use crate::pipeline::campaign::Campaign;
+use crate::pipeline::problems::problem;
 use crate::tables::{EstimateRow, LiftAndDragRow};
 
 /// Version of the posterior.

@@ -6,10 +6,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::campaign::{Campaign, MissingArtefact};
 use super::estimate_step::{LazyRecord, context};
-use super::ingested::Flight;
-use super::problems::problem;
 use super::step::{ComputedArtefact, Step};
 use super::step_runner::StepRunner;
 use crate::config::Config;
@@ -21,6 +18,9 @@ use crate::flight::Record;
 use crate::lineage::Stage;
 use crate::maneuver::Maneuver;
 use crate::output_error::Outcome;
+use crate::pipeline::campaign::{Campaign, MissingArtefact};
+use crate::pipeline::problems::problem;
+use crate::pipeline::records::ingested::Flight;
 use crate::store::{ArtefactName, Kind, Store};
 use crate::surfaces::DelayCorrection;
 use crate::tables::{FitRow, JOINT_FLIGHT};

@@ -4,13 +4,6 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::campaign::{Campaign, Failure, MissingArtefact};
-use super::flight_contents::FlightContents;
-use super::ingested::{Flight, IngestedFlight};
-use super::memory_shares::{MemoryShares, map_with_workers};
-use super::problems::problem;
-use super::record_writing::RecordWriting;
-use super::repeated_rows;
 use super::step::{Companion, ComputedArtefact, LoadedOrMade, Step};
 use super::step_runner::StepRunner;
 use crate::aircraft::Aircraft;
@@ -18,6 +11,13 @@ use crate::error::{Error, Problem, ProblemStage, Result};
 use crate::flight::Channel;
 use crate::ingest;
 use crate::lineage::Stage;
+use crate::pipeline::campaign::{Campaign, Failure, MissingArtefact};
+use crate::pipeline::problems::problem;
+use crate::pipeline::records::flight_contents::FlightContents;
+use crate::pipeline::records::ingested::{Flight, IngestedFlight};
+use crate::pipeline::records::memory_shares::{MemoryShares, map_with_workers};
+use crate::pipeline::records::record_writing::RecordWriting;
+use crate::pipeline::records::repeated_rows;
 use crate::store::archive::FlightFiles;
 use crate::store::{ArtefactName, Kind, object};
 
@@ -86,7 +86,7 @@ impl<'a> Step for IngestStep<'a> {
     }
 
     fn companions(&self, _: &ArtefactName, flight: &IngestedFlight) -> Vec<Companion> {
-        let companion = |record: &super::ingested::StoredRecord| Companion {
+        let companion = |record: &crate::pipeline::records::ingested::StoredRecord| Companion {
             name: record.name.clone(),
             digest: Some(record.digest.clone()),
         };

@@ -5,10 +5,10 @@ use std::sync::Mutex;
 
 use rayon::prelude::*;
 
-use super::progress::Progress;
 use super::step::{Companion, ComputedArtefact, LoadedOrMade, Step};
 use crate::config::Config;
 use crate::error::Result;
+use crate::pipeline::progress::Progress;
 use crate::store::{ArtefactName, InWorkEntry, InputDigests, Store};
 
 /// Treatment of an artefact that is absent from the store.

@@ -5,10 +5,7 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::campaign::Campaign;
 use super::estimate_step::LazyRecord;
-use super::ingested::Flight;
-use super::model_stage::by_maneuver;
 use super::step::{ComputedArtefact, Step};
 use super::step_runner::StepRunner;
 use crate::aero::{AeroModel, WindTunnel};
@@ -18,6 +15,9 @@ use crate::error::Result;
 use crate::flight::Correction;
 use crate::maneuver::{Maneuver, Means};
 use crate::model::Model;
+use crate::pipeline::campaign::Campaign;
+use crate::pipeline::records::ingested::Flight;
+use crate::pipeline::stages::model_stage::by_maneuver;
 use crate::proof_of_match::{
     self, DecisiveDifference, Matched, OwnEstimates, ProofInputs, RecordedManeuver, Specification,
 };

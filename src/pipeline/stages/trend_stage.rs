@@ -4,12 +4,12 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use super::campaign::Campaign;
 use crate::compare::earlier_campaign::{self, Earlier};
 use crate::compare::{self, extrapolation, ranges};
 use crate::config::Config;
 use crate::error::Result;
 use crate::output_error::Outcome;
+use crate::pipeline::campaign::Campaign;
 use crate::store::files;
 use crate::tables::EstimateRow;
 use crate::trend;

@@ -3,11 +3,6 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::campaign::{Campaign, Failure, MissingArtefact};
-use super::ingested::Flight;
-use super::problems::problem;
-use super::record_windows::{FoundManeuvers, find_maneuvers};
-use super::repeated_rows;
 use super::step::{ComputedArtefact, LoadedOrMade, Step};
 use super::step_runner::{AbsentArtefacts, StepRunner};
 use crate::aero::Axis;
@@ -15,6 +10,11 @@ use crate::config::Config;
 use crate::error::{ProblemStage, Result};
 use crate::lineage::Stage;
 use crate::maneuver::{Event, Recognition};
+use crate::pipeline::campaign::{Campaign, Failure, MissingArtefact};
+use crate::pipeline::problems::problem;
+use crate::pipeline::records::ingested::Flight;
+use crate::pipeline::records::record_windows::{FoundManeuvers, find_maneuvers};
+use crate::pipeline::records::repeated_rows;
 use crate::segment;
 use crate::store::{ArtefactName, Kind, Store};
 
