@@ -2,29 +2,17 @@
 //!
 //! The head of `report.html` documents the values.
 
+mod classes;
+mod derivatives;
+mod maneuvers;
+mod proof_of_match;
 mod changes;
-mod class_figures;
-mod class_markers;
-mod class_outcomes;
-mod correlation_triangle;
-mod derivative_page;
-mod derivative_results;
 mod failures;
-mod history_strips;
-mod identifiability_tables;
 mod instrument_charts;
 mod uncertainty_section;
-mod maneuver_page;
-mod maneuver_table;
-mod match_charts;
-mod match_section;
-mod match_strips;
-mod prediction_table;
 mod qualities_section;
 mod quality_charts;
 mod summary;
-mod verdict_ranges;
-mod verdict_table;
 
 use std::collections::BTreeSet;
 
@@ -34,19 +22,19 @@ use super::contents::Contents;
 use super::notation::count;
 use super::provenance::Provenance;
 use super::table_view::TableView;
-use class_figures::ClassFigure;
-use class_markers::ClassMarkers;
-use class_outcomes::ClassOutcomes;
-use correlation_triangle::CorrelationTriangle;
-use derivative_page::DerivativeGroup;
-use derivative_results::DerivativeResults;
-use maneuver_page::ManeuverPage;
-use match_section::MatchSection;
+use classes::class_figures::ClassFigure;
+use classes::class_markers::ClassMarkers;
+use classes::class_outcomes::ClassOutcomes;
+use derivatives::correlation_triangle::CorrelationTriangle;
+use derivatives::derivative_page::DerivativeGroup;
+use derivatives::derivative_results::DerivativeResults;
+use derivatives::verdict_table::VerdictGroup;
+use maneuvers::maneuver_page::ManeuverPage;
+use proof_of_match::match_section::MatchSection;
 use qualities_section::QualitiesSection;
 use quality_charts::QualityChart;
 use summary::Summary;
 use uncertainty_section::UncertaintySection;
-use verdict_table::VerdictGroup;
 
 /// Values that the template prints.
 #[derive(Debug, Serialize)]
@@ -86,10 +74,10 @@ impl<'a> Page<'a> {
     /// Assembles all sections.
     #[must_use]
     pub fn new(contents: &Contents<'a>) -> Page<'a> {
-        let derivatives = derivative_results::collect(contents);
-        let anchors = derivative_page::anchors(&derivatives);
+        let derivatives = derivatives::derivative_results::collect(contents);
+        let anchors = derivatives::derivative_page::anchors(&derivatives);
         let markers = ClassMarkers::new(contents);
-        let classes = class_outcomes::by_class(contents, &markers);
+        let classes = classes::class_outcomes::by_class(contents, &markers);
         Page {
             title: contents.title,
             aircraft: contents.aircraft,
@@ -99,28 +87,32 @@ impl<'a> Page<'a> {
             changed: changes::headline(contents.overnight),
             changes: changes::tables(contents.overnight),
             summary: summary::summary(contents, &derivatives, &classes),
-            outcome_heads: class_outcomes::heads(),
+            outcome_heads: classes::class_outcomes::heads(),
             classes,
-            verdicts: verdict_table::by_axis(&derivatives, &anchors),
+            verdicts: derivatives::verdict_table::by_axis(&derivatives, &anchors),
             qualities: qualities_section::section(contents),
-            proof_of_match: match_section::section(contents, &markers),
+            proof_of_match: proof_of_match::match_section::section(contents, &markers),
             knowledge: uncertainty_section::section(contents),
-            derivative_groups: derivative_page::groups(&derivatives, &anchors, &markers),
+            derivative_groups: derivatives::derivative_page::groups(
+                &derivatives,
+                &anchors,
+                &markers,
+            ),
             never_estimated: never_estimated(contents, &derivatives),
-            inputs: class_figures::inputs(contents, &markers),
-            correlated_signals: class_figures::correlated_signals(contents, &markers),
-            rates: class_figures::rates(contents, &markers),
-            maneuvers: maneuver_table::table(contents, &markers),
-            predictions: prediction_table::table(contents),
-            correlation_triangles: correlation_triangle::triangles(contents),
-            identifiability: identifiability_tables::tables(contents),
+            inputs: classes::class_figures::inputs(contents, &markers),
+            correlated_signals: classes::class_figures::correlated_signals(contents, &markers),
+            rates: classes::class_figures::rates(contents, &markers),
+            maneuvers: maneuvers::maneuver_table::table(contents, &markers),
+            predictions: maneuvers::prediction_table::table(contents),
+            correlation_triangles: derivatives::correlation_triangle::triangles(contents),
+            identifiability: derivatives::identifiability_tables::tables(contents),
             is_held_by_evidence: contents
                 .estimates
                 .iter()
                 .any(|e| e.evidence_to_hold().is_some()),
             failures: failures::tables(contents),
             instrument_charts: instrument_charts::charts(contents),
-            maneuver_pages: maneuver_page::pages(contents, &markers),
+            maneuver_pages: maneuvers::maneuver_page::pages(contents, &markers),
             provenance: contents.provenance,
             data: contents.provenance.table(),
         }

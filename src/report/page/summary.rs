@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 
 use serde::Serialize;
 
-use super::class_outcomes::{self, ClassOutcomes};
-use super::derivative_results::DerivativeResults;
-use super::verdict_ranges::{self, VerdictRange};
-use super::verdict_table::LARGEST_PERCENTAGE;
+use super::classes::class_outcomes::{self, ClassOutcomes};
+use super::derivatives::derivative_results::DerivativeResults;
+use super::derivatives::verdict_ranges::{self, VerdictRange};
+use super::derivatives::verdict_table::LARGEST_PERCENTAGE;
 use crate::report::contents::Contents;
 use crate::report::notation::{angle, count, fixed, outcome_in_words};
 use crate::tables::{ComparisonRow, EventVerdict, FitRow, Outcome, TunnelVerdict};
@@ -258,8 +258,8 @@ fn events_line(contents: &Contents) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::class_markers::ClassMarkers;
-    use super::super::derivative_results;
+    use super::super::classes::class_markers::ClassMarkers;
+    use super::super::derivatives::derivative_results;
     use super::*;
     use crate::report::campaign_fixture::campaign;
 

@@ -4,7 +4,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
-use super::class_markers::ClassMarkers;
 use super::derivative_results::DerivativeResults;
 use super::verdict_ranges;
 use crate::aero::Coefficient;
@@ -15,6 +14,7 @@ use crate::report::figure::legend::{LegendView, key, line};
 use crate::report::figure::scale::{Scale, ValueRange, extent};
 use crate::report::figure::style::{INK, TUNNEL_COLOUR};
 use crate::report::notation::{self, DASH, Digits, angle, count, fixed, number};
+use crate::report::page::classes::class_markers::ClassMarkers;
 use crate::report::table_view::TableView;
 use crate::tables::{ComparisonRow, PosteriorRow, TrendRow};
 

@@ -1,11 +1,11 @@
 //! Charts of the proof of match: margin of each maneuver over angle of attack, one chart for each model.
 
-use super::quality_charts::QualityChart;
 use crate::report::contents::Contents;
 use crate::report::figure::chart_axis::ChartAxis;
 use crate::report::figure::scale::{Scale, extent};
 use crate::report::figure::style::DARK_COLOURS;
 use crate::report::figure::xy_chart::{ChartPoint, ChartSeries, LevelBox, XyChart};
+use crate::report::page::quality_charts::QualityChart;
 use crate::tables::{MatchVerdict, MatchVerdictRow, ModelSource};
 
 /// Least margin that a chart reaches: twice the tolerance.

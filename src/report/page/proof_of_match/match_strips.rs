@@ -1,12 +1,12 @@
 //! A maneuver flown again as strips: each judged quantity measured, simulated, its tolerance, and the times outside it.
 
-use super::history_strips::scale_of;
 use crate::proof_of_match::Tolerance;
 use crate::report::figure::strip::{OutsideSpans, Strip, StripLine};
 use crate::report::figure::strip_figure::{self, StripFigure};
 use crate::report::figure::style::MEASURED_COLOUR;
 use crate::report::history::{points, time_scale};
 use crate::report::notation::{angle, without_unit};
+use crate::report::page::maneuvers::history_strips::scale_of;
 use crate::tables::{History, HistoryOutput, MatchRow, MatchVerdict};
 
 /// Width of the figure: two or three columns.

@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::class_markers::ClassMarkers;
-use super::maneuver_page;
 use super::match_charts;
-use super::quality_charts::QualityChart;
 use crate::numerics::statistics::order_statistics::median;
 use crate::proof_of_match::Matched;
 use crate::report::contents::Contents;
 use crate::report::notation::{DASH, angle, count, fixed, number};
+use crate::report::page::classes::class_markers::ClassMarkers;
+use crate::report::page::maneuvers::maneuver_page;
+use crate::report::page::quality_charts::QualityChart;
 use crate::report::table_view::TableView;
 use crate::tables::{MatchRow, MatchVerdict, MatchVerdictRow, ModelSource};
 

@@ -5,14 +5,15 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::class_markers::ClassMarkers;
-use super::{history_strips, match_strips};
+use super::history_strips;
 use crate::error::Problem;
 use crate::maneuver::{Maneuver, Status};
 use crate::proof_of_match::Matched;
 use crate::report::contents::{Contents, group_by};
 use crate::report::figure::legend::{self, LegendView};
 use crate::report::notation::{self, DASH, Digits, angle, count, fixed, number, outcome_in_words};
+use crate::report::page::classes::class_markers::ClassMarkers;
+use crate::report::page::proof_of_match::match_strips;
 use crate::report::table_view::TableView;
 use crate::tables::{AgreementRow, EstimateRow, FitRow, History, MatchVerdict};
 

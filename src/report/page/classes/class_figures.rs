@@ -6,7 +6,6 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::class_markers::ClassMarkers;
-use super::history_strips;
 use crate::aero::Axis;
 use crate::numerics::statistics::mean::{mean, root_mean_square};
 use crate::report::contents::{Contents, group_by};
@@ -17,6 +16,7 @@ use crate::report::figure::strip_figure::{self, StripFigure};
 use crate::report::figure::style::DARK_COLOURS;
 use crate::report::history;
 use crate::report::notation::{angle, fixed, without_unit};
+use crate::report::page::maneuvers::history_strips;
 use crate::tables::{CorrelationKind, CorrelationRow, History};
 use crate::units::Unit;
 

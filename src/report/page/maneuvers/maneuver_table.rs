@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use super::class_markers::ClassMarkers;
 use super::maneuver_page;
 use crate::maneuver::Maneuver;
 use crate::report::contents::Contents;
 use crate::report::notation::{DASH, fixed, number, outcome_in_words};
+use crate::report::page::classes::class_markers::ClassMarkers;
 use crate::report::table_view::TableView;
 use crate::tables::{FitRow, Outcome};
 
