@@ -1,9 +1,9 @@
 //! Channels that names and units propose, with their certainty and evidence.
 
 use super::clock::ClockColumn;
+use super::controls::inputs::InputColumn;
 use super::findings::{Channel, Role};
-use super::inputs::InputColumn;
-use super::plausible::ColumnFacts;
+use super::search::plausible::ColumnFacts;
 use crate::flight::signal;
 use crate::units::Unit;
 

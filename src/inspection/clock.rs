@@ -1,8 +1,8 @@
 //! Clock of a recording: the column that counts time, and its unit.
 
+use super::names::vocabulary::meanings;
+use super::names::words::Spelling;
 use super::recording::{Recording, column_names};
-use super::vocabulary::meanings;
-use super::words::Spelling;
 use crate::flight::signal;
 use crate::numerics::statistics::mean::finite_mean;
 use crate::numerics::statistics::order_statistics::{median, quantile};

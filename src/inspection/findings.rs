@@ -1,8 +1,8 @@
 //! Findings of an inspection: each column with its signal, unit and sign, and their certainty.
 
+use super::controls::inputs::InputColumn;
 use super::grid::Grid;
-use super::inputs::InputColumn;
-use super::mirror_images::MirrorImages;
+use super::names::mirror_images::MirrorImages;
 
 /// Use of a column.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,23 +2,23 @@
 
 use std::collections::BTreeSet;
 
-use super::assignment::{Assignment, Candidates, Search};
-use super::certainty::verdicts;
 use super::channels::{
     constant_channel, input_unit, plain_channel, rounded, suffix, temperature_channel,
     time_channel, unless_shared, unless_unknown_unit,
 };
 use super::clock::find_clock;
-use super::descent::SearchResult;
+use super::controls::inputs::{InputColumn, inputs, kind_of, rate};
+use super::controls::steps::{Excursions, InputActivity, steps};
 use super::findings::{Channel, Inspection, Role, Unused};
 use super::grid::Grid;
-use super::inputs::{InputColumn, inputs, kind_of, rate};
-use super::mirror_images::MirrorImages;
-use super::plausible::{ColumnFacts, candidates, facts};
+use super::names::mirror_images::MirrorImages;
+use super::names::vocabulary::meanings;
 use super::quantity::Quantity;
 use super::recording::Recording;
-use super::steps::{Excursions, InputActivity, steps};
-use super::vocabulary::meanings;
+use super::search::assignment::{Assignment, Candidates, Search};
+use super::search::certainty::verdicts;
+use super::search::descent::SearchResult;
+use super::search::plausible::{ColumnFacts, candidates, facts};
 use crate::flight::signal;
 use crate::units::{self, Unit};
 

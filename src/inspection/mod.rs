@@ -9,37 +9,25 @@
 //!
 //! In the order of use:
 //!
-//! - `recording` (the input), `words` and `vocabulary` (names), `mirror_images`, `quantity`, `clock`,
-//!   `grid` (one step for all columns), `plausible` (candidates);
-//! - `equations`, `signs`, `assignment` (and its cost), `rotation` and `descent` (the search),
-//!   `rescaling`, `certainty`;
-//! - `effects` and `inputs` (surfaces and controls), `steps` (which of them step);
+//! - `recording` (the input), `names`, `quantity`, `clock`, `grid` (one step for all columns);
+//! - `search`: candidates (`plausible`), `equations`, `signs`, `assignment` (and its cost), `rotation`
+//!   and `descent`, `rescaling`, `certainty`;
+//! - `controls`: `effects` and `inputs` (surfaces and controls), `steps` (which of them step);
 //! - `findings` (the result), `channels` (by name and unit), `inspect` (all of it), `draft` (YAML).
 
-mod assignment;
-mod certainty;
+mod names;
+mod search;
+mod controls;
 mod channels;
 mod clock;
-mod descent;
 pub mod draft;
-mod effects;
-mod equations;
 mod findings;
 mod grid;
-mod inputs;
 mod inspect;
-mod mirror_images;
-mod plausible;
 mod quantity;
 mod recording;
-mod rescaling;
-mod rotation;
-mod signs;
-mod steps;
 #[cfg(test)]
 mod test_flight;
-mod vocabulary;
-mod words;
 
 pub use findings::{Channel, Inspection, Role, Unused};
 pub use inspect::inspect;

@@ -1,11 +1,11 @@
 //! A flight from formulas that obeys the equations of motion, for tests.
 
-use super::assignment::{Assignment, Candidates, Choice};
 use super::clock::find_clock;
 use super::grid::Grid;
-use super::plausible::{candidates, facts};
 use super::quantity::Quantity;
 use super::recording::{Column, Recording};
+use super::search::assignment::{Assignment, Candidates, Choice};
+use super::search::plausible::{candidates, facts};
 use crate::earth::air;
 use crate::units::G0_FT_S2;
 

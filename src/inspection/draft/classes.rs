@@ -5,9 +5,9 @@ use std::fmt::Write;
 use super::contents::Draft;
 use super::model::{basic, bias, biased, of_surface};
 use crate::aero::Axis;
+use crate::inspection::controls::inputs::{ControlAxis, InputColumn};
 use crate::inspection::findings::Channel;
-use crate::inspection::inputs::{ControlAxis, InputColumn};
-use crate::inspection::vocabulary::Input;
+use crate::inspection::names::vocabulary::Input;
 
 /// Least number of steps of an input that make a maneuver: a doublet has three.
 const FEWEST_STEPS: usize = 3;

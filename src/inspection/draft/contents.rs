@@ -1,7 +1,7 @@
 //! Contents of a draft, and the form of texts in YAML.
 
+use crate::inspection::controls::inputs::{ControlAxis, InputColumn};
 use crate::inspection::findings::{Channel, Inspection, Role};
-use crate::inspection::inputs::{ControlAxis, InputColumn};
 
 /// Word in place of a value that the analyst must give. The configuration lists all of them.
 pub const OPEN: &str = "FILL_IN";

@@ -6,9 +6,9 @@
 use std::collections::BTreeMap;
 
 use super::equations::{Equation, Misfit, Scaled, misfit};
-use super::grid::Grid;
-use super::quantity::Quantity;
 use super::signs::SignCosts;
+use crate::inspection::grid::Grid;
+use crate::inspection::quantity::Quantity;
 
 /// Cost of a column whose name does not suggest the quantity, relative to one whose name does.
 const NAME_COST: f64 = 2.0;

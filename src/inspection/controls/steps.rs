@@ -3,8 +3,8 @@
 
 use std::ops::Range;
 
-use super::grid::Grid;
-use super::vocabulary::Input;
+use crate::inspection::grid::Grid;
+use crate::inspection::names::vocabulary::Input;
 use crate::numerics::series::differences;
 use crate::numerics::statistics::order_statistics::{median, quantile};
 use crate::units::{Quantity, Unit};

@@ -1,11 +1,11 @@
 //! Surfaces, pilot controls and flags of a recording: their signs from the motion that they cause.
 
-use super::assignment::Assignment;
 use super::effects::{Effect, Regression, effects};
-use super::grid::Grid;
-use super::plausible::ColumnFacts;
-use super::quantity::Quantity;
-use super::vocabulary::{Input, input, is_derived, meanings};
+use crate::inspection::grid::Grid;
+use crate::inspection::names::vocabulary::{Input, input, is_derived, meanings};
+use crate::inspection::quantity::Quantity;
+use crate::inspection::search::assignment::Assignment;
+use crate::inspection::search::plausible::ColumnFacts;
 use crate::units;
 
 /// Least significance of an effect that determines a sign. Residuals are coloured, so the standard
@@ -348,9 +348,9 @@ fn slopes(grid: &Grid, values: &[f64], steps: usize) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inspection::assignment::Choice;
-    use crate::inspection::plausible::facts;
     use crate::inspection::recording::{Column, Recording};
+    use crate::inspection::search::assignment::Choice;
+    use crate::inspection::search::plausible::facts;
     use crate::numerics::series::sample_count::whole_steps;
 
     const STEP_S: f64 = 0.1;

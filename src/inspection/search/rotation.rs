@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::assignment::{Assignment, Choice, Search, with};
 use super::equations::Equation;
-use super::quantity::Quantity;
+use crate::inspection::quantity::Quantity;
 
 /// Largest misfit at which a column counts as the integral of another; it is large because bank
 /// couples the attitudes.

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use super::assignment::{Assignment, Choice, Search};
 use super::equations::Equation;
-use super::quantity::Quantity;
+use crate::inspection::quantity::Quantity;
 
 /// A combination of units: for each quantity the place of its unit, 0 for the assigned one.
 type Combination = Vec<usize>;

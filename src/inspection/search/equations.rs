@@ -4,8 +4,8 @@
 //! slug. Accelerations are those of an instrument: normal positive up, axial forward, lateral
 //! right. The distances of instruments from the centre of gravity are neglected.
 
-use super::quantity::Quantity;
 use crate::earth::air;
+use crate::inspection::quantity::Quantity;
 use crate::units::G0_FT_S2;
 
 /// Equation between quantities.

@@ -1,11 +1,11 @@
 //! Candidates of each quantity: columns whose name, unit and range allow it.
 
 use super::assignment::{Candidate, Candidates};
-use super::clock::ClockColumn;
-use super::quantity::Quantity;
-use super::recording::{Recording, column_names};
-use super::vocabulary::{input, is_one_side, meanings};
-use super::words::Spelling;
+use crate::inspection::clock::ClockColumn;
+use crate::inspection::names::vocabulary::{input, is_one_side, meanings};
+use crate::inspection::names::words::Spelling;
+use crate::inspection::quantity::Quantity;
+use crate::inspection::recording::{Recording, column_names};
 use crate::numerics::statistics::order_statistics::quantile;
 use crate::units::Unit;
 

@@ -5,9 +5,9 @@ use std::collections::BTreeSet;
 
 use super::assignment::{Assignment, Candidate, Choice, SIGN_COST, Search, turned, variants, with};
 use super::equations::Equation;
-use super::quantity::Quantity;
 use super::rotation::lacks_axis;
 use super::signs::Reversal;
+use crate::inspection::quantity::Quantity;
 
 /// Least gain that counts as an improvement: more than rounding.
 const LEAST_GAIN: f64 = 1e-9;

@@ -6,7 +6,7 @@
 //! contains few quantities, and its misfit is computed once for each reversal of them.
 
 use super::equations::Equation;
-use super::quantity::Quantity;
+use crate::inspection::quantity::Quantity;
 
 /// A set of reversed quantities, one bit each.
 pub type Reversal = u32;

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use super::assignment::{Assignment, HOLDS, Search, with};
 use super::descent::SearchResult;
 use super::equations::Equation;
-use super::quantity::Quantity;
 use super::rescaling::rescalings;
 use super::signs::{Reversal, SignCosts};
+use crate::inspection::quantity::Quantity;
 
 /// Misfit above which an equation contradicts all of its columns: one of them is wrong. The columns that it
 /// requires are not sure at a misfit above [`HOLDS`].

@@ -1,8 +1,8 @@
 //! Surfaces of the left and the right side that are mirror images: their half difference is one input.
 
-use super::recording::{Column, Recording, column_names};
 use super::vocabulary::{Input, SIDES, input};
 use super::words::{Spelling, words};
+use crate::inspection::recording::{Column, Recording, column_names};
 use crate::output_error::identifiability;
 
 /// Largest correlation of mirror images. Ailerons that move twice as far up as down have −0.95; elevons
