@@ -102,13 +102,13 @@ fn kernel(c: &mut Criterion) {
     let Ok(standard) = standard_case::load(&file) else {
         return;
     };
-    let Ok(window) = standard.window() else {
+    let Ok(signals) = standard.signals() else {
         return;
     };
-    let (case, model) = (standard.case(&window), standard.model());
+    let (case, model) = (standard.case(&signals), standard.model());
     let (start, weights) = standard.start(&case);
     let mut response = case.response();
-    let reference = Reference::new(standard.aircraft(), &window, &model, &case);
+    let reference = Reference::new(standard.aircraft(), &signals, &model, &case);
     c.bench_function("one pass, kernel", |b| {
         b.iter(|| case.respond(&start, &mut response));
     });
@@ -121,7 +121,7 @@ fn kernel(c: &mut Criterion) {
     c.bench_function("sensitivities kept", |b| {
         b.iter(|| case.sensitivities(&start));
     });
-    c.bench_function("maneuver prepared", |b| b.iter(|| standard.case(&window)));
+    c.bench_function("maneuver prepared", |b| b.iter(|| standard.case(&signals)));
     let mut pass_s = f64::INFINITY;
     for _ in 0..1000 {
         let begin = Instant::now();

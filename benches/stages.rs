@@ -100,7 +100,7 @@ fn case(bench: &BenchFlight, free: bool) -> Result<Case<3, Longitudinal>, String
         .derivatives
         .iter()
         .filter_map(|d| d.regressor.surface());
-    let window = ManeuverSignals::cut(
+    let signals = ManeuverSignals::cut(
         &bench.config.aircraft,
         &bench.record,
         range,
@@ -113,7 +113,7 @@ fn case(bench: &BenchFlight, free: bool) -> Result<Case<3, Longitudinal>, String
     };
     Ok(Case::new(
         &bench.config.aircraft,
-        &window,
+        &signals,
         measurements,
         &model,
     ))

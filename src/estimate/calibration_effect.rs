@@ -25,7 +25,7 @@ pub(super) fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
     if fit.covariance_corrected.is_none() || task.has_exact_signals() {
         return;
     }
-    let errors = signal_errors(&[task], &prepared.window);
+    let errors = signal_errors(&[task], &prepared.signals);
     match gradient_shifts(
         task.context.aircraft,
         prepared,
@@ -40,14 +40,14 @@ pub(super) fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
     }
 }
 
-/// Errors of one standard deviation each of the signals of a window. Of several maneuvers each error
+/// Errors of one standard deviation each of the signals of a maneuver. Of several maneuvers each error
 /// has its largest size.
 pub(super) fn signal_errors<'a>(
     tasks: &[&Task<'a>],
-    window: &ManeuverSignals,
+    signals: &ManeuverSignals,
 ) -> Vec<SignalError<'a>> {
     // A signal that the maneuver does not use has no effect.
-    let is_used = |signal: &str| !window.signal(signal).is_empty();
+    let is_used = |signal: &str| !signals.signal(signal).is_empty();
     let mut sizes: BTreeMap<&str, Calibration> = BTreeMap::new();
     for (signal, of_task) in tasks.iter().flat_map(|task| task.error_sizes()) {
         let size = sizes.entry(signal).or_default();
@@ -72,14 +72,14 @@ pub(super) fn gradient_shifts<const NX: usize, E: Equations<NX>>(
     weights: &[f64; OUTPUTS],
 ) -> Result<Vec<DVector<f64>>, Diverged> {
     let PreparedCase {
-        window,
+        signals,
         model,
         case,
         ..
     } = prepared;
     FittedManeuver {
         aircraft,
-        window,
+        signals,
         model,
         case,
         values,

@@ -14,7 +14,7 @@ pub(super) struct PreparedCase<'a, const NX: usize, E: Equations<NX>> {
     pub model: Model<'a>,
     /// Signals of the surfaces that act.
     pub surfaces: Vec<&'a str>,
-    pub window: ManeuverSignals,
+    pub signals: ManeuverSignals,
     pub case: Case<NX, E>,
     /// Share of the recorded output samples that the cost leaves out.
     pub left_out: f64,
@@ -35,7 +35,7 @@ impl<'a, const NX: usize, E: Equations<NX>> PreparedCase<'a, NX, E> {
         let surfaces: Vec<&str> = derivatives.flat_map(|d| d.regressor.signals()).collect();
         let settings = task.context.settings;
         check_marked_share(task, &surfaces)?;
-        let window = ManeuverSignals::cut(
+        let signals = ManeuverSignals::cut(
             task.context.aircraft,
             task.record,
             range.clone(),
@@ -43,7 +43,7 @@ impl<'a, const NX: usize, E: Equations<NX>> PreparedCase<'a, NX, E> {
             settings.mass_properties,
         )?;
         let measurements = task.measurements(&range)?;
-        let mut case = Case::<NX, E>::new(task.context.aircraft, &window, measurements, &model);
+        let mut case = Case::<NX, E>::new(task.context.aircraft, &signals, measurements, &model);
         let counted: usize = case.used().iter().sum();
         let recorded = task.recorded_outputs().count() * case.samples();
         let left_out = 1.0 - counted as f64 / recorded.max(1) as f64;
@@ -54,13 +54,13 @@ impl<'a, const NX: usize, E: Equations<NX>> PreparedCase<'a, NX, E> {
             ));
         }
         case.noisy_inputs = NoisyInputs {
-            surfaces: noisy_surfaces(task.context.aircraft, &window, &model),
+            surfaces: noisy_surfaces(task.context.aircraft, &signals, &model),
             pressure_variance: pressure_noise::relative_variance(task.record, range),
         };
         Ok(PreparedCase {
             model,
             surfaces,
-            window,
+            signals,
             case,
             left_out,
         })
@@ -69,7 +69,7 @@ impl<'a, const NX: usize, E: Equations<NX>> PreparedCase<'a, NX, E> {
     /// The case with the held derivatives free as well, for the effect of their errors.
     pub fn with_held_free(&self, aircraft: &Aircraft) -> Case<NX, E> {
         self.case
-            .with_model(aircraft, &self.window, &all_free(&self.model))
+            .with_model(aircraft, &self.signals, &all_free(&self.model))
     }
 }
 

@@ -171,7 +171,7 @@ impl<'t, 'a> RowMaker<'t, 'a> {
         &self,
         measured: &Measurements,
         fit: &Fit,
-        window: &ManeuverSignals,
+        signals: &ManeuverSignals,
         surfaces: &[&str],
     ) -> History {
         let outputs = self.task.class.axis.outputs().into_iter().enumerate();
@@ -189,7 +189,7 @@ impl<'t, 'a> RowMaker<'t, 'a> {
         let control = |name: &str| {
             (
                 name.to_owned(),
-                window.signal(name).iter().step_by(2).copied().collect(),
+                signals.signal(name).iter().step_by(2).copied().collect(),
             )
         };
         History {
@@ -197,7 +197,7 @@ impl<'t, 'a> RowMaker<'t, 'a> {
             class: self.task.class.name.clone(),
             alpha_deg: self.task.maneuver.alpha_deg,
             time_s: (0..measured.values.len())
-                .map(|k| k as f64 * window.step_s)
+                .map(|k| k as f64 * signals.step_s)
                 .collect(),
             outputs: outputs.collect(),
             controls: names.into_iter().map(control).collect(),

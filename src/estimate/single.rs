@@ -211,7 +211,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> SingleEstimation<'t, 'a, NX, E> 
         let diagnostics = Diagnostics {
             task,
             case,
-            window: &self.prepared.window,
+            signals: &self.prepared.signals,
             model: &self.prepared.model,
         };
         diagnostics.add_to(information, &mut estimated);
@@ -229,7 +229,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> SingleEstimation<'t, 'a, NX, E> 
     fn make_rows(&self, fit: &Fit, start: StartingValues) -> Estimated {
         let PreparedCase {
             case,
-            window,
+            signals,
             surfaces,
             left_out,
             ..
@@ -240,7 +240,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> SingleEstimation<'t, 'a, NX, E> 
             combined: row_maker.combined_rows(&case.names, fit),
             covariance: Covariance::of_fit(&case.names, fit),
             correlations: vec![],
-            history: Some(row_maker.history(&case.measurements, fit, window, surfaces)),
+            history: Some(row_maker.history(&case.measurements, fit, signals, surfaces)),
             fit: row_maker.fit_row(fit, *left_out, start),
             fit_outputs: vec![],
             noise: None,

@@ -38,7 +38,7 @@ use crate::output_error::{Case, Diverged, InitialState, Measurements, Model};
 #[derive(Clone, Copy, Debug)]
 pub struct Recorded<'a> {
     pub aircraft: &'a Aircraft,
-    pub window: &'a ManeuverSignals,
+    pub signals: &'a ManeuverSignals,
     pub model: &'a Model<'a>,
 }
 
@@ -120,7 +120,7 @@ struct SampleValues<const NX: usize> {
 
 /// Equations of a maneuver at its samples, with all derivatives held at their values.
 struct SampleEquations<'a, const NX: usize, E: Equations<NX>> {
-    window: ManeuverSignals,
+    signals: ManeuverSignals,
     model: Model<'a>,
     /// Maneuver as recorded.
     exact: Case<NX, E>,
@@ -135,26 +135,26 @@ impl<'a, const NX: usize, E: Equations<NX>> SampleEquations<'a, NX, E> {
             initial_state: InitialState::Measured,
             ..Model::default()
         };
-        let window = recorded.window.at_samples();
-        let windows = [recorded.window, &window];
+        let signals = recorded.signals.at_samples();
+        let windows = [recorded.signals, &signals];
         let nothing = Measurements::default();
         SampleEquations {
             exact: case.as_recorded(recorded.aircraft, windows, nothing, &model),
-            window,
+            signals,
             model,
         }
     }
 
     /// Maneuver as an instrument in error would have recorded it.
     fn case_with_error(&self, recorded: &Recorded, error: &SignalError) -> Case<NX, E> {
-        let window = if error.delay_s == 0.0 {
-            error.apply_to(&self.window)
+        let signals = if error.delay_s == 0.0 {
+            error.apply_to(&self.signals)
         } else {
             // A delay needs the slope of the signal, and that the points between samples.
-            let delayed = error.apply_to(recorded.window);
-            self.window.with_samples_of(error.signal, &delayed)
+            let delayed = error.apply_to(recorded.signals);
+            self.signals.with_samples_of(error.signal, &delayed)
         };
-        let windows = [&self.window, &window];
+        let windows = [&self.signals, &signals];
         let nothing = Measurements::default();
         self.exact
             .as_recorded(recorded.aircraft, windows, nothing, &self.model)

@@ -51,25 +51,25 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     #[must_use]
     pub fn new(
         aircraft: &Aircraft,
-        window: &ManeuverSignals,
+        signals: &ManeuverSignals,
         measurements: Measurements,
         model: &Model,
         biases: &[Option<f64>],
     ) -> Self {
-        let case = Case::new(aircraft, window, measurements, &without_own(model));
+        let case = Case::new(aircraft, signals, measurements, &without_own(model));
         Self::of_case(case, model, biases)
     }
 
-    /// Prepares the same maneuver with another model. `window` may have other surfaces.
+    /// Prepares the same maneuver with another model. `signals` may have other surfaces.
     #[must_use]
     pub fn with_model(
         &self,
         aircraft: &Aircraft,
-        window: &ManeuverSignals,
+        signals: &ManeuverSignals,
         model: &Model,
         biases: &[Option<f64>],
     ) -> Self {
-        let case = self.case.with_model(aircraft, window, &without_own(model));
+        let case = self.case.with_model(aircraft, signals, &without_own(model));
         Self::of_case(case, model, biases)
     }
 

@@ -29,7 +29,7 @@ use crate::output_error::case::chunking::{CHUNK, POINTS, Strided};
 use crate::output_error::case::layout::LaneLayout;
 use crate::output_error::kernel::chunk::{ChunkBuildUp, fill_regressor_rows};
 use crate::output_error::kernel::normal_equations::NormalSums;
-use crate::output_error::kernel::pass::{Correction, Diverged, Propagation};
+use crate::output_error::kernel::pass::{MeasurementUpdate, Diverged, Propagation};
 use crate::output_error::kernel::propagators::Propagators;
 use crate::output_error::kernel::trajectory::{STATE_BOUND, StageHistory, Trajectory};
 
@@ -110,7 +110,7 @@ impl<const NX: usize> LaneGain<NX> {
 }
 
 /// Values of a pass that do not change within it.
-pub(super) struct Corrections<'a, const NX: usize> {
+pub(super) struct MeasurementUpdates<'a, const NX: usize> {
     pub gains: Vec<LaneGain<NX>>,
     pub patterns: &'a [Pattern],
     /// Pattern of each sample.
@@ -245,14 +245,14 @@ pub(super) struct FilterPass<'a, const NX: usize, E: InGusts<NX>, K: RowSink<NX>
     pub start: SVector<f64, NX>,
     /// Sensitivities of the first state: state by state a row of lanes.
     pub start_sensitivities: AlignedBuffer,
-    pub corrections: &'a Corrections<'a, NX>,
+    pub corrections: &'a MeasurementUpdates<'a, NX>,
     pub outputs: PassOutputs<'a>,
     pub sink: Option<&'a mut K>,
 }
 
-/// Corrections at the samples of one chunk.
-struct ChunkCorrections<'a, const NX: usize, E> {
-    corrections: &'a Corrections<'a, NX>,
+/// MeasurementUpdates at the samples of one chunk.
+struct ChunkUpdates<'a, const NX: usize, E> {
+    corrections: &'a MeasurementUpdates<'a, NX>,
     /// Slots of products of a state: (slot, state).
     products: &'a [(usize, usize)],
     /// Factors of the first vector's regressors at the predicted states.
@@ -264,7 +264,7 @@ struct ChunkCorrections<'a, const NX: usize, E> {
     equations: std::marker::PhantomData<E>,
 }
 
-impl<const NX: usize, E: InGusts<NX>> Correction<NX> for &ChunkCorrections<'_, NX, E> {
+impl<const NX: usize, E: InGusts<NX>> MeasurementUpdate<NX> for &ChunkUpdates<'_, NX, E> {
     #[inline(always)]
     fn output_factors(&self, k: usize) -> Option<&[f64; VECTOR]> {
         Some(&self.factors[k])
@@ -325,9 +325,9 @@ impl<const NX: usize, E: InGusts<NX>> Correction<NX> for &ChunkCorrections<'_, N
     }
 }
 
-impl<'a, const NX: usize, E: InGusts<NX>> ChunkCorrections<'a, NX, E> {
-    fn new(corrections: &'a Corrections<'a, NX>, layout: &'a LaneLayout) -> Self {
-        ChunkCorrections {
+impl<'a, const NX: usize, E: InGusts<NX>> ChunkUpdates<'a, NX, E> {
+    fn new(corrections: &'a MeasurementUpdates<'a, NX>, layout: &'a LaneLayout) -> Self {
+        ChunkUpdates {
             corrections,
             products: &layout.products,
             factors: [[1.0; VECTOR]; CHUNK],
@@ -391,7 +391,7 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink<NX>> WithSimd for FilterPass<'_
         let mut build_up = ChunkBuildUp::<NX>::ZERO;
         let mut history = StageHistory::<NX>::EMPTY;
         let mut propagators = Propagators::<NX>::ZERO;
-        let mut chunk = ChunkCorrections::<NX, E>::new(self.corrections, layout);
+        let mut chunk = ChunkUpdates::<NX, E>::new(self.corrections, layout);
         let mut x = self.start;
         for first in (0..samples).step_by(CHUNK) {
             let count = CHUNK.min(samples - first);

@@ -71,7 +71,7 @@ impl ManeuverData {
         let derivatives = derivatives(record, E::AXIS, basis.aero_model);
         let surfaces = surfaces_of(&derivatives);
         let signals = surfaces.iter().map(String::as_str);
-        let window = ManeuverSignals::cut(
+        let signals = ManeuverSignals::cut(
             basis.aircraft,
             record,
             range,
@@ -84,7 +84,7 @@ impl ManeuverData {
             initial_state: InitialState::Measured,
             ..Model::default()
         };
-        let case = Case::<NX, E>::new(basis.aircraft, &window, Measurements::default(), &model);
+        let case = Case::<NX, E>::new(basis.aircraft, &signals, Measurements::default(), &model);
         let regressors = regressors(&band, &case);
         let condition = maneuver.condition(basis.tunnel);
         let term = |j: usize| {

@@ -26,7 +26,7 @@ struct RegressorHistory<'a> {
 pub(in crate::estimate) struct Diagnostics<'d, 'm, const NX: usize, E: Equations<NX>> {
     pub task: &'d Task<'m>,
     pub case: &'d Case<NX, E>,
-    pub window: &'d ManeuverSignals,
+    pub signals: &'d ManeuverSignals,
     pub model: &'d Model<'m>,
 }
 
@@ -69,7 +69,7 @@ impl<'m, const NX: usize, E: Equations<NX>> Diagnostics<'_, 'm, NX, E> {
 
     /// Regressors of all derivatives that act in the maneuver, free and held.
     fn regressor_histories(&self) -> Vec<RegressorHistory<'m>> {
-        let (window, model) = (self.window, self.model);
+        let (signals, model) = (self.signals, self.model);
         let mut acting: Vec<&'m Derivative> = model
             .free
             .iter()
@@ -88,14 +88,14 @@ impl<'m, const NX: usize, E: Equations<NX>> Diagnostics<'_, 'm, NX, E> {
         };
         let wide = self
             .case
-            .with_model(self.task.context.aircraft, window, &all);
+            .with_model(self.task.context.aircraft, signals, &all);
         let flown = acting.into_iter().filter_map(|derivative| {
             let j = wide.names.iter().position(|n| *n == derivative.name)?;
             let history = wide.measured_regressor(j);
             let moved = match &derivative.regressor {
                 Regressor::Constant => None,
                 // In deg, not over q̄S.
-                Regressor::Vane(name) => Some(excitation(&window.samples_of(name))),
+                Regressor::Vane(name) => Some(excitation(&signals.samples_of(name))),
                 _ => Some(excitation(&history)),
             };
             Some(RegressorHistory {
@@ -177,7 +177,7 @@ impl<'m, const NX: usize, E: Equations<NX>> Diagnostics<'_, 'm, NX, E> {
 
     /// Name and history of a regressor: of the signal where it is one; `None` for a constant.
     fn named_regressor(&self, one: &RegressorHistory) -> Option<(String, Vec<f64>)> {
-        let of_signal = |name: &str| (name.to_owned(), self.window.samples_of(name));
+        let of_signal = |name: &str| (name.to_owned(), self.signals.samples_of(name));
         Some(match &one.derivative.regressor {
             Regressor::Constant => return None,
             Regressor::Alpha => ("alpha".to_owned(), one.history.clone()),

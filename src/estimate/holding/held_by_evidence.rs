@@ -83,7 +83,7 @@ impl Choice {
 /// The choice of a maneuver's held derivatives.
 struct Choosing<'t, 'a, const NX: usize, E: Equations<NX>> {
     task: &'t Task<'a>,
-    window: ManeuverSignals,
+    signals: ManeuverSignals,
     /// Model with every candidate free.
     all_free: Model<'a>,
     wide: Case<NX, E>,
@@ -99,7 +99,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
             .iter()
             .chain(all_free.held.iter().map(|(d, _)| d))
             .flat_map(|d| d.regressor.signals());
-        let window = ManeuverSignals::cut(
+        let signals = ManeuverSignals::cut(
             task.context.aircraft,
             task.record,
             range.clone(),
@@ -107,7 +107,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
             task.context.settings.mass_properties,
         )?;
         let measurements = task.measurements(&range)?;
-        let wide = Case::new(task.context.aircraft, &window, measurements, &all_free);
+        let wide = Case::new(task.context.aircraft, &signals, measurements, &all_free);
         let uncertainty = wide
             .names
             .iter()
@@ -115,7 +115,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
             .collect();
         Ok(Choosing {
             task,
-            window,
+            signals,
             all_free,
             wide,
             uncertainty,
@@ -139,7 +139,7 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
         model.free.retain(|d| !is_held(d));
         Case::new(
             self.task.context.aircraft,
-            &self.window,
+            &self.signals,
             self.wide.measurements.clone(),
             &model,
         )

@@ -125,7 +125,7 @@ fn add_calibration_errors<const NX: usize, E: Equations<NX>>(
         return;
     };
     let tasks: Vec<_> = parts.iter().map(|part| &part.task).collect();
-    let errors = signal_errors(&tasks, &first.prepared.window);
+    let errors = signal_errors(&tasks, &first.prepared.signals);
     let mut together = vec![DVector::zeros(joint.names().len()); errors.len()];
     for (i, part) in parts.iter().enumerate() {
         let places = joint.parameters().places(i);

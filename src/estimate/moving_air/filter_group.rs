@@ -338,7 +338,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
         if tasks.iter().all(|task| task.has_exact_signals()) {
             return;
         }
-        let errors = signal_errors(&tasks, &first.slopes.window);
+        let errors = signal_errors(&tasks, &first.slopes.signals);
         let mut together = vec![DVector::zeros(fit.values.len()); errors.len()];
         for (i, (member, filter)) in self.members.iter().zip(&slope_fit.filters).enumerate() {
             let parameters = self

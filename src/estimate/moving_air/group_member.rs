@@ -31,7 +31,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
         GroupMember {
             task: *task,
             prepared,
-            slopes: AlphaSlopes::new(task, &prepared.window, wide),
+            slopes: AlphaSlopes::new(task, &prepared.signals, wide),
             deviations: least_deviations(task, &prepared.case.measurements),
         }
     }
@@ -46,28 +46,28 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
         }
     }
 
-    /// The maneuver in the window of its slopes.
+    /// The maneuver with the signals of its slopes.
     fn case_with(&self, model: &Model) -> Case<NX, E> {
         let aircraft = self.task.context.aircraft;
         self.prepared
             .case
-            .with_model(aircraft, &self.slopes.window, model)
+            .with_model(aircraft, &self.slopes.signals, model)
     }
 
-    /// Filter of a model in the window of the slopes; `like` is another one of the maneuver.
+    /// Filter of a model on the signals of the slopes; `like` is another filter of the maneuver.
     pub fn filter<const NG: usize, G: InGusts<NG>>(
         &self,
         model: &Model,
         like: Option<&Filter<NG, G>>,
     ) -> Filter<NG, G> {
-        let window = &self.slopes.window;
+        let signals = &self.slopes.signals;
         let Some(filter) = like else {
-            return new_filter(&self.task, self.prepared, window, model);
+            return new_filter(&self.task, self.prepared, signals, model);
         };
         let aircraft = self.task.context.aircraft;
         let biases = bias_uncertainties(&self.task, model);
-        let filter = filter.with_model(aircraft, window, model, &biases);
-        filter.with_noisy_inputs(noisy_inputs(&self.task, self.prepared, window, model))
+        let filter = filter.with_model(aircraft, signals, model, &biases);
+        filter.with_noisy_inputs(noisy_inputs(&self.task, self.prepared, signals, model))
     }
 
     /// Pass at a fit with the held derivatives and the slopes free as well.
@@ -102,7 +102,7 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
         let model = self.model_with_slopes(held);
         let recorded = Recorded {
             aircraft: self.task.context.aircraft,
-            window: &self.slopes.window,
+            signals: &self.slopes.signals,
             model: &model,
         };
         filter.gradient_shifts(parameters, &recorded, errors)

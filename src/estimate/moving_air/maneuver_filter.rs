@@ -10,7 +10,7 @@ use crate::filter_error::filter::Filter;
 use crate::output_error::surface_noise::noisy_surfaces;
 use crate::output_error::{Measurements, Model, NoisyInputs};
 
-/// Filter of a model in a window of the maneuver.
+/// Filter of a model on the signals of a maneuver.
 pub(in crate::estimate) fn new_filter<
     const NX: usize,
     E: Equations<NX>,
@@ -19,24 +19,24 @@ pub(in crate::estimate) fn new_filter<
 >(
     task: &Task,
     prepared: &PreparedCase<NX, E>,
-    window: &ManeuverSignals,
+    signals: &ManeuverSignals,
     model: &Model,
 ) -> Filter<NG, G> {
     let measurements = prepared.case.measurements.clone();
     let biases = bias_uncertainties(task, model);
-    let filter = Filter::new(task.context.aircraft, window, measurements, model, &biases);
-    filter.with_noisy_inputs(noisy_inputs(task, prepared, window, model))
+    let filter = Filter::new(task.context.aircraft, signals, measurements, model, &biases);
+    filter.with_noisy_inputs(noisy_inputs(task, prepared, signals, model))
 }
 
-/// Noise of the inputs of a model in a window of the maneuver.
+/// Noise of the inputs of a model in the signals of a maneuver.
 pub(in crate::estimate) fn noisy_inputs<const NX: usize, E: Equations<NX>>(
     task: &Task,
     prepared: &PreparedCase<NX, E>,
-    window: &ManeuverSignals,
+    signals: &ManeuverSignals,
     model: &Model,
 ) -> NoisyInputs {
     NoisyInputs {
-        surfaces: noisy_surfaces(task.context.aircraft, window, model),
+        surfaces: noisy_surfaces(task.context.aircraft, signals, model),
         pressure_variance: prepared.case.noisy_inputs.pressure_variance,
     }
 }

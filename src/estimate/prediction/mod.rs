@@ -250,7 +250,7 @@ fn predict_in_gusts<const NX: usize, E: Equations<NX>, const NG: usize, G: InGus
     by_output_error: Prediction,
     start: Vec<f64>,
 ) -> Result<Prediction, String> {
-    let filter = new_filter::<NX, E, NG, G>(task, prepared, &prepared.window, &prepared.model);
+    let filter = new_filter::<NX, E, NG, G>(task, prepared, &prepared.signals, &prepared.model);
     let sharing = SharedParameters::of_one(filter.names());
     let joint = JointFilter::new(std::slice::from_ref(&filter), &sharing).with_known_noise();
     let start = if by_output_error.cost.is_ok() {

@@ -28,20 +28,20 @@ use crate::numerics::statistics::mean::mean;
 use crate::output_error::{Case, Model};
 use crate::units::DEG;
 
-/// Slopes over α that act in a maneuver, with its window.
+/// Slopes over α that act in a maneuver, with its signals.
 #[derive(Clone)]
 pub(in crate::estimate) struct AlphaSlopes {
     pub slopes: Vec<AlphaSlope>,
     /// Derivatives along α and constants, one pair per coefficient, that take the slopes' lines.
     lines: Vec<[Derivative; 2]>,
     /// Signals of the maneuver, with those of the slopes.
-    pub window: ManeuverSignals,
+    pub signals: ManeuverSignals,
 }
 
 /// Slope of a coefficient or derivative.
 #[derive(Clone)]
 pub(in crate::estimate) struct AlphaSlope {
-    /// Derivative along the change less its line, which is a signal of the window.
+    /// Derivative along the change less its line, which is one of the signals.
     pub term: Derivative,
     pub prior: SlopePrior,
     /// Line through the change: slope over α, per deg, and value at α = 0.
@@ -62,15 +62,15 @@ impl AlphaSlopes {
     /// Slopes over α of the derivatives that are free in `wide`, along the motion as measured.
     pub fn new<const NX: usize, E: Equations<NX>>(
         task: &Task,
-        window: &ManeuverSignals,
+        signals: &ManeuverSignals,
         wide: &Case<NX, E>,
     ) -> AlphaSlopes {
-        let motion = window.motion(task.context.aircraft);
+        let motion = signals.motion(task.context.aircraft);
         let alphas: Vec<f64> = motion.points().step_by(2).map(|m| DEG * m.alpha).collect();
         let mut slopes = AlphaSlopes {
             slopes: vec![],
             lines: lines::<NX, E>(),
-            window: window.clone(),
+            signals: signals.clone(),
         };
         for (change, prior) in changes(task, &alphas, wide) {
             slopes.add(&change, prior, &alphas);
@@ -136,7 +136,7 @@ impl AlphaSlopes {
         let rest: Vec<f64> = pairs
             .map(|(value, alpha)| value - line[0] * alpha - line[1])
             .collect();
-        self.window = self.window.with_samples(&change.name, &rest);
+        self.signals = self.signals.with_samples(&change.name, &rest);
         let term = Derivative {
             regressor: Regressor::Surface(change.name.clone()),
             name: change.name.clone(),

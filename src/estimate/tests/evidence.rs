@@ -37,7 +37,7 @@ fn fly(truth: Vec<(Derivative, f64)>, edit: impl Fn(&mut Record)) -> Flown {
         ..Model::default()
     };
     let surfaces = truth.iter().filter_map(|(d, _)| d.regressor.surface());
-    let window = ManeuverSignals::cut(
+    let signals = ManeuverSignals::cut(
         &aircraft(),
         &record,
         0..SAMPLES,
@@ -45,7 +45,7 @@ fn fly(truth: Vec<(Derivative, f64)>, edit: impl Fn(&mut Record)) -> Flown {
         MassProperties::Recorded,
     )
     .unwrap();
-    let case = Case::<3, Longitudinal>::new(&aircraft(), &window, nothing_measured(), &model);
+    let case = Case::<3, Longitudinal>::new(&aircraft(), &signals, nothing_measured(), &model);
     let values: BTreeMap<&str, f64> = truth.iter().map(|(d, v)| (d.name.as_str(), *v)).collect();
     let mut response = case.response();
     case.respond(&case.starting_values(|name| values[name]), &mut response)

@@ -92,9 +92,9 @@ impl Bench {
         };
         let surfaces = ["de_deg", "dpv_deg"];
         let recorded = MassProperties::Recorded;
-        let window =
+        let signals =
             ManeuverSignals::cut(&self.aircraft, record, 0..SAMPLES, surfaces, recorded).unwrap();
-        let case = Case::new(&self.aircraft, &window, nothing_measured(), &model);
+        let case = Case::new(&self.aircraft, &signals, nothing_measured(), &model);
         let values = truth.iter().map(|(d, value)| (d.name.clone(), *value));
         (case, values.collect())
     }

@@ -56,7 +56,7 @@ fn shift_by_pass<const NX: usize, E: InGusts<NX>>(
             values[o] += error.scale * values[o] + error.bias;
         }
     }
-    let (without_error, in_error) = (window(), error.apply_to(&window()));
+    let (without_error, in_error) = (signals(), error.apply_to(&signals()));
     let held_start = Model {
         initial_state: InitialState::Measured,
         ..model.clone()
@@ -93,11 +93,11 @@ fn assert_shifts_are_those_of_passes<const NX: usize, E: InGusts<NX>>(surface: &
         free: truth.iter().map(|(d, _)| d).collect(),
         ..Model::default()
     };
-    let filter = Filter::<NX, E>::new(&aircraft(), &window(), measurements, &model, &[]);
+    let filter = Filter::<NX, E>::new(&aircraft(), &signals(), measurements, &model, &[]);
     let at = filter.with_noise(&simulated.own, &light());
     let recorded = Recorded {
         aircraft: &aircraft(),
-        window: &window(),
+        signals: &signals(),
         model: &model,
     };
     let errors = errors(surface);

@@ -30,14 +30,14 @@ fn recorded<const NX: usize, E: InGusts<NX>>(
         ..light()
     };
     exact.fly(&still, draws);
-    let window = window_of(&with_noisy_surfaces(SURFACE_NOISE_DEG, draws));
+    let signals = window_of(&with_noisy_surfaces(SURFACE_NOISE_DEG, draws));
     let model = model_of(truth);
     let inputs = NoisyInputs {
-        surfaces: noisy_surfaces(&aircraft(), &window, &model),
+        surfaces: noisy_surfaces(&aircraft(), &signals, &model),
         pressure_variance: 0.0,
     };
     let measured = exact.filter.case.measurements.clone();
-    let filter = Filter::<NX, E>::new(&aircraft(), &window, measured, &model, &[]);
+    let filter = Filter::<NX, E>::new(&aircraft(), &signals, measured, &model, &[]);
     Simulated {
         filter: filter.with_noisy_inputs(inputs),
         own: exact.own,
@@ -49,9 +49,9 @@ fn assert_gradient_matches_differences<const NX: usize, E: InGusts<NX>>(noise: &
     let truth = truth(E::AXIS);
     let mut draws = Draws(42);
     let recorded = recorded::<NX, E>(&truth, &mut draws);
-    let window = window_of(&with_noisy_surfaces(SURFACE_NOISE_DEG, &mut draws));
+    let signals = window_of(&with_noisy_surfaces(SURFACE_NOISE_DEG, &mut draws));
     let inputs = NoisyInputs {
-        surfaces: noisy_surfaces(&aircraft(), &window, &model_of(&truth)),
+        surfaces: noisy_surfaces(&aircraft(), &signals, &model_of(&truth)),
         pressure_variance: 1e-4,
     };
     let filter = recorded.filter.with_noisy_inputs(inputs);

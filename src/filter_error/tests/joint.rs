@@ -104,7 +104,7 @@ fn assert_still_air_is_joint_output_error<
     let [(a, case_a, own_a), (b, case_b, own_b)] = [11, 12].map(|seed| {
         let simulated = flown::<NG, G>(seed, &light());
         let measured = simulated.filter.case.measurements.clone();
-        let of = (&aircraft(), &window());
+        let of = (&aircraft(), &signals());
         let unknown = vec![None; given.len()];
         let filter = Filter::<NG, G>::new(of.0, of.1, measured.clone(), &model, &unknown);
         let case = Case::<NX, E>::new(of.0, of.1, measured, &model);

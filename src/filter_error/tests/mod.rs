@@ -22,7 +22,7 @@ use crate::dynamics::{
 use crate::numerics::runge_kutta::{self, POINT};
 use crate::output_error::sharing::SharedParameters;
 use crate::output_error::tests::{
-    Noise as Draws, SAMPLES, biases, nothing_measured, truth, window, with_products,
+    Noise as Draws, SAMPLES, biases, nothing_measured, truth, signals, with_products,
 };
 use crate::output_error::theil::OutputAgreement;
 use crate::output_error::{Case, InitialState, Model};
@@ -61,7 +61,7 @@ fn prepared<const NX: usize, E: InGusts<NX>>(
         initial_state: InitialState::Estimated,
     };
     let known: Vec<Option<f64>> = biases.iter().map(|_| Some(0.05)).collect();
-    let filter = Filter::<NX, E>::new(&aircraft(), &window(), nothing_measured(), &model, &known);
+    let filter = Filter::<NX, E>::new(&aircraft(), &signals(), nothing_measured(), &model, &known);
     let values = values_by_name(truth);
     let mut own: Vec<f64> = filter.case.starting_values(|name| values[name]);
     own.extend(biases.iter().map(|_| 0.01));
@@ -145,7 +145,7 @@ fn assert_gradient_matches_differences<const NX: usize, E: InGusts<NX>>() {
     };
     let filter = Filter::<NX, E>::new(
         &aircraft(),
-        &window(),
+        &signals(),
         measurements,
         &model,
         &[Some(0.05), None],
@@ -189,7 +189,7 @@ fn the_noise_of_an_output_that_never_counts_has_no_effect() {
         ..Model::default()
     };
     let filter =
-        Filter::<4, LongitudinalInGusts>::new(&aircraft(), &window(), measurements, &model, &[]);
+        Filter::<4, LongitudinalInGusts>::new(&aircraft(), &signals(), measurements, &model, &[]);
     let respond = |an: f64| {
         let mut noise = light();
         noise.outputs[3] = an;
@@ -234,7 +234,7 @@ fn assert_still_air_is_output_error<
         biases: given.iter().collect(),
         initial_state: InitialState::Estimated,
     };
-    let case = Case::<NX, E>::new(&aircraft(), &window(), nothing_measured(), &model);
+    let case = Case::<NX, E>::new(&aircraft(), &signals(), nothing_measured(), &model);
     let mut response = case.response();
     case.respond(&simulated.own, &mut response).unwrap();
     for (filter, output_error) in predicted.predicted.iter().zip(&response.outputs) {

@@ -79,7 +79,7 @@ pub fn load(path: &Path) -> Result<StandardCase> {
 
 /// One estimate of a standard case.
 pub(super) struct StandardEstimate {
-    window: ManeuverSignals,
+    signals: ManeuverSignals,
     case: Case<3, Longitudinal>,
     pub fit: Fit,
     /// Inverse of the information matrix.
@@ -103,7 +103,7 @@ impl StandardEstimate {
     /// `None` if the information matrix is singular.
     pub fn corrected(&mut self, standard: &StandardCase) -> Option<Vec<f64>> {
         let model = standard.model();
-        self.case.noisy_inputs.surfaces = noisy_surfaces(&standard.aircraft, &self.window, &model);
+        self.case.noisy_inputs.surfaces = noisy_surfaces(&standard.aircraft, &self.signals, &model);
         let bounds = cramer_rao::bounds(self.inverse.as_ref()?, &self.case, &self.fit);
         Some(
             bounds
@@ -123,8 +123,8 @@ impl StandardCase {
     /// The message for a signal that the record lacks.
     pub(super) fn estimate(&self) -> Result<StandardEstimate, String> {
         let begin = Instant::now();
-        let window = self.window()?;
-        let case = self.case(&window);
+        let signals = self.signals()?;
+        let case = self.case(&signals);
         let ready_s = begin.elapsed().as_secs_f64();
         let settings = Settings {
             tolerance: TOLERANCE_PER_FTOL * self.file.ftol,
@@ -139,7 +139,7 @@ impl StandardCase {
             .as_ref()
             .map_or(vec![], |inverse| standard_errors(inverse, &sums));
         Ok(StandardEstimate {
-            window,
+            signals,
             case,
             fit,
             inverse,
@@ -153,17 +153,17 @@ impl StandardCase {
     ///
     /// # Errors
     /// The message for a signal that the record lacks.
-    pub fn window(&self) -> Result<ManeuverSignals, String> {
+    pub fn signals(&self) -> Result<ManeuverSignals, String> {
         let derivatives = self.free.iter().chain(self.held.iter().map(|(d, _)| d));
         let surfaces = derivatives.flat_map(|d| d.regressor.signals());
-        let window = ManeuverSignals::cut(
+        let signals = ManeuverSignals::cut(
             &self.aircraft,
             &self.record,
             0..self.record.samples,
             surfaces,
             MassProperties::Mean,
         )?;
-        Ok(window.linear_between_samples())
+        Ok(signals.linear_between_samples())
     }
 
     /// Free and held parameters of the case.
@@ -179,9 +179,9 @@ impl StandardCase {
 
     /// Prepares the maneuver for the iteration.
     #[must_use]
-    pub fn case(&self, window: &ManeuverSignals) -> Case<3, Longitudinal> {
+    pub fn case(&self, signals: &ManeuverSignals) -> Case<3, Longitudinal> {
         let measurements = self.file.measurements(&self.record);
-        let mut case = Case::new(&self.aircraft, window, measurements, &self.model());
+        let mut case = Case::new(&self.aircraft, signals, measurements, &self.model());
         case.start_from_mean_of(self.file.x0_samples);
         case
     }

@@ -75,8 +75,8 @@ impl<'a> SignalError<'a> {
 
     /// Signals as an instrument with the error would have recorded it.
     #[must_use]
-    pub fn apply_to(&self, window: &ManeuverSignals) -> ManeuverSignals {
-        let in_error = window.with_error(self.signal, self.scale, self.bias);
+    pub fn apply_to(&self, signals: &ManeuverSignals) -> ManeuverSignals {
+        let in_error = signals.with_error(self.signal, self.scale, self.bias);
         if self.delay_s == 0.0 {
             return in_error;
         }
@@ -112,7 +112,7 @@ impl Calibration {
 #[derive(Debug)]
 pub struct FittedManeuver<'a, const NX: usize, E: Equations<NX>> {
     pub aircraft: &'a Aircraft,
-    pub window: &'a ManeuverSignals,
+    pub signals: &'a ManeuverSignals,
     pub model: &'a Model<'a>,
     pub case: &'a Case<NX, E>,
     pub values: &'a [f64],
@@ -126,7 +126,7 @@ impl<const NX: usize, E: Equations<NX>> FittedManeuver<'_, NX, E> {
     /// [`Diverged`] when the integration with an error leaves its bounds.
     pub fn gradient_shifts(&self, errors: &[SignalError]) -> Result<Vec<DVector<f64>>, Diverged> {
         let held = self.all_held();
-        let exact = self.computed(self.window, &held)?;
+        let exact = self.computed(self.signals, &held)?;
         let sensitivities = self.case.sensitivities(self.values)?;
         let mut surfaces = None;
         let mut shifts = Vec::with_capacity(errors.len());
@@ -153,7 +153,7 @@ impl<const NX: usize, E: Equations<NX>> FittedManeuver<'_, NX, E> {
         exact: &[[f64; OUTPUTS]],
         sensitivities: &Sensitivities,
     ) -> Result<DVector<f64>, Diverged> {
-        let in_error = error.apply_to(self.window);
+        let in_error = error.apply_to(self.signals);
         let computed = self.computed(&in_error, held)?;
         let misread_outputs = E::AXIS.outputs().map(|o| o.signal() == error.signal);
         let measurements = &self.case.measurements;
@@ -186,10 +186,10 @@ impl<const NX: usize, E: Equations<NX>> FittedManeuver<'_, NX, E> {
         free.chain(self.model.held.iter().copied()).collect()
     }
 
-    /// Outputs of a window at the values of the fit, without the biases.
+    /// Outputs of a maneuver's signals at the values of the fit, without the biases.
     fn computed(
         &self,
-        window: &ManeuverSignals,
+        signals: &ManeuverSignals,
         held: &[(&Derivative, f64)],
     ) -> Result<Vec<[f64; OUTPUTS]>, Diverged> {
         let model = Model {
@@ -197,7 +197,7 @@ impl<const NX: usize, E: Equations<NX>> FittedManeuver<'_, NX, E> {
             initial_state: InitialState::Measured,
             ..Model::default()
         };
-        let windows = [self.window, window];
+        let windows = [self.signals, signals];
         let measurements = self.case.measurements.clone();
         let mut case = self
             .case
@@ -249,8 +249,8 @@ impl<'a> SurfaceErrors<'a> {
             biases: model.biases.clone(),
             initial_state: case.initial_state,
         };
-        let window = fitted.window.with_constant(ONE, 1.0);
-        let mut wide = case.with_model(fitted.aircraft, &window, &wide);
+        let signals = fitted.signals.with_constant(ONE, 1.0);
+        let mut wide = case.with_model(fitted.aircraft, &signals, &wide);
         wide.start = case.start;
         let values = wide
             .names

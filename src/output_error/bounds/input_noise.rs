@@ -295,7 +295,7 @@ mod tests {
     use crate::output_error::case::surface_noise::noisy_surfaces;
     use crate::output_error::case::{InitialState, Model};
     use crate::output_error::tests::{
-        Noise, SAMPLES, TABLE, nothing_measured, record, truth, window, window_of,
+        Noise, SAMPLES, TABLE, nothing_measured, record, truth, signals, window_of,
         with_noisy_surfaces,
     };
 
@@ -342,7 +342,7 @@ mod tests {
             biases: vec![],
             initial_state: InitialState::Estimated,
         };
-        let exact = window();
+        let exact = signals();
         let mut case = Case::<NX, E>::new(&aircraft(), &exact, nothing_measured(), &model);
         let derivative = |name: &str| {
             free.iter()
@@ -424,7 +424,7 @@ mod tests {
             free: truth.iter().map(|(d, _)| d).collect(),
             ..Model::default()
         };
-        let still = window();
+        let still = signals();
         assert_eq!(noisy_surfaces(&aircraft(), &still, &model), []);
     }
 }

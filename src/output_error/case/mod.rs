@@ -75,60 +75,60 @@ pub struct Case<const NX: usize, E: Equations<NX>> {
 }
 
 impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
-    /// Prepares a maneuver. `window` must contain the surfaces of the model's derivatives.
+    /// Prepares a maneuver. `signals` must contain the surfaces of the model's derivatives.
     #[must_use]
     pub fn new(
         aircraft: &Aircraft,
-        window: &ManeuverSignals,
+        signals: &ManeuverSignals,
         measurements: Measurements,
         model: &Model,
     ) -> Self {
-        let motion = Arc::new(PreparedMotion::new(aircraft, window));
-        Case::of_motion(motion, aircraft, window, measurements, model)
+        let motion = Arc::new(PreparedMotion::new(aircraft, signals));
+        Case::of_motion(motion, aircraft, signals, measurements, model)
     }
 
-    /// Prepares the same maneuver with another model. `window` may have other surfaces than the
-    /// window of this case, but the same motion.
+    /// Prepares the same maneuver with another model. `signals` may have other surfaces than the
+    /// signals of this case, but the same motion.
     #[must_use]
-    pub fn with_model(&self, aircraft: &Aircraft, window: &ManeuverSignals, model: &Model) -> Self {
+    pub fn with_model(&self, aircraft: &Aircraft, signals: &ManeuverSignals, model: &Model) -> Self {
         let measurements = self.measurements.clone();
         Case::of_motion(
             Arc::clone(&self.motion),
             aircraft,
-            window,
+            signals,
             measurements,
             model,
         )
     }
 
-    /// Prepares the same maneuver as another recorder would have recorded it, for passes alone. `windows`
-    /// are the window of this case and the window of the other recorder.
+    /// Prepares the same maneuver as another recorder would have recorded it, for passes alone.
+    /// `recordings` are the signals of this case and those of the other recorder.
     #[must_use]
     pub fn as_recorded(
         &self,
         aircraft: &Aircraft,
-        windows: [&ManeuverSignals; 2],
+        recordings: [&ManeuverSignals; 2],
         measurements: Measurements,
         model: &Model,
     ) -> Self {
-        let [own, window] = windows;
-        let motion = if window.shares_motion_with(own) {
+        let [of_this_case, signals] = recordings;
+        let motion = if signals.shares_motion_with(of_this_case) {
             Arc::clone(&self.motion)
         } else {
-            Arc::new(PreparedMotion::for_passes(aircraft, window))
+            Arc::new(PreparedMotion::for_passes(aircraft, signals))
         };
-        Case::of_motion(motion, aircraft, window, measurements, model)
+        Case::of_motion(motion, aircraft, signals, measurements, model)
     }
 
     fn of_motion(
         motion: Arc<PreparedMotion<NX, E>>,
         aircraft: &Aircraft,
-        window: &ManeuverSignals,
+        signals: &ManeuverSignals,
         measurements: Measurements,
         model: &Model,
     ) -> Self {
         let free = model.free_in_order();
-        let mut columns = RegressorColumns::<NX, E>::new(aircraft, window);
+        let mut columns = RegressorColumns::<NX, E>::new(aircraft, signals);
         let terms: Vec<BuildUpTerm> = free.iter().map(|d| columns.term(d)).collect();
         let held = model.held.iter().map(|(d, value)| ValuedTerm {
             term: columns.term(d),
@@ -148,7 +148,7 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
             biased_outputs.len(),
         );
         Case {
-            step_s: window.step_s,
+            step_s: signals.step_s,
             held: build_up_of(&held, &columns),
             columns,
             ranges: ranges_by_coefficient(&terms),

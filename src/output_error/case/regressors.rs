@@ -15,7 +15,7 @@ use crate::dynamics::{COEFFICIENTS, Equations, Longitudinal, Motion};
 use crate::flight::signal;
 use crate::units::DEG;
 
-/// Measured motion of a window, prepared for the equations of one axis.
+/// Measured motion of a maneuver, prepared for the equations of one axis.
 #[derive(Debug)]
 pub(crate) struct PreparedMotion<const NX: usize, E: Equations<NX>> {
     /// Inputs of the rates at every point.
@@ -34,18 +34,18 @@ pub(crate) struct PreparedMotion<const NX: usize, E: Equations<NX>> {
 }
 
 impl<const NX: usize, E: Equations<NX>> PreparedMotion<NX, E> {
-    pub fn new(aircraft: &Aircraft, window: &ManeuverSignals) -> Self {
-        Self::prepare(aircraft, window, true)
+    pub fn new(aircraft: &Aircraft, signals: &ManeuverSignals) -> Self {
+        Self::prepare(aircraft, signals, true)
     }
 
     /// Motion for passes alone. Only equation error reads the implied coefficients, which take as long as
     /// the rest.
-    pub fn for_passes(aircraft: &Aircraft, window: &ManeuverSignals) -> Self {
-        Self::prepare(aircraft, window, false)
+    pub fn for_passes(aircraft: &Aircraft, signals: &ManeuverSignals) -> Self {
+        Self::prepare(aircraft, signals, false)
     }
 
-    fn prepare(aircraft: &Aircraft, window: &ManeuverSignals, with_implied: bool) -> Self {
-        let (points, samples) = (window.len(), window.samples);
+    fn prepare(aircraft: &Aircraft, signals: &ManeuverSignals, with_implied: bool) -> Self {
+        let (points, samples) = (signals.len(), signals.samples);
         let implied = if with_implied { samples } else { 0 };
         let mut prepared = PreparedMotion {
             rate_inputs: Vec::with_capacity(points + 2 * WIDEST_STRIDE),
@@ -57,7 +57,7 @@ impl<const NX: usize, E: Equations<NX>> PreparedMotion<NX, E> {
         };
         Arch::new().dispatch(Preparation {
             aircraft,
-            window,
+            signals,
             with_implied,
             prepared: &mut prepared,
         });
@@ -72,7 +72,7 @@ impl<const NX: usize, E: Equations<NX>> PreparedMotion<NX, E> {
 /// Preparation point by point, compiled for the processor at hand.
 struct Preparation<'a, const NX: usize, E: Equations<NX>> {
     aircraft: &'a Aircraft,
-    window: &'a ManeuverSignals,
+    signals: &'a ManeuverSignals,
     with_implied: bool,
     prepared: &'a mut PreparedMotion<NX, E>,
 }
@@ -84,21 +84,21 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Preparation<'_, NX, E> {
     fn with_simd<S: Simd>(self, _: S) {
         let Preparation {
             aircraft,
-            window,
+            signals,
             with_implied,
             prepared,
         } = self;
-        let measured = window.motion(aircraft);
-        for point in 0..window.len() {
+        let measured = signals.motion(aircraft);
+        for point in 0..signals.len() {
             let motion = measured.at(point);
             let inputs = E::rate_inputs(aircraft, &motion);
             prepared.flow.push([motion.alpha, motion.beta]);
-            if window.is_sample(point) {
+            if signals.is_sample(point) {
                 let sensors = E::sensor_inputs(aircraft, &motion);
                 prepared.sensor_inputs.push(sensors);
                 prepared.states.push(E::measured_state(&motion));
             }
-            if with_implied && window.is_sample(point) {
+            if with_implied && signals.is_sample(point) {
                 let implied = E::implied_coefficients(aircraft, &motion, &inputs);
                 prepared.implied.push(implied);
                 let rest = measured.without_angular_accelerations(point);
@@ -113,17 +113,17 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Preparation<'_, NX, E> {
 /// Distinct columns of regressors, collected term by term.
 pub(super) struct RegressorColumns<'a, const NX: usize, E: Equations<NX>> {
     aircraft: &'a Aircraft,
-    window: &'a ManeuverSignals,
+    signals: &'a ManeuverSignals,
     /// One derivative that has each column.
     derivatives: Vec<&'a Derivative>,
     equations: PhantomData<E>,
 }
 
 impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
-    pub fn new(aircraft: &'a Aircraft, window: &'a ManeuverSignals) -> Self {
+    pub fn new(aircraft: &'a Aircraft, signals: &'a ManeuverSignals) -> Self {
         RegressorColumns {
             aircraft,
-            window,
+            signals,
             derivatives: vec![],
             equations: PhantomData,
         }
@@ -161,7 +161,7 @@ impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
     fn column(&self, derivative: &Derivative, motion: &PreparedMotion<NX, E>) -> Vec<f64> {
         let mut column = self.factor(&derivative.regressor, motion);
         if matches!(derivative.regressor, Regressor::Vane(_)) {
-            let qbar = self.window.signal(signal::QBAR).iter();
+            let qbar = self.signals.signal(signal::QBAR).iter();
             for (force, qbar) in column.iter_mut().zip(qbar) {
                 *force *= derivative.coefficient_factor(self.aircraft, *qbar);
             }
@@ -193,7 +193,7 @@ impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
     }
 
     fn state_factor(&self, regressor: &Regressor) -> Vec<f64> {
-        let velocity = self.window.signal(signal::VELOCITY).iter();
+        let velocity = self.signals.signal(signal::VELOCITY).iter();
         let factor = |v: &f64| E::state_regressor(self.aircraft, *v, regressor);
         column_of(velocity.map(|v| factor(v).map_or(0.0, |(_, factor)| factor)))
     }
@@ -206,11 +206,11 @@ impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
             Regressor::PitchRate => self.reduced_rate(signal::Q, aircraft.chord_ft),
             Regressor::YawRate => self.reduced_rate(signal::R, aircraft.span_ft),
             Regressor::AlphaRate => self.reduced_alpha_rate(),
-            Regressor::Constant => column_of((0..self.window.len()).map(|_| 1.0)),
+            Regressor::Constant => column_of((0..self.signals.len()).map(|_| 1.0)),
             Regressor::Alpha => column_of(motion.flow.iter().map(|[alpha, _]| alpha * DEG)),
             Regressor::Beta => column_of(motion.flow.iter().map(|[_, beta]| beta * DEG)),
             Regressor::Surface(name) | Regressor::Vane(name) => {
-                column_of(self.window.signal(name).iter().copied())
+                column_of(self.signals.signal(name).iter().copied())
             }
             Regressor::Magnitude(of) => {
                 let values = self.measured(of, motion);
@@ -230,12 +230,12 @@ impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
             let rate = Longitudinal::alpha_rate(aircraft, &motion);
             rate * aircraft.chord_ft / (2.0 * motion.velocity)
         };
-        self.window.motion(aircraft).points().map(reduced).collect()
+        self.signals.motion(aircraft).points().map(reduced).collect()
     }
 
     fn reduced_rate(&self, rate: &str, length_ft: f64) -> Vec<f64> {
-        let rate = self.window.signal(rate).iter();
-        let both = rate.zip(self.window.signal(signal::VELOCITY));
+        let rate = self.signals.signal(rate).iter();
+        let both = rate.zip(self.signals.signal(signal::VELOCITY));
         column_of(both.map(|(rate, v)| rate / DEG * length_ft / (2.0 * v)))
     }
 }

@@ -35,11 +35,11 @@ pub(crate) enum DerivativeValue {
     Held(f64),
 }
 
-/// Surfaces of a model that have noise in a window.
+/// Surfaces of a model that have noise in a maneuver.
 #[must_use]
 pub fn noisy_surfaces(
     aircraft: &Aircraft,
-    window: &ManeuverSignals,
+    signals: &ManeuverSignals,
     model: &Model,
 ) -> Vec<NoisySurface> {
     let free = model.free_in_order().into_iter().enumerate();
@@ -55,12 +55,12 @@ pub fn noisy_surfaces(
     surfaces.dedup();
     let mut noisy = Vec::new();
     for surface in surfaces {
-        let variance = white_variance(&window.samples_of(surface));
+        let variance = white_variance(&signals.samples_of(surface));
         if variance > 0.0 {
             let own = derivatives
                 .iter()
                 .filter(|(d, _)| d.regressor.surface() == Some(surface));
-            let effects = own.map(|(d, value)| DeflectionEffect::new(aircraft, window, d, *value));
+            let effects = own.map(|(d, value)| DeflectionEffect::new(aircraft, signals, d, *value));
             noisy.push(NoisySurface {
                 variance,
                 effects: effects.collect(),
@@ -73,14 +73,14 @@ pub fn noisy_surfaces(
 impl DeflectionEffect {
     fn new(
         aircraft: &Aircraft,
-        window: &ManeuverSignals,
+        signals: &ManeuverSignals,
         derivative: &Derivative,
         value: DerivativeValue,
     ) -> DeflectionEffect {
         let factors = match derivative.regressor {
             Regressor::Vane(_) => {
                 let times_qbar = derivative.coefficient_factor(aircraft, 1.0);
-                let qbar = window.samples_of(signal::QBAR);
+                let qbar = signals.samples_of(signal::QBAR);
                 qbar.iter().map(|qbar| times_qbar / qbar).collect()
             }
             _ => vec![],

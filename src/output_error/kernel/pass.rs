@@ -185,7 +185,7 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
                 history,
                 propagators: &propagators,
                 count,
-                correction: Uncorrected,
+                correction: NoUpdate,
             };
             propagation.run::<E>();
             let samples = Strided {
@@ -216,8 +216,8 @@ fn initial_sensitivities<const NX: usize>(
     sensitivities
 }
 
-/// Correction of the states by the measurements, between a sample's outputs and the next step.
-pub(crate) trait Correction<const NX: usize> {
+/// Update of the states by the measurements, between a sample's outputs and the next step.
+pub(crate) trait MeasurementUpdate<const NX: usize> {
     /// Returns the factors of the first vector's regressors in the outputs, if they differ from the
     /// factors at the step's first stage.
     fn output_factors(&self, k: usize) -> Option<&[f64; VECTOR]>;
@@ -235,10 +235,10 @@ pub(crate) trait Correction<const NX: usize> {
     );
 }
 
-/// No correction: output error.
-struct Uncorrected;
+/// No update: output error.
+struct NoUpdate;
 
-impl<const NX: usize> Correction<NX> for Uncorrected {
+impl<const NX: usize> MeasurementUpdate<NX> for NoUpdate {
     #[inline(always)]
     fn output_factors(&self, _: usize) -> Option<&[f64; VECTOR]> {
         None
@@ -271,7 +271,7 @@ pub(crate) struct Propagation<'a, S: Simd, const NX: usize, K> {
     pub correction: K,
 }
 
-impl<S: Simd, const NX: usize, K: Correction<NX>> Propagation<'_, S, NX, K> {
+impl<S: Simd, const NX: usize, K: MeasurementUpdate<NX>> Propagation<'_, S, NX, K> {
     /// Propagates the groups of all coefficients side by side, so that the processor has several
     /// independent sums, then the group of the initial states.
     #[inline(always)]

@@ -20,7 +20,7 @@ use crate::units::DEG;
 #[derive(Debug)]
 pub struct Reference<'a, const NX: usize, E: Equations<NX>> {
     aircraft: &'a Aircraft,
-    window: &'a ManeuverSignals,
+    signals: &'a ManeuverSignals,
     measurements: &'a Measurements,
     /// Measured motion at samples and halves between them.
     motion: Vec<Motion>,
@@ -62,20 +62,20 @@ struct Coefficients<const NX: usize> {
 }
 
 impl<'a, const NX: usize, E: Equations<NX>> Reference<'a, NX, E> {
-    /// Pass over the maneuver of a case; aircraft, window and model must be the ones from which the
+    /// Pass over the maneuver of a case; aircraft, signals and model must be the ones from which the
     /// case was made.
     #[must_use]
     pub fn new(
         aircraft: &'a Aircraft,
-        window: &'a ManeuverSignals,
+        signals: &'a ManeuverSignals,
         model: &'a Model<'a>,
         case: &'a Case<NX, E>,
     ) -> Self {
         Reference {
             aircraft,
-            window,
+            signals,
             measurements: &case.measurements,
-            motion: window.motion(aircraft).points().collect(),
+            motion: signals.motion(aircraft).points().collect(),
             free: model.free_in_order(),
             held: &model.held,
             biased_outputs: &case.biased_outputs,
@@ -131,7 +131,7 @@ impl<'a, const NX: usize, E: Equations<NX>> Reference<'a, NX, E> {
         let slope = |stage: usize, at: &Augmented<NX>| {
             self.rates(2 * sample + POINT[stage], parameters, at)
         };
-        runge_kutta::step(from, self.window.step_s, slope, Augmented::plus)
+        runge_kutta::step(from, self.signals.step_s, slope, Augmented::plus)
     }
 
     /// Rates of the states (2.1-2.3, 3.1-3.4) and of their sensitivities s to each derivative. Let
@@ -246,7 +246,7 @@ impl<'a, const NX: usize, E: Equations<NX>> Reference<'a, NX, E> {
                 Longitudinal::alpha_rate(aircraft, m) * aircraft.chord_ft / (2.0 * m.velocity)
             }
             Regressor::Surface(name) | Regressor::Vane(name) => {
-                self.window.signal(name)[point] * derivative.coefficient_factor(aircraft, m.qbar)
+                self.signals.signal(name)[point] * derivative.coefficient_factor(aircraft, m.qbar)
             }
             Regressor::Magnitude(_) | Regressor::Product(_) => {
                 part.value(&|own| self.measured(own, derivative, point))
@@ -275,7 +275,7 @@ mod tests {
     use crate::dynamics::tests::aircraft;
     use crate::output_error::likelihood::cost::{Sums, sums};
     use crate::output_error::tests::{
-        Noise, SAMPLES, TABLE, biases, measure, nothing_measured, truth, window, with_products,
+        Noise, SAMPLES, TABLE, biases, measure, nothing_measured, truth, signals, with_products,
     };
 
     /// Compares kernel and reference away from the true parameters, with noise on the measurements,
@@ -291,8 +291,8 @@ mod tests {
             biases: biases.iter().collect(),
             initial_state: InitialState::Estimated,
         };
-        let (aircraft, window) = (aircraft(), window());
-        let mut case = Case::<NX, E>::new(&aircraft, &window, nothing_measured(), &model);
+        let (aircraft, signals) = (aircraft(), signals());
+        let mut case = Case::<NX, E>::new(&aircraft, &signals, nothing_measured(), &model);
         let value_of = |name: &str| free.iter().find(|(d, _)| d.name == name).unwrap().1;
         let mut parameters = case.starting_values(value_of);
         measure(&mut case, &parameters, &mut Noise(20_261_122), 0.0);
@@ -305,7 +305,7 @@ mod tests {
         let mut response = case.response();
         case.respond(&parameters, &mut response).unwrap();
         let kernel = sums(&response, &TABLE);
-        let reference = Reference::new(&aircraft, &window, &model, &case);
+        let reference = Reference::new(&aircraft, &signals, &model, &case);
         let plain = reference.run(&parameters, &TABLE);
         for (kernel, plain) in response.outputs.iter().zip(&plain.outputs) {
             assert_abs_diff_eq!(kernel[..], plain[..], epsilon = 1e-10);

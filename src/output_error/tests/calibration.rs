@@ -16,10 +16,10 @@ fn model(truth: &[(Derivative, f64)]) -> Model<'_> {
     }
 }
 
-/// Maneuver without noise at its true parameters, with its window.
+/// Maneuver without noise at its true parameters, with its signals.
 struct Exact<const NX: usize, E: Equations<NX>> {
     truth: Vec<(Derivative, f64)>,
-    window: ManeuverSignals,
+    signals: ManeuverSignals,
     case: Case<NX, E>,
     parameters: Vec<f64>,
     response: crate::output_error::Response,
@@ -34,7 +34,7 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
         case.measurements.values.clone_from(&response.outputs);
         Exact {
             truth,
-            window: window(),
+            signals: signals(),
             case,
             parameters,
             response,
@@ -46,7 +46,7 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
         let model = model(&self.truth);
         let fitted = FittedManeuver {
             aircraft: &aircraft(),
-            window: &self.window,
+            signals: &self.signals,
             model: &model,
             case: &self.case,
             values: &self.parameters,
@@ -77,8 +77,8 @@ impl<const NX: usize, E: Equations<NX>> Exact<NX, E> {
                 .iter_mut()
                 .for_each(|z| z[o] += error.scale * z[o] + error.bias);
         }
-        let window = error.apply_to(&self.window);
-        let case = Case::<NX, E>::new(&aircraft(), &window, measurements, &model(&self.truth));
+        let signals = error.apply_to(&self.signals);
+        let case = Case::<NX, E>::new(&aircraft(), &signals, measurements, &model(&self.truth));
         let settings = Settings {
             tolerance: 1e-13,
             ..Settings::default()

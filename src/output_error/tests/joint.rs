@@ -175,7 +175,7 @@ fn the_error_of_a_held_value_does_not_average_out() {
             .collect(),
         ..Model::default()
     };
-    let case = Longitudinals::new(&aircraft(), &window(), wide.measurements.clone(), &model);
+    let case = Longitudinals::new(&aircraft(), &signals(), wide.measurements.clone(), &model);
     let values: BTreeMap<&str, f64> = wide
         .names
         .iter()

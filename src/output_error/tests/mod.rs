@@ -184,7 +184,7 @@ pub(crate) fn with_noisy_surfaces(sd_deg: f64, noise: &mut Noise) -> Record {
     record
 }
 
-pub(crate) fn window() -> ManeuverSignals {
+pub(crate) fn signals() -> ManeuverSignals {
     window_of(&record())
 }
 
@@ -211,7 +211,7 @@ fn case<const NX: usize, E: Equations<NX>>(
         biases: biases.iter().collect(),
         initial_state: InitialState::Estimated,
     };
-    let case = Case::new(&aircraft(), &window(), nothing_measured(), &model);
+    let case = Case::new(&aircraft(), &signals(), nothing_measured(), &model);
     let values: BTreeMap<&str, f64> = truth.iter().map(|(d, v)| (d.name.as_str(), *v)).collect();
     let mut parameters = case.starting_values(|name| values[name]);
     for (j, _) in biases.iter().enumerate() {
@@ -549,7 +549,7 @@ fn a_surface_that_never_moves_is_named() {
     };
     record.signals.insert("ghost_deg".into(), still);
     let surfaces = ["dr_deg", "da_deg", "dyv_deg", "ghost_deg"];
-    let window = ManeuverSignals::cut(
+    let signals = ManeuverSignals::cut(
         &aircraft(),
         &record,
         0..SAMPLES,
@@ -557,7 +557,7 @@ fn a_surface_that_never_moves_is_named() {
         MassProperties::Recorded,
     )
     .unwrap();
-    let case = Case::<4, Lateral>::new(&aircraft(), &window, nothing_measured(), &model);
+    let case = Case::<4, Lateral>::new(&aircraft(), &signals, nothing_measured(), &model);
     let fit = fit(&case, case.starting_values(|_| 0.0), Weights::Table);
     assert_eq!(fit.outcome, Outcome::Unidentifiable);
     assert!(fit.reason.contains("Cn_ghost"), "{}", fit.reason);
@@ -609,7 +609,7 @@ fn the_consider_covariance_is_the_effect_of_a_held_value_s_error() {
     let estimated = |value: f64| {
         let case = Case::<3, Longitudinal>::new(
             &aircraft(),
-            &window(),
+            &signals(),
             full.measurements.clone(),
             &held(value),
         );
