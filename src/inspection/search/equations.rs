@@ -100,44 +100,65 @@ impl Equation {
     }
 
     /// Quantity whose change is compared, and the terms of its rate; for equations of levels the
-    /// quantity itself and its prediction.
+    /// quantity itself and its prediction. Sines are most of the search's time, so each equation
+    /// computes its own alone.
     fn sides(self, m: &Motion) -> (f64, [f64; 4]) {
-        let (sin_theta, cos_theta) = m.theta.sin_cos();
-        let (sin_phi, cos_phi) = m.phi.sin_cos();
-        let level = m.velocity * m.beta.cos();
-        let (u, v, w) = (
-            level * m.alpha.cos(),
-            m.velocity * m.beta.sin(),
-            level * m.alpha.sin(),
-        );
         let g = G0_FT_S2;
         match self {
-            Equation::PitchAttitude => (m.theta, [m.q * cos_phi, -m.r * sin_phi, 0.0, 0.0]),
+            Equation::PitchAttitude => {
+                let (sin_phi, cos_phi) = m.phi.sin_cos();
+                (m.theta, [m.q * cos_phi, -m.r * sin_phi, 0.0, 0.0])
+            }
             Equation::RollAttitude => {
+                let (sin_theta, cos_theta) = m.theta.sin_cos();
+                let (sin_phi, cos_phi) = m.phi.sin_cos();
                 let tan = sin_theta / cos_theta;
                 (m.phi, [m.p, tan * m.q * sin_phi, tan * m.r * cos_phi, 0.0])
             }
-            Equation::Heading => (
-                m.psi,
-                [
-                    m.q * sin_phi / cos_theta,
-                    m.r * cos_phi / cos_theta,
-                    0.0,
-                    0.0,
-                ],
-            ),
-            Equation::Forward => (u, [m.r * v, -m.q * w, m.ax, -g * sin_theta]),
-            Equation::Sideways => (v, [m.p * w, -m.r * u, m.ay, g * cos_theta * sin_phi]),
-            Equation::Downward => (w, [m.q * u, -m.p * v, -m.an, g * cos_theta * cos_phi]),
-            Equation::Climb => (
-                m.altitude,
-                [
-                    u * sin_theta,
-                    -v * sin_phi * cos_theta,
-                    -w * cos_phi * cos_theta,
-                    0.0,
-                ],
-            ),
+            Equation::Heading => {
+                let (_, cos_theta) = m.theta.sin_cos();
+                let (sin_phi, cos_phi) = m.phi.sin_cos();
+                (
+                    m.psi,
+                    [
+                        m.q * sin_phi / cos_theta,
+                        m.r * cos_phi / cos_theta,
+                        0.0,
+                        0.0,
+                    ],
+                )
+            }
+            Equation::Forward => {
+                let [u, v, w] = m.body_velocity();
+                let (sin_theta, _) = m.theta.sin_cos();
+                (u, [m.r * v, -m.q * w, m.ax, -g * sin_theta])
+            }
+            Equation::Sideways => {
+                let [u, v, w] = m.body_velocity();
+                let (_, cos_theta) = m.theta.sin_cos();
+                let (sin_phi, _) = m.phi.sin_cos();
+                (v, [m.p * w, -m.r * u, m.ay, g * cos_theta * sin_phi])
+            }
+            Equation::Downward => {
+                let [u, v, w] = m.body_velocity();
+                let (_, cos_theta) = m.theta.sin_cos();
+                let (_, cos_phi) = m.phi.sin_cos();
+                (w, [m.q * u, -m.p * v, -m.an, g * cos_theta * cos_phi])
+            }
+            Equation::Climb => {
+                let [u, v, w] = m.body_velocity();
+                let (sin_theta, cos_theta) = m.theta.sin_cos();
+                let (sin_phi, cos_phi) = m.phi.sin_cos();
+                (
+                    m.altitude,
+                    [
+                        u * sin_theta,
+                        -v * sin_phi * cos_theta,
+                        -w * cos_phi * cos_theta,
+                        0.0,
+                    ],
+                )
+            }
             Equation::DynamicPressure => {
                 let air = air(m.altitude);
                 let pressure = 0.5 * air.density_slug_ft3 * m.velocity * m.velocity;
@@ -182,6 +203,18 @@ struct Motion {
 }
 
 impl Motion {
+    /// Velocity forward, right and down, ft/s.
+    fn body_velocity(&self) -> [f64; 3] {
+        let (sin_alpha, cos_alpha) = self.alpha.sin_cos();
+        let (sin_beta, cos_beta) = self.beta.sin_cos();
+        let level = self.velocity * cos_beta;
+        [
+            level * cos_alpha,
+            self.velocity * sin_beta,
+            level * sin_alpha,
+        ]
+    }
+
     fn set(&mut self, quantity: Quantity, value: f64) {
         let place = match quantity {
             Quantity::Alpha => &mut self.alpha,
@@ -275,7 +308,7 @@ fn interval_squares(
         let (measured, terms) = if equation.is_level() {
             (value, rates)
         } else {
-            let (last, integral) = integrated(&sides, at..at + length, step_s);
+            let (last, integral) = integrated(&sides, rates, at..at + length, step_s);
             (change(equation, value, last), integral)
         };
         let residual = measured - terms.iter().sum::<f64>();
@@ -287,14 +320,16 @@ fn interval_squares(
     }
 }
 
-/// Compared quantity at the end of an interval, and the integrals of the terms (trapezia).
+/// Compared quantity at the end of an interval, and the integrals of the terms (trapezia). `before`
+/// are the terms at its start.
 fn integrated(
     sides: &impl Fn(usize) -> (f64, [f64; 4]),
+    mut before: [f64; 4],
     interval: std::ops::Range<usize>,
     step_s: f64,
 ) -> (f64, [f64; 4]) {
     let mut integral = [0.0; 4];
-    let (mut last, mut before) = sides(interval.start);
+    let mut last = f64::NAN;
     for k in interval.start + 1..=interval.end {
         let (value, rates) = sides(k);
         for (sum, (a, b)) in integral.iter_mut().zip(before.iter().zip(rates)) {
