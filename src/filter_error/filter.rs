@@ -12,10 +12,10 @@ use pulp::Arch;
 
 use super::gain_computation::GainComputation;
 use super::gains::{Pattern, PatternGain, patterns};
-use super::input_noise::InputNoise;
+use super::input_process_noise::InputNoise;
 use super::linearised::Linearised;
 use super::noise::{Noise, NoiseParameter, NoisePrior};
-use super::pass::{Corrections, FilterPass, LaneBlocks, LaneGain, PassOutputs, RowSink};
+use super::pass::{FilterPass, LaneBlocks, LaneGain, MeasurementUpdates, PassOutputs, RowSink};
 use super::response::FilterResponse;
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::ManeuverSignals;
@@ -213,7 +213,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         let mut gain = PatternGain::none();
         gain.gain[(E::ANGLE, E::VANE)] = RAD * self.noise(parameters).angle_gain(E::VANE);
         let gains = vec![gain; self.patterns.len()];
-        let mut corrections = self.corrections(parameters, &gains);
+        let mut corrections = self.measurement_updates(parameters, &gains);
         corrections.decay = 0.0;
         let mut response = FilterResponse::empty(self.samples(), self.parameters());
         let no_sums = None::<&mut NormalSums>;
@@ -228,7 +228,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         response: &mut FilterResponse,
         sink: Option<&mut K>,
     ) -> Result<(), Diverged> {
-        let corrections = self.corrections(parameters, gains);
+        let corrections = self.measurement_updates(parameters, gains);
         self.run_on(&self.case, parameters, &corrections, response, sink)
     }
 
@@ -237,7 +237,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         &self,
         case: &Case<NX, E>,
         parameters: &[f64],
-        corrections: &Corrections<NX>,
+        corrections: &MeasurementUpdates<NX>,
         response: &mut FilterResponse,
         sink: Option<&mut K>,
     ) -> Result<(), Diverged> {
@@ -257,14 +257,14 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         })
     }
 
-    pub(super) fn corrections(
+    pub(super) fn measurement_updates(
         &self,
         parameters: &[f64],
         gains: &[PatternGain<NX>],
-    ) -> Corrections<'_, NX> {
+    ) -> MeasurementUpdates<'_, NX> {
         let noise = self.noise(parameters);
         let lane_gain = |gain: &PatternGain<NX>| LaneGain::new(gain, &self.layout);
-        Corrections {
+        MeasurementUpdates {
             gains: gains.iter().map(lane_gain).collect(),
             patterns: &self.patterns,
             pattern_of: &self.pattern_of,
@@ -282,6 +282,12 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
             biases[o] += bias;
         }
         biases
+    }
+
+    /// Output that each free bias shifts.
+    #[cfg(test)]
+    pub(super) fn biased_outputs(&self) -> &[usize] {
+        &self.biased_outputs
     }
 
     /// Number of lanes.
@@ -407,7 +413,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
 
 /// Model of the filter's case, without biases and initial states, which the filter itself
 /// estimates.
-fn without_own<'a>(model: &Model<'a>) -> Model<'a> {
+pub(super) fn without_own<'a>(model: &Model<'a>) -> Model<'a> {
     Model {
         biases: vec![],
         initial_state: InitialState::Measured,

@@ -11,7 +11,7 @@ use super::gains::{
     ParameterSlope, Pattern, PatternGain, gains_of_patterns, steady_variance_slopes,
     steady_variances,
 };
-use super::input_noise::InputNoise;
+use super::input_process_noise::InputNoise;
 use super::linearised::{Discrete, DiscreteSystem, Linearised};
 use super::noise::{Noise, NoiseParameter};
 use super::riccati::{NoisySystem, StateMatrix, SteadyFilter};

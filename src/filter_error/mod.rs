@@ -6,10 +6,10 @@
 //! x̃ by the measurements z:
 //!
 //! ```text
-//! prediction   x̂(k+1) = f(T x̃(k))
-//! innovation   v(k) = z(k) − h(x̂(k))
-//! correction   x̃(k) = x̂(k) + K v(k)
-//! cost         J = ½ Σ (v' S⁻¹ v + log|S|) + priors
+//! (1) prediction   x̂(k+1) = f(T x̃(k))
+//! (2) innovation   v(k) = z(k) − h(x̂(k))
+//! (3) correction   x̃(k) = x̂(k) + K v(k)
+//! (4) cost         J = ½ Σ (v' S⁻¹ v + log|S|) + priors
 //! ```
 //!
 //! f is the step of output error, h the outputs, S the covariance of the innovations v. T lets the
@@ -21,10 +21,11 @@
 //! |---|---|
 //! | [`noise`] | parameters of the noise, their priors and floors |
 //! | `linearised` | mean system of a maneuver, as a function of its derivatives |
-//! | [`input_noise`] | noise of surfaces and dynamic pressure as noise of the states |
+//! | [`input_process_noise`] | noise of surfaces and dynamic pressure as noise of the states |
 //! | `riccati` | covariance of the prediction, and its slopes |
 //! | `gains` | gain and covariance of the innovations for each pattern of missing outputs |
 //! | `gain_computation` | gains for given parameters, with their slopes along all of them |
+//! | `reference` | one pass in plain scalar code, which the tests compare with `pass`: read it first |
 //! | `pass` | one pass: innovations and their sensitivities, in the kernel of output error |
 //! | [`response`] | result of a pass: cost, gradient and information |
 //! | [`filter`] | a maneuver prepared |
@@ -39,11 +40,13 @@ pub mod calibration_gradients;
 pub mod filter;
 mod gain_computation;
 mod gains;
-mod input_noise;
+mod input_process_noise;
 pub mod joint_filter;
 mod linearised;
 pub mod noise;
 mod pass;
+#[cfg(test)]
+mod reference;
 pub mod response;
 mod riccati;
 pub mod scoring;

@@ -29,7 +29,7 @@ use crate::output_error::case::chunking::{CHUNK, POINTS, Strided};
 use crate::output_error::case::layout::LaneLayout;
 use crate::output_error::kernel::chunk::{ChunkBuildUp, fill_regressor_rows};
 use crate::output_error::kernel::normal_equations::NormalSums;
-use crate::output_error::kernel::pass::{MeasurementUpdate, Diverged, Propagation};
+use crate::output_error::kernel::pass::{Diverged, MeasurementUpdate, Propagation};
 use crate::output_error::kernel::propagators::Propagators;
 use crate::output_error::kernel::trajectory::{STATE_BOUND, StageHistory, Trajectory};
 
@@ -250,7 +250,7 @@ pub(super) struct FilterPass<'a, const NX: usize, E: InGusts<NX>, K: RowSink<NX>
     pub sink: Option<&'a mut K>,
 }
 
-/// MeasurementUpdates at the samples of one chunk.
+/// Measurement updates at the samples of one chunk.
 struct ChunkUpdates<'a, const NX: usize, E> {
     corrections: &'a MeasurementUpdates<'a, NX>,
     /// Slots of products of a state: (slot, state).

@@ -66,7 +66,7 @@ fn shift_by_pass<const NX: usize, E: InGusts<NX>>(
         .case
         .as_recorded(&aircraft(), windows, measured, &held_start);
     let mut moved = FilterResponse::empty(filter.samples(), filter.parameters());
-    let corrections = filter.corrections(at, &gains);
+    let corrections = filter.measurement_updates(at, &gains);
     filter
         .run_on(&case, at, &corrections, &mut moved, None::<&mut NormalSums>)
         .unwrap();

@@ -3,6 +3,7 @@
 mod inputs;
 mod joint;
 mod calibration_gradients;
+mod plain_pass;
 
 use std::collections::BTreeMap;
 
@@ -22,7 +23,7 @@ use crate::dynamics::{
 use crate::numerics::runge_kutta::{self, POINT};
 use crate::output_error::sharing::SharedParameters;
 use crate::output_error::tests::{
-    Noise as Draws, SAMPLES, biases, nothing_measured, truth, signals, with_products,
+    Noise as Draws, SAMPLES, biases, nothing_measured, signals, truth, with_products,
 };
 use crate::output_error::theil::OutputAgreement;
 use crate::output_error::{Case, InitialState, Model};

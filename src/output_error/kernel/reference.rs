@@ -46,11 +46,23 @@ pub struct PlainSums {
     pub information: DMatrix<f64>,
 }
 
+impl PlainSums {
+    /// Sums over no samples.
+    pub(crate) fn zeros(parameters: usize) -> PlainSums {
+        PlainSums {
+            outputs: vec![],
+            weighted_square: 0.0,
+            gradient: DVector::zeros(parameters),
+            information: DMatrix::zeros(parameters, parameters),
+        }
+    }
+}
+
 /// State with its sensitivities, one for each parameter.
 #[derive(Clone)]
-struct Augmented<const NX: usize> {
-    x: SVector<f64, NX>,
-    s: Vec<SVector<f64, NX>>,
+pub(crate) struct Augmented<const NX: usize> {
+    pub x: SVector<f64, NX>,
+    pub s: Vec<SVector<f64, NX>>,
 }
 
 /// Coefficients at a point and state.
@@ -88,13 +100,7 @@ impl<'a, const NX: usize, E: Equations<NX>> Reference<'a, NX, E> {
     /// Integrates with these parameters and sums with these weights.
     #[must_use]
     pub fn run(&self, parameters: &[f64], weights: &[f64; OUTPUTS]) -> PlainSums {
-        let n = parameters.len();
-        let mut sums = PlainSums {
-            outputs: Vec::with_capacity(self.measurements.values.len()),
-            weighted_square: 0.0,
-            gradient: DVector::zeros(n),
-            information: DMatrix::zeros(n, n),
-        };
+        let mut sums = PlainSums::zeros(parameters.len());
         let mut state = self.initial(parameters);
         for sample in 0..self.measurements.values.len() {
             if sample > 0 {
@@ -127,7 +133,12 @@ impl<'a, const NX: usize, E: Equations<NX>> Reference<'a, NX, E> {
     }
 
     /// Runge-Kutta step from a sample to the next one.
-    fn step(&self, sample: usize, parameters: &[f64], from: &Augmented<NX>) -> Augmented<NX> {
+    pub(crate) fn step(
+        &self,
+        sample: usize,
+        parameters: &[f64],
+        from: &Augmented<NX>,
+    ) -> Augmented<NX> {
         let slope = |stage: usize, at: &Augmented<NX>| {
             self.rates(2 * sample + POINT[stage], parameters, at)
         };
@@ -151,7 +162,7 @@ impl<'a, const NX: usize, E: Equations<NX>> Reference<'a, NX, E> {
 
     /// Outputs at a sample (2.7-2.9, 3.7, 3.8) and their slopes along the parameters, C s + D_k r.
     /// C are the slopes of the outputs along the states, and D_k those along the coefficient k.
-    fn outputs(
+    pub(crate) fn outputs(
         &self,
         sample: usize,
         parameters: &[f64],
@@ -266,7 +277,7 @@ impl<const NX: usize> Augmented<NX> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use approx::{assert_abs_diff_eq, assert_relative_eq};
 
     use super::*;
@@ -275,11 +286,11 @@ mod tests {
     use crate::dynamics::tests::aircraft;
     use crate::output_error::likelihood::cost::{Sums, sums};
     use crate::output_error::tests::{
-        Noise, SAMPLES, TABLE, biases, measure, nothing_measured, truth, signals, with_products,
+        Noise, SAMPLES, TABLE, biases, measure, nothing_measured, signals, truth, with_products,
     };
 
-    /// Compares kernel and reference away from the true parameters, with noise on the measurements,
-    /// samples that do not count, one held derivative, and free biases and initial states.
+    /// Compares kernel and reference away from the true parameters, with noise on the measurements
+    /// and samples that do not count. One derivative is held; biases and initial states are free.
     fn assert_kernel_matches_reference<const NX: usize, E: Equations<NX>>(
         truth: &[(Derivative, f64)],
     ) {
@@ -314,7 +325,7 @@ mod tests {
     }
 
     /// Compares the sums in units of each parameter's own size, 1/√H_jj.
-    fn assert_sums_match(kernel: &Sums, plain: &PlainSums) {
+    pub(crate) fn assert_sums_match(kernel: &Sums, plain: &PlainSums) {
         const TOLERANCE: f64 = 1e-10;
         let square = plain.weighted_square;
         assert_relative_eq!(kernel.weighted_square, square, max_relative = TOLERANCE);
