@@ -296,10 +296,20 @@ const TERMINAL: [&str; 8] = [
     "io::stdin",
 ];
 
-/// Lines of modules other than `home` that contain one of some spellings as whole words.
-fn elsewhere(home: &str, spellings: &[&str]) -> Vec<String> {
+/// Spellings of a use of the process: its environment, its arguments, its end, other processes.
+const PROCESS: [&str; 5] = [
+    "std::process",
+    "process::",
+    "env::var",
+    "env::args",
+    "env::current_exe",
+];
+
+/// Lines of modules outside `homes` that contain one of some spellings as whole words.
+fn elsewhere(homes: &[&str], spellings: &[&str]) -> Vec<String> {
     let mut found = Vec::new();
-    for source in sources().iter().filter(|source| source.module[0] != home) {
+    let is_outside = |source: &&Source| !homes.contains(&source.module[0].as_str());
+    for source in sources().iter().filter(is_outside) {
         for (number, line) in lines(&source.bare) {
             let has = |spelling: &&str| {
                 line.match_indices(*spelling).any(|(at, _)| {
@@ -317,13 +327,19 @@ fn elsewhere(home: &str, spellings: &[&str]) -> Vec<String> {
 
 #[test]
 fn only_the_store_touches_the_disk() {
-    let wrong = elsewhere("store", &OUTSIDE);
+    let wrong = elsewhere(&["store"], &OUTSIDE);
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
 #[test]
 fn only_the_command_line_prints() {
-    let wrong = elsewhere("cli", &TERMINAL);
+    let wrong = elsewhere(&["cli"], &TERMINAL);
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn only_store_and_command_line_depend_on_the_process() {
+    let wrong = elsewhere(&["cli", "store"], &PROCESS);
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
@@ -382,6 +398,21 @@ fn a_function_or_constant_of_one_file_is_private() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// Largest number of files side by side in a folder, besides its `mod.rs`.
+const MOST_FILES_IN_A_ROOM: usize = 20;
+
+#[test]
+fn no_room_is_crowded() {
+    let mut files_in: BTreeMap<PathBuf, usize> = BTreeMap::new();
+    for file in rust_files(&["src"]).filter(|file| !file.ends_with("mod.rs")) {
+        *files_in
+            .entry(file.parent().unwrap().to_owned())
+            .or_default() += 1;
+    }
+    files_in.retain(|_, files| *files > MOST_FILES_IN_A_ROOM);
+    assert!(files_in.is_empty(), "{files_in:#?}");
 }
 
 #[test]
