@@ -16,10 +16,12 @@ use crate::model::LocalPosterior;
 use crate::numerics::dual::Dual;
 use crate::numerics::linear_algebra::root::continuous_root;
 use crate::numerics::statistics::normal::NORMAL_95;
+use crate::numerics::statistics::order_statistics::quantile_of_sorted;
 use crate::numerics::statistics::random::RandomStream;
 use crate::tables::{
     ALL_PARAGRAPHS, Airframe, DeviationBasis, FlyingQuality, Level, LevelRow, QualityRow, RootRow,
 };
+use crate::units::DEG;
 
 /// Seed of the draws. All angles of attack use the same random numbers, so that probabilities vary
 /// as smoothly over α as the posterior.
@@ -215,7 +217,7 @@ impl Drawn {
         let at = |share: f64| {
             let known = Some(share).filter(|_| !self.lacks_values());
             known
-                .and_then(|share| self.quantile(share))
+                .and_then(|share| quantile_of_sorted(&self.values, share))
                 .unwrap_or(f64::NAN)
         };
         let [low, high] = ONE_DEVIATION.map(at);
@@ -225,22 +227,6 @@ impl Drawn {
             upper: at(0.975),
             basis: DeviationBasis::Draws,
         }
-    }
-
-    /// Quantile, linear between neighbours; infinite if one of them is.
-    fn quantile(&self, share: f64) -> Option<f64> {
-        let rank = share * self.values.len().checked_sub(1)? as f64;
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a share of a count"
-        )]
-        let below = rank as usize;
-        let (first, second) = (self.values[below], self.values.get(below + 1));
-        let second = second.copied().filter(|second| *second > first);
-        let step = |second: f64| (second - first) * rank.fract();
-        let is_between = rank.fract() > 0.0;
-        Some(first + second.filter(|_| is_between).map_or(0.0, step))
     }
 }
 
@@ -320,7 +306,7 @@ impl JudgedFlight<'_> {
                 mach: trim.condition.mach,
                 qbar_psf: trim.qbar,
                 mass_slug: trim.mass,
-                path_deg: (trim.theta - trim.alpha).to_degrees(),
+                path_deg: (trim.theta - trim.alpha) * DEG,
                 value: finite(dual.value),
                 standard_deviation: finite(uncertainty.deviation),
                 lower_95: finite(uncertainty.lower),

@@ -6,6 +6,7 @@
 //! | [`upper_median`] | the larger of the two middle values | left out |
 //! | [`upper_median_in_place`] | the larger of the two middle values | ordered: −∞ first, then +∞, then NaN |
 //! | [`quantile`] | linear between the two neighbours | left out |
+//! | [`quantile_of_sorted`] | linear between the two neighbours | infinite if a neighbour is |
 //! | [`lower_quantile_in_place`] | the smaller of the two neighbours | ordered |
 //! | [`trimmed_range`] | | ordered |
 //! | [`weighted_median`] | the smaller of the two middle values | ordered |
@@ -14,7 +15,7 @@
 //! and allocate nothing; they select in linear time. The upper median of many values is one of the
 //! values. It needs one selection; the mean of the middle two needs a second pass. Noise estimates
 //! over thousands of samples therefore use it. Trends use it for the scatter of the median
-//! maneuver, so that the scatter belongs to one maneuver and is not the mean of two classes.
+//! maneuver. The scatter then belongs to one maneuver and is not the mean of two classes.
 //! [`median`] would change the published scatter.
 
 /// Standard deviation of a normal distribution over the median of its absolute deviations: 1/Φ⁻¹(¾).
@@ -83,6 +84,19 @@ pub fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64
     let below = sorted.get(whole(rank))?;
     let above = sorted.get(whole(rank.ceil()))?;
     Some(below + (above - below) * rank.fract())
+}
+
+/// Quantile of sorted values at a share between 0 and 1, linear between neighbours; infinite if one
+/// of them is.
+#[must_use]
+pub fn quantile_of_sorted(sorted: &[f64], share: f64) -> Option<f64> {
+    let rank = share * sorted.len().checked_sub(1)? as f64;
+    let below = whole(rank);
+    let first = *sorted.get(below)?;
+    let second = sorted.get(below + 1).filter(|second| **second > first);
+    let step = |second: &f64| (second - first) * rank.fract();
+    let is_between = rank.fract() > 0.0;
+    Some(first + second.filter(|_| is_between).map_or(0.0, step))
 }
 
 /// Quantile of all values at a share between 0 and 1; the smaller of two neighbours. Reorders them.
