@@ -4,7 +4,7 @@
 mod terminal;
 
 mod bars;
-mod changes;
+mod printed_changes;
 mod check_command;
 mod cluster_commands;
 mod export_command;
@@ -33,10 +33,10 @@ use crate::lineage::Stage;
 
 /// Flight-test archives in, trusted aerodynamic derivatives out.
 ///
-/// harvest reads Parquet flight records, finds the maneuvers in them, estimates the stability and
-/// control derivatives of each by maximum likelihood (output error, and filter error in gusts), fits
-/// trends across angle of attack, fuses flights and wind tunnel, and writes tables (Parquet and CSV)
-/// and a report (HTML and PDF).
+/// harvest reads Parquet flight records and finds the maneuvers in them. It estimates the stability
+/// and control derivatives of each maneuver by maximum likelihood: output error, and filter error
+/// in gusts. It fits trends across angle of attack and fuses flights and wind tunnel. It writes
+/// tables (Parquet and CSV) and a report (HTML and PDF).
 #[derive(Debug, Parser)]
 #[command(version = VERSION, after_long_help = AFTER)]
 struct Cli {

@@ -6,9 +6,9 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::bars::Bars;
-use super::changes::{self, MOST_LISTED};
 use super::cluster_commands;
 use super::options::{ATTENTION, Options, REJECTED, WaitOptions, exit_code, start_threads};
+use super::printed_changes::{self, MOST_LISTED};
 use crate::night::status::NightStatus;
 use crate::night::{diff, explain, gc, status, verify};
 
@@ -176,7 +176,7 @@ pub fn diff(options: &DiffOptions) -> anyhow::Result<ExitCode> {
     if options.json {
         out!("{}", serde_json::to_string_pretty(&found.changes)?);
     } else if !options.options.quiet || found.changes.alert {
-        changes::print(&found.night, &found.changes);
+        printed_changes::print(&found.night, &found.changes);
     }
     Ok(exit_code(found.changes.alert, ATTENTION))
 }

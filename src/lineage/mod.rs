@@ -1,12 +1,12 @@
 //! Lineage: code, configuration and input that decide a published night, and the differences between
 //! two nights.
 
-mod changes;
+mod change_rows;
 mod differences;
 mod parts;
 mod stage;
 
-pub use changes::{
+pub use change_rows::{
     Changes, Contradiction, InformationGain, InstrumentChange, ManeuverChange, ManeuverDifference,
     Moved, VerdictChange,
 };

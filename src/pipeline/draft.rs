@@ -7,7 +7,7 @@ use crate::inspection::draft::{self, Draft};
 use crate::inspection::{Inspection, inspect};
 use crate::report::recording_page;
 use crate::store::archive::{self, FlightFiles};
-use crate::store::{atomic, files, import, recording};
+use crate::store::{atomic, files, import, unmapped_recording};
 
 /// Largest number of rows that are read of a file: half an hour at 200 Hz.
 const MOST_ROWS: usize = 360_000;
@@ -44,7 +44,7 @@ pub fn write(name: &str, from: &[String]) -> Result<Drafted> {
     for flight in &flights {
         found += flight.files.len();
         if recordings.len() < MOST_FILES {
-            recordings.extend(recording::first_rows(flight, MOST_ROWS)?);
+            recordings.extend(unmapped_recording::first_rows(flight, MOST_ROWS)?);
         }
     }
     let read = recordings.len();

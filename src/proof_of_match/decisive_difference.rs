@@ -1,7 +1,7 @@
 //! Difference that decides whether a repeat flight passes, as a linear function of the derivatives.
 //!
-//! To first order the outputs of a repeat flight and of a model differ by four parts: the mean
-//! difference, the effect of the derivatives' deviations, the effect of the start's errors, and
+//! To first order the outputs of a repeat flight and of a model differ by four parts. These are the
+//! mean difference, the effects of the derivatives' deviations and of the start's errors, and
 //! sensor noise. At one sample the difference is therefore normal, and its nearest limit is a
 //! number of standard deviations away: its distance. The decisive difference is
 //!
@@ -19,9 +19,9 @@ use super::dutch_roll::{DutchRoll, LateralModes};
 use super::free_run::FreeRun;
 use super::judgement::Judged;
 use super::linear_run::Histories;
+use super::maneuver_recording::ManeuverRecording;
 use super::mean_run::{MeanRun, acting_derivatives};
 use super::outputs::output_index;
-use super::recording::ManeuverRecording;
 use super::specification::Tolerance;
 use crate::aero::{AeroModel, Condition};
 use crate::model::{LocalPosterior, LocalValue};

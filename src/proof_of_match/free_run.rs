@@ -6,8 +6,8 @@ use super::aerodynamics::{
     AeroInputs, Aerodynamics, COEFFICIENTS, SimulationTrim, TrimmedAerodynamics,
 };
 use super::load_changes::LoadSlopes;
+use super::maneuver_recording::ManeuverRecording;
 use super::outputs::{Outputs, outputs};
-use super::recording::ManeuverRecording;
 use crate::aircraft::Aircraft;
 use crate::numerics::runge_kutta::{self, POINT};
 use crate::rigid_body::{

@@ -2,8 +2,8 @@
 
 use super::dutch_roll::DutchRoll;
 use super::free_run::FreeRun;
+use super::maneuver_recording::ManeuverRecording;
 use super::outputs::output_index;
-use super::recording::ManeuverRecording;
 use super::specification::{Test, Tolerance};
 use crate::tables::MatchVerdict;
 

@@ -5,8 +5,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::free_run::{FreeRun, STATES, Simulation};
 use super::linear_run::{Histories, Parameter, RunWithSensitivities};
+use super::maneuver_recording::ManeuverRecording;
 use super::outputs::{COUNT, Outputs};
-use super::recording::ManeuverRecording;
 use super::start::MatchedStart;
 use crate::aero::{AeroModel, Axis, Regressor};
 use crate::model::{LocalKind, LocalPosterior, LocalValue};

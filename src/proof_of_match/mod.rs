@@ -1,7 +1,7 @@
 //! Proof of match: comparison of simulators with the aircraft. Each maneuver is flown again by a
 //! body with six degrees of freedom, and judged by the tolerances of a standard.
 //!
-//! - [`recording`]: the maneuver as recorded, inputs and outputs;
+//! - [`maneuver_recording`]: the maneuver as recorded, inputs and outputs;
 //! - [`derivative_table`] and [`aerodynamics`]: the model that flies it again;
 //! - [`free_run`]: the flight, and [`linear_run`]: the slopes of its outputs;
 //! - [`start`]: initial state and trim;
@@ -17,7 +17,7 @@ mod specification;
 mod outputs;
 mod derivative_table;
 mod aerodynamics;
-mod recording;
+mod maneuver_recording;
 mod load_changes;
 mod free_run;
 mod linear_run;

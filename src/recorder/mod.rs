@@ -8,17 +8,17 @@
 //! 1. [`error_series`]: one error of one instrument over the flights.
 //! 2. [`common_error`]: mean, scatter, and flights far from the others.
 //! 3. [`history`]: steps and drifts in the order of the flights.
-//! 4. [`findings`]: rows of the table `instrument_trends`, and problems.
-//! 5. [`correction`]: corrections of flights by the errors of the others.
+//! 4. [`instrument_trends`]: rows of the table `instrument_trends`, and problems.
+//! 5. [`flight_corrections`]: corrections of flights by the errors of the others.
 
 mod error_series;
 mod common_error;
 mod history;
-mod findings;
-mod correction;
+mod instrument_trends;
+mod flight_corrections;
 #[cfg(test)]
 mod fixture;
 
-pub use correction::{FlightCorrections, apply_common_verdicts, correct_flights};
 pub use error_series::{ErrorSample, ErrorSeries, instrument_series};
-pub use findings::{ExaminedSeries, examine};
+pub use flight_corrections::{FlightCorrections, apply_common_verdicts, correct_flights};
+pub use instrument_trends::{ExaminedSeries, examine};

@@ -8,14 +8,14 @@ pub mod air_data;
 pub mod loading;
 pub mod body;
 pub mod readings;
-pub(crate) mod changes;
+pub(crate) mod first_order_changes;
 pub(crate) mod reading_changes;
 #[cfg(test)]
 mod tests;
 
 pub use air_data::{AirData, DEPARTURE_DEG};
 pub use body::{BodyState, Euler, Loads, StateRate};
-pub(crate) use changes::{AirChange, AirSlopes, BodySlopes, CHANGING, StateChange};
+pub(crate) use first_order_changes::{AirChange, AirSlopes, BodySlopes, CHANGING, StateChange};
 pub use loading::{Loading, Mass};
 pub(crate) use reading_changes::ReadingSlopes;
 pub use readings::{Instant, Readings};

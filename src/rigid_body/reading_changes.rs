@@ -7,7 +7,7 @@
 use nalgebra::Vector3;
 use pulp::Simd;
 
-use super::changes::{AirChange, DownDirection, StateChange};
+use super::first_order_changes::{AirChange, DownDirection, StateChange};
 use super::readings::Instant;
 use crate::aircraft::{Aircraft, Position, Reading, VaneFlow};
 use crate::numerics::vectors::lanes::{Lanes, combination, each};

@@ -4,7 +4,7 @@ use approx::assert_relative_eq;
 use nalgebra::{Quaternion, Vector3};
 use pulp::Scalar;
 
-use super::changes::attitude;
+use super::first_order_changes::attitude;
 use super::{
     AirData, AirSlopes, BodySlopes, BodyState, CHANGING, Euler, Instant, Loading, Loads,
     ReadingSlopes, StateChange, body,

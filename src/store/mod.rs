@@ -20,7 +20,7 @@ mod nights;
 pub mod object;
 pub mod record_file;
 pub mod recorder;
-pub mod recording;
+pub mod unmapped_recording;
 mod regular;
 mod shared;
 pub mod table;

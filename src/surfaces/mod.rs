@@ -12,8 +12,8 @@
 //!    of its surfaces' effects to the tunnel's.
 //! 5. [`delays`] combines maneuvers of a flight, and flights of a campaign; [`flight`] repeats it,
 //!    as the phases are linearised about the delays.
-//! 6. [`correction`] decides which delays are corrected, and with which remaining uncertainty.
-//! 7. [`findings`] makes rows of the table `instruments`, and reports reversed signs.
+//! 6. [`delay_corrections`] decides which delays are corrected, and with which remaining uncertainty.
+//! 7. [`surface_findings`] makes rows of the table `instruments`, and reports reversed signs.
 
 mod settings;
 mod fourier;
@@ -22,13 +22,13 @@ mod weighted_fit;
 mod evidence;
 mod delays;
 mod flight;
-mod correction;
-mod findings;
+mod delay_corrections;
+mod surface_findings;
 
-pub use correction::{DelayCorrection, corrections};
+pub use delay_corrections::{DelayCorrection, corrections};
 pub use delays::of_campaign;
 pub use evidence::FlightEvidence;
-pub use findings::{delay_series, findings};
 pub use flight::flight_evidence;
 pub use maneuver_data::AircraftModel;
 pub use settings::Settings;
+pub use surface_findings::{delay_series, findings};

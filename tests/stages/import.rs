@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use arrow::array::{ArrayRef, Float64Array, RecordBatch, StringArray};
 use harvest::inspection::{Column, Recording};
-use harvest::store::{archive, recording};
+use harvest::store::{archive, unmapped_recording};
 
 use crate::support::{Outcome, Random, harvest, run, write};
 
@@ -48,7 +48,7 @@ fn import(folder: &Path, file: &str) -> Outcome {
 fn imported(folder: &Path) -> Recording {
     let flights = archive::find(&folder.join("flights").display().to_string()).unwrap();
     assert_eq!(flights.len(), 1);
-    recording::first_rows(&flights[0], usize::MAX)
+    unmapped_recording::first_rows(&flights[0], usize::MAX)
         .unwrap()
         .remove(0)
 }

@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 
 use harvest::inspection::draft::{self, Draft};
 use harvest::inspection::{Column, Inspection, Recording, inspect};
-use harvest::store::{archive, recording};
+use harvest::store::{archive, unmapped_recording};
 
 use crate::support::{harvest, run};
 
@@ -22,7 +22,7 @@ fn demonstration() -> Vec<Recording> {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/demo/flights");
         let flights = archive::find(&root.display().to_string()).unwrap();
         let two = flights.iter().take(2);
-        two.flat_map(|flight| recording::first_rows(flight, ROWS).unwrap())
+        two.flat_map(|flight| unmapped_recording::first_rows(flight, ROWS).unwrap())
             .collect()
     };
     FLIGHTS.get_or_init(read).clone()
@@ -433,7 +433,7 @@ fn ailerons_that_are_mirror_images_are_proposed_as_their_half_difference() {
     let flights = archive::find(&root.display().to_string()).unwrap();
     let recordings = flights.iter().take(2);
     let recordings: Vec<Recording> = recordings
-        .flat_map(|flight| recording::first_rows(flight, ROWS).unwrap())
+        .flat_map(|flight| unmapped_recording::first_rows(flight, ROWS).unwrap())
         .collect();
     let inspection = inspect(&recordings).unwrap();
     let channels = inspection.channels.iter();
@@ -644,7 +644,7 @@ fn classes_of(maneuvers: &[(usize, f64, f64)]) -> Vec<String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/demo/flights");
     let flights = archive::find(&root.display().to_string()).unwrap();
     let cut = |(flight, from_s, to_s): &(usize, f64, f64)| {
-        let mut recording = recording::first_rows(&flights[*flight], 60_000)
+        let mut recording = unmapped_recording::first_rows(&flights[*flight], 60_000)
             .unwrap()
             .remove(0);
         let times = recording.column("time").unwrap().values.clone();

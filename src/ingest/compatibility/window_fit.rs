@@ -7,7 +7,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::equations::STATES;
-use super::input_noise::{score_covariance, with_input_noise};
+use super::parameter_noise::{score_covariance, with_input_noise};
 use super::parameters::{INPUTS, Kind, OUTPUTS, PARAMETERS, Parameters, output};
 use super::reconstruction::{
     LOCAL, LocalParameters, Row, Trajectory, WIND, reconstruct, sensitivities,

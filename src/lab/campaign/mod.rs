@@ -10,7 +10,7 @@ mod next_flight;
 mod cards;
 mod card_conditions;
 mod test_cards;
-mod recording;
+mod simulated_recorder;
 mod simulated_campaign;
 mod flights;
 mod tunnel;

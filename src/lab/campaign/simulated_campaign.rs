@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use super::cards::Cards;
-use super::recording::Recorder;
+use super::simulated_recorder::Recorder;
 use super::test_cards::TestCards;
 use crate::config::{self, Config, Overrides, Source};
 use crate::error::{Result, did_you_mean};

@@ -295,7 +295,7 @@ mod tests {
     use crate::output_error::case::surface_noise::noisy_surfaces;
     use crate::output_error::case::{InitialState, Model};
     use crate::output_error::tests::{
-        Noise, SAMPLES, TABLE, nothing_measured, record, truth, signals, window_of,
+        Noise, SAMPLES, TABLE, nothing_measured, record, signals, truth, window_of,
         with_noisy_surfaces,
     };
 

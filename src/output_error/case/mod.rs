@@ -90,7 +90,12 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
     /// Prepares the same maneuver with another model. `signals` may have other surfaces than the
     /// signals of this case, but the same motion.
     #[must_use]
-    pub fn with_model(&self, aircraft: &Aircraft, signals: &ManeuverSignals, model: &Model) -> Self {
+    pub fn with_model(
+        &self,
+        aircraft: &Aircraft,
+        signals: &ManeuverSignals,
+        model: &Model,
+    ) -> Self {
         let measurements = self.measurements.clone();
         Case::of_motion(
             Arc::clone(&self.motion),

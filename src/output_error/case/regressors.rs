@@ -230,7 +230,11 @@ impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
             let rate = Longitudinal::alpha_rate(aircraft, &motion);
             rate * aircraft.chord_ft / (2.0 * motion.velocity)
         };
-        self.signals.motion(aircraft).points().map(reduced).collect()
+        self.signals
+            .motion(aircraft)
+            .points()
+            .map(reduced)
+            .collect()
     }
 
     fn reduced_rate(&self, rate: &str, length_ft: f64) -> Vec<f64> {

@@ -15,7 +15,7 @@ use crate::model::LocalPosterior;
 use crate::proof_of_match::aerodynamics::Aerodynamics;
 use crate::proof_of_match::derivative_table::DerivativeTable;
 use crate::proof_of_match::free_run::Simulation;
-use crate::proof_of_match::recording::ManeuverRecording;
+use crate::proof_of_match::maneuver_recording::ManeuverRecording;
 use crate::proof_of_match::{
     Matched, OwnEstimates, ProofInputs, RecordedManeuver, Specification, fly_again,
 };

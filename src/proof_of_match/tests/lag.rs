@@ -7,7 +7,7 @@ use crate::lab::simulator::tests::{shipped_campaign, with_lag};
 use crate::proof_of_match::aerodynamics::Aerodynamics;
 use crate::proof_of_match::derivative_table::DerivativeTable;
 use crate::proof_of_match::free_run::Simulation;
-use crate::proof_of_match::recording::ManeuverRecording;
+use crate::proof_of_match::maneuver_recording::ManeuverRecording;
 use crate::proof_of_match::start;
 
 /// Place of α among the outputs.

@@ -10,7 +10,7 @@ use crate::proof_of_match::aerodynamics::Aerodynamics;
 use crate::proof_of_match::derivative_table::DerivativeTable;
 use crate::proof_of_match::free_run::{FreeRun, Simulation, Start};
 use crate::proof_of_match::linear_run::Parameter;
-use crate::proof_of_match::recording::ManeuverRecording;
+use crate::proof_of_match::maneuver_recording::ManeuverRecording;
 use crate::proof_of_match::start::{self, PARAMETERS};
 
 /// Samples of a run, and those in a step of it.

@@ -6,7 +6,7 @@ mod classes;
 mod derivatives;
 mod maneuvers;
 mod proof_of_match;
-mod changes;
+mod changes_section;
 mod failures;
 mod instrument_charts;
 mod uncertainty_section;
@@ -84,8 +84,8 @@ impl<'a> Page<'a> {
             archive: contents.archive,
             wind_tunnel: contents.wind_tunnel,
             counts: counts(contents, &derivatives),
-            changed: changes::headline(contents.overnight),
-            changes: changes::tables(contents.overnight),
+            changed: changes_section::headline(contents.overnight),
+            changes: changes_section::tables(contents.overnight),
             summary: summary::summary(contents, &derivatives, &classes),
             outcome_heads: classes::class_outcomes::heads(),
             classes,

@@ -5,13 +5,13 @@ mod annotations;
 mod envelope;
 mod flight;
 mod maneuver;
-mod recording;
+mod channel_strips;
 mod signal_groups;
 mod signal_strips;
 #[cfg(test)]
 mod tests;
 
+pub use channel_strips::{draw_channels, draw_unused};
 pub use flight::{FlightView, draw_flight};
 pub use maneuver::{ManeuverView, draw_maneuver};
-pub use recording::{draw_channels, draw_unused};
 pub use signal_groups::SignalGroups;

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use super::findings::{ExaminedSeries, RecorderFindings};
+use super::instrument_trends::{ExaminedSeries, RecorderFindings};
 use crate::flight::Correction;
 use crate::ingest::{Compatibility, correction};
 use crate::tables::{InstrumentRow, InstrumentVerdict};
@@ -18,7 +18,7 @@ use crate::tables::{InstrumentRow, InstrumentVerdict};
 const MOST_OF_ORDINARY: f64 = 0.7;
 
 /// Number of grid steps per bound, for completed errors. A further flight that moves an error by
-/// less than a step leaves the estimates as they are; rounding to the grid is a twentieth of the
+/// less than a step leaves the estimates as they are. Rounding to the grid is a twentieth of the
 /// bound.
 const STEPS_IN_BOUND: f64 = 8.0;
 
@@ -114,8 +114,8 @@ fn on_grid(value: f64, bound: f64) -> f64 {
 mod tests {
     use approx::assert_abs_diff_eq;
 
-    use super::super::findings::examine;
     use super::super::fixture;
+    use super::super::instrument_trends::examine;
     use super::*;
 
     fn row(flight: usize, scale: Option<f64>, applied: &str) -> InstrumentRow {

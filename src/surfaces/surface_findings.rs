@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::correction::DelayCorrection;
+use super::delay_corrections::DelayCorrection;
 use super::evidence::{FlightEvidence, SurfaceDelay, SurfaceEffect};
 use crate::error::{Problem, ProblemStage};
 use crate::flight::Channel;
