@@ -190,8 +190,9 @@ impl Record {
         }
     }
 
-    /// Copies the part of the record from one time to another, with a margin on each side: slopes
-    /// of signals at the ends of the part are those of the whole. Sample times are unchanged.
+    /// Copies the part of the record from one time to another, with a margin on each side. The
+    /// signals thus have the slopes of the whole record at the ends of the part. Sample times are
+    /// unchanged.
     #[must_use]
     pub fn part(&self, start_s: f64, end_s: f64) -> Record {
         let (first, last) = (self.sample_at(start_s), self.sample_at(end_s));

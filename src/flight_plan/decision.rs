@@ -1,5 +1,5 @@
-//! Probability that the next flight decides the limits between which a quantity lies: the level of
-//! a flying quality, or the tolerances of a proof of match.
+//! Probability that the next flight decides the limits between which a quantity lies. They are the
+//! levels of a flying quality, or the tolerances of a proof of match.
 //!
 //! # Symbols
 //!

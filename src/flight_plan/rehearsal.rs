@@ -102,8 +102,8 @@ pub fn instruments(of_cards: &Instruments, channels: &[ChannelRow]) -> Instrumen
     )
 }
 
-/// Errors that remain in the signals of a flight like those of the campaign: the median bound and scatter
-/// of each error that its flights determine.
+/// Errors that remain in the signals of a flight like those of the campaign. Each is the median
+/// bound and scatter of an error that its flights determine.
 #[must_use]
 pub fn remaining_errors(rows: &[InstrumentRow]) -> BTreeMap<String, RemainingErrors> {
     let mut rows_by_signal: BTreeMap<&str, Vec<&InstrumentRow>> = BTreeMap::new();

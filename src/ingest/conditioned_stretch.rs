@@ -143,7 +143,7 @@ fn reported_repairs(
     stuck.into_iter().chain(beyond)
 }
 
-/// Reason to leave out a channel before any check, for each channel: it has no value, or most of
+/// Reason to leave out a channel before any check, for each channel. It has no value, or most of
 /// its values are missing and a stand-in replaces it.
 fn unread_channels<'a>(
     conditioned: &[ConditionedChannel<'a>],

@@ -19,8 +19,8 @@ use crate::flight::stand_in::GapExtent;
 use crate::flight::{Completion, Record, StandIn, signal};
 use crate::tables::{ChannelVerdict, CheckRow};
 
-/// Samples of a long record that are read at once, so that memory does not grow with the record:
-/// under an hour of a usual recorder.
+/// Samples of a long record that are read at once, so that memory does not grow with the record.
+/// They are under an hour of a usual recorder.
 pub const PART_SAMPLES: usize = 1 << 17;
 
 /// Reads signals of a record over a range of its samples; `None` if they cannot be read.

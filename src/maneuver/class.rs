@@ -19,9 +19,8 @@ words! {
     }
 }
 
-/// Number of fast steps of one signal in a maneuver of the class. A signal that may step as often as
-/// a doublet, without a smallest number of steps, is an input only of the maneuvers in which it is
-/// excited.
+/// Number of fast steps of one signal in a maneuver of the class. A signal that may step as often
+/// as a doublet but has no smallest number of steps is an input only where it is excited.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StepCount {

@@ -3,8 +3,8 @@
 /// Factor by which damping grows or falls (Marquardt's ν).
 const FACTOR: f64 = 10.0;
 
-/// Share of the predicted gain above which a prediction is good, and below which it is poor: those of trust
-/// regions (Nocedal and Wright, *Numerical Optimization*, algorithm 4.1).
+/// Shares of the predicted gain above which a prediction is good, and below which it is poor.
+/// Source: trust regions (Nocedal and Wright, *Numerical Optimization*, algorithm 4.1).
 const GOOD: f64 = 0.75;
 const POOR: f64 = 0.25;
 

@@ -1,6 +1,5 @@
-//! Numerical methods that several modules share: linear algebra and dual numbers, distributions and
-//! order statistics, differences, sums over time and frequency, bisection, roots and minima, random
-//! numbers, and the processor's vectors.
+//! Numerical methods that several modules share. Rooms hold linear algebra, the processor's
+//! vectors, statistics, and series of samples; files hold roots, minima, slopes and integration.
 
 pub mod linear_algebra;
 pub mod vectors;

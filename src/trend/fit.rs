@@ -34,10 +34,10 @@
 //! # Outliers and intervals
 //!
 //! [`RobustSolution`] limits the influence of an outlier on the trend and on τ. A bound below the
-//! fraction `BOUND_FLOOR` of the group's median bound is raised to that limit, because a bound is
-//! itself uncertain by a factor of a few. The 95 % band is Student's t with n − p degrees of
-//! freedom times the standard error (Hartung and Knapp 2001). The standard error is never smaller
-//! than the one from the bounds alone.
+//! fraction `BOUND_FLOOR` of the group's median bound is raised to that limit: a bound is itself
+//! uncertain by a factor of a few. The 95 % band is Student's t with n − p degrees of freedom times
+//! the standard error (Hartung and Knapp 2001). The standard error is never smaller than the one
+//! from the bounds alone.
 //!
 //! # Lack of fit
 //!

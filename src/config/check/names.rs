@@ -66,9 +66,9 @@ fn no_channel(source: &Source, name: &str, user: &str, near: &str) -> Error {
     source.error(name, what)
 }
 
-/// Signal whose name is the corrected spelling of `name`. A typing error occurs in one place of the
-/// configuration and resembles a correct name; or it occurs in the channel map, and nothing else
-/// uses the signal.
+/// Signal whose name is the corrected spelling of `name`. A name counts as a typing error in two
+/// cases. It occurs in one place of the configuration and resembles a correct name, or it occurs in
+/// the channel map and nothing else uses the signal.
 fn corrected_spelling<'a>(config: &'a Config, name: &str) -> Option<&'a str> {
     if is_given(config, name) || signal::is_own(name) {
         return None;

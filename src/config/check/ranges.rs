@@ -74,8 +74,8 @@ const OF_CLASS: [(&str, Range); 9] = [
     ("above_alpha_deg", (-180.0, 180.0)),
 ];
 
-/// Ranges of the numbers of test cards, by the last name of a key: the numbers that set the amount
-/// of work, and the conditions of a card. The standard atmosphere ends at 105,000 ft.
+/// Ranges of the numbers of test cards, by the last name of a key. They are the numbers that set
+/// the amount of work, and the conditions of a card. The standard atmosphere ends at 105,000 ft.
 const OF_CARDS: [(&str, Range); 14] = [
     ("seed", (0.0, 1.9e19)),
     ("rate_hz", (0.01, 1e4)),

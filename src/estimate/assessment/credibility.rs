@@ -120,9 +120,9 @@ impl<const NX: usize, E: Equations<NX>> Credibility<'_, '_, NX, E> {
     }
 
     /// Initial states further from the measured ones than an instrument's error, by more than their
-    /// uncertainty. The smaller of two distances counts: from the first sample, which may be an
-    /// outlier, and from the mean of several samples, during which the aircraft may move. The first
-    /// outputs are the measured states.
+    /// uncertainty. The smaller of two distances counts. One is from the first sample, which may be
+    /// an outlier; the other from the mean of several samples, during which the aircraft may move.
+    /// The first outputs are the measured states.
     fn impossible_initial_states(&self) -> Vec<String> {
         let (case, fit) = (self.case, self.fit);
         let first = case.parameters() - NX;

@@ -48,8 +48,8 @@ fn is_at_rest(task: &Task, name: &str) -> bool {
     samples.is_some_and(is_noise)
 }
 
-/// `true` if samples show no motion: their scatter about the mean is small, and no larger than that
-/// of white noise with the same differences from sample to sample.
+/// `true` if samples show no motion. Their scatter about the mean is then small, and no larger than
+/// that of white noise with the same differences from sample to sample.
 fn is_noise(samples: &[f64]) -> bool {
     let steps = samples.windows(2).map(|pair| (pair[1] - pair[0]).powi(2));
     let count = samples.len().saturating_sub(1).max(1) as f64;

@@ -124,9 +124,9 @@ struct JointAir {
 }
 
 impl JointAir {
-    /// Adds the gusts that the filters found to the row of `fits`: the root mean square of the
-    /// maneuvers' gusts, and the largest correlation of innovations. The row has no cost of output
-    /// error.
+    /// Adds the gusts that the filters estimate to the row of `fits`. They are the root mean square
+    /// of the maneuvers' gusts, and the largest correlation of innovations. The row has no cost of
+    /// output error.
     fn add_to<const NX: usize, E: Equations<NX>>(
         &self,
         own: &[OwnEstimate<NX, E>],

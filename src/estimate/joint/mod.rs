@@ -1,12 +1,12 @@
 //! Joint estimation: maneuvers of one class and nearly one angle of attack share their derivatives.
 //! Each keeps its biases and initial states.
 //!
-//! Each also keeps its constants (`CN_0`) unless `share_constants` is set: they take up trim and the
-//! zero errors of vanes and surfaces, which differ between flights.
+//! Each also keeps its constants (`CN_0`) unless `share_constants` is set. They take up trim and
+//! the zero errors of vanes and surfaces, which differ between flights.
 //!
 //! The class's table and weights are those at the mean angle of attack, so that all maneuvers have
-//! the same free derivatives. A held derivative acts at the tunnel's value at each maneuver's own
-//! angle of attack and Mach number: one value for all would charge its change between them to the
+//! the same free derivatives. A held derivative has the tunnel's value at each maneuver's own angle
+//! of attack and Mach number. One value for all would attribute its change between them to the
 //! shared derivatives. The tunnel's error is common to all maneuvers.
 
 mod bins;
@@ -90,9 +90,9 @@ type LeftOut<'r> = Vec<(&'r Maneuver, String)>;
 type TakingPart<'r> = (&'r Maneuver, Option<f64>);
 
 impl<'r> Request<'r> {
-    /// Estimates by filter error if a maneuver needs it. Estimates by output error otherwise, and
-    /// also if the sensors' noise explains all maneuvers, or if filter error does not converge and
-    /// all residuals of output error are white.
+    /// Estimates by filter error if a maneuver needs it. Estimates by output error otherwise. It
+    /// does so also if the sensors' noise explains all maneuvers, or if filter error does not
+    /// converge and all residuals of output error are white.
     fn estimate<const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>(
         &self,
         mut left_out: LeftOut<'r>,

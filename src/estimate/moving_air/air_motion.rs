@@ -146,7 +146,7 @@ impl Filtered {
 
 /// Iterates from moving air, or from still air if the residuals of output error are white. If this
 /// gives no estimates, iterates from the other start. Both starts are tried if a rotary gust is as
-/// large as its rate: the gust may then be mistaken for the effect of the rate.
+/// large as its rate. The gust may then be mistaken for the effect of the rate.
 ///
 /// # Errors
 /// Why no start leads to a minimum: the reason of the iteration that ended at the least cost.

@@ -1,5 +1,5 @@
-//! Maneuvers that filter error estimates together, or one alone: the fit, the slopes over α of the
-//! derivatives, and what held values and calibration add to its bounds.
+//! Maneuvers that filter error estimates together, or one alone. A group has the fit, the
+//! derivatives' slopes over α, and the parts of the bounds from held values and calibration.
 
 use std::marker::PhantomData;
 
@@ -182,9 +182,10 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
         slope_fit
     }
 
-    /// Fit with the slopes a fraction of the way to those found; `None` if its cost rises. It starts
-    /// from the fit before, and by equation error only where that fails: of 21 refits of two
-    /// campaigns none ended lower from equation error by more than 0.005, in several times the passes.
+    /// Fit with the slopes a fraction of the way to those found; `None` if its cost rises. It
+    /// starts from the fit before, and by equation error only where that fails. In 21 refits of two
+    /// campaigns equation error never lowered the cost by more than 0.005, and took several times
+    /// the passes.
     fn step_to_slopes(
         &self,
         slope_fit: &SlopeFit<NG, G>,
@@ -298,9 +299,9 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
         fit
     }
 
-    /// Moves the estimates by what the slopes still change in them, and adds the effects of the tunnel's
-    /// errors and of the derivatives' change over α to the covariances. Both are common to all
-    /// maneuvers.
+    /// Moves the estimates by what the slopes still change in them. Adds the effects of the
+    /// tunnel's errors and of the derivatives' change over α to the covariances. Both are common to
+    /// all maneuvers.
     fn add_held_and_slopes(&self, slope_fit: &SlopeFit<NG, G>, fit: &mut Fit<Vec<Response>>) {
         let Some(first) = self.members.first() else {
             return;
@@ -328,8 +329,8 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
     }
 
     /// Adds the effect of calibration errors. The estimates move by H⁻¹ times the gradient of the
-    /// maneuvers as an instrument in error would have recorded them; its error is taken as common to
-    /// all.
+    /// maneuvers as an instrument in error would have recorded them. The instrument's error is
+    /// taken as common to all.
     fn add_calibration(&self, slope_fit: &SlopeFit<NG, G>, fit: &mut Fit<Vec<Response>>) {
         let Some(first) = self.members.first() else {
             return;

@@ -177,7 +177,7 @@ impl AlphaSlope {
     }
 }
 
-/// Changes of the coefficients over α by the derivatives that are free in `wide`: first one
+/// Changes of the coefficients over α by the derivatives that are free in `wide`. First one
 /// standard deviation of each derivative's change, then the changes in the tunnel.
 fn changes<const NX: usize, E: Equations<NX>>(
     task: &Task,

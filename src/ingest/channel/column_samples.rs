@@ -13,7 +13,7 @@ use crate::numerics::series::sample_count::nearest;
 const SEPARATE_ROWS: usize = 1 << 16;
 
 /// Samples of another clock that are read beyond each end of a range, in addition to one step's
-/// samples: one for the interpolation's neighbour, one for rounding.
+/// samples. One is the interpolation's neighbour, one is for rounding.
 const BEYOND_ENDS: f64 = 2.0;
 
 /// One column of a flight's files.

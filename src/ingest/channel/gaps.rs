@@ -93,10 +93,10 @@ impl BridgedGaps {
 
 /// Bridges the gaps (NaN) within reach in place and returns the flag of every sample.
 ///
-/// A gap at an end of the record has one neighbour only and stays missing, with two exceptions: it
-/// lies between two values of a slow channel, or it is within the reach at an end. It then takes
-/// the neighbour's value. `period` gives the channel's samples per recorded value at a sample. A
-/// gap that is no longer lies between two recorded values and is no fault.
+/// A gap at an end of the record has one neighbour only and stays missing. There are two
+/// exceptions: a gap between two values of a slow channel, and a gap within the reach at an end. It
+/// then takes the neighbour's value. `period` gives the channel's samples per recorded value at a
+/// sample. A gap that is no longer lies between two recorded values and is no fault.
 pub fn bridge_gaps(
     values: &mut [f64],
     reach: BridgedGaps,

@@ -2,11 +2,10 @@
 //! hold.
 //!
 //! A faulty channel fails every relation that contains it, so the failed relations alone name too
-//! many channels. Each channel of the failed relations is tried with a reversed sign, with each
-//! unit in which it could have been recorded, and with a conversion done twice. If every relation
-//! holds after a trial, the trial names the channel and the cause. If there is no such trial, the
-//! channels that the failed relations share and no other relation confirms are named without a
-//! cause.
+//! many channels. Each channel of the failed relations is tried with a reversed sign, in each unit
+//! in which it could have been recorded, and converted twice. If every relation holds after a
+//! trial, the trial names the channel and the cause. If there is no such trial, the channels that
+//! the failed relations share and no other relation confirms are named without a cause.
 
 use std::collections::{BTreeMap, BTreeSet};
 

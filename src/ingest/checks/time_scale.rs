@@ -6,8 +6,8 @@ use super::mass_properties::ImpossibleSignal;
 use crate::flight::signal;
 use crate::tables::CheckVerdict;
 
-/// First signals of two kinds of relations: the change of an attitude against rates, and the change
-/// of altitude or speed against the flight path or accelerations.
+/// First signals of two kinds of relations. One kind compares the change of an attitude with rates,
+/// the other that of altitude or speed with flight path or accelerations.
 const OF_ATTITUDE: [&str; 3] = [signal::THETA, signal::PHI, signal::PSI];
 const OF_PATH: [&str; 2] = [signal::ALTITUDE, signal::VELOCITY];
 

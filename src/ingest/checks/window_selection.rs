@@ -6,9 +6,9 @@ use super::windows::WindowPair;
 use crate::ingest::settings::Checks;
 use crate::numerics::statistics::order_statistics::{SIGMA_PER_MAD, upper_median};
 
-/// Number of windows that a relation selects in a short flight if it selects the largest, as a
-/// multiple of the smallest number for a verdict. They suffice for the slope of a relation whose
-/// noise reaches its level.
+/// Number of windows that a relation of the kind `Largest` selects in a short flight, as a multiple
+/// of the smallest number for a verdict. They suffice for the slope of a relation whose noise
+/// reaches its level.
 const LEAST_SELECTED: usize = 5;
 
 /// Distance of a window from the line through all windows above which the window contains a jump of

@@ -21,8 +21,8 @@ const SAME_TIME_S: f64 = 1e-6;
 /// double precision.
 const SAME_TIME: f64 = 1e-9;
 
-/// `true` if the second piece repeats the values of the first piece at the same times, in those of
-/// the named channels that change at all.
+/// `true` if the second piece repeats the values of the first piece at the same times. Only those
+/// of the named channels count that change at all.
 ///
 /// # Errors
 /// The reason for which a file cannot be read.

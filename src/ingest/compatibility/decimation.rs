@@ -42,8 +42,8 @@ fn samples_over<'r>(
 }
 
 /// Measured values of a signal over a range; NaN where a sample was repaired or not recorded. A
-/// measured value of a slow channel is averaged with the samples on the line to the next value, so
-/// that the mean is the value at the middle.
+/// measured value of a slow channel is averaged with the samples on the line to the next value. The
+/// mean is thus the value at the middle.
 pub fn decimate_measured(
     record: &Record,
     name: &str,

@@ -31,8 +31,8 @@ pub struct ErrorBounds {
     /// Contribution of gusts and of the equations' own error, which no number of windows or flights
     /// averages out.
     pub systematic: Parameters,
-    /// Scatter of the errors between the windows beyond that of their noise: an error that is not
-    /// constant, such as a drift or a position error that varies with the flow.
+    /// Scatter of the errors between the windows beyond that of their noise. It shows errors that
+    /// are not constant, such as a drift or a position error that varies with the flow.
     pub scatter: Parameters,
     /// Share of the information on each parameter that comes from the data and not from the prior.
     pub data_shares: Parameters,

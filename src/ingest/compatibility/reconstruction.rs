@@ -293,8 +293,8 @@ impl Linearisation<'_> {
         end
     }
 
-    /// Sensitivities of the readings at a node: through the states, through the body rates in a
-    /// reading, and to the bias, scale and delay of the output.
+    /// Sensitivities of the readings at a node. They act through the states and through the body
+    /// rates in a reading, and are to bias, scale and delay of the output.
     #[inline(always)]
     fn reading_rows<S: Simd>(&self, simd: S, node: usize, s: &Sensitivities) -> [Row; OUTPUTS] {
         let Trajectory {
@@ -480,7 +480,7 @@ impl CorrectedInputs {
     }
 }
 
-/// Mean of a signal between its second and its last but one sample, by the trapezoidal rule with
+/// Mean of a signal between its second and its last but one sample. The trapezoidal rule has
 /// Gregory's correction for the slopes at the ends. It is exact for cubics.
 fn mean_over_step(samples: &[f64]) -> f64 {
     let last = samples.len() - 2;

@@ -112,7 +112,7 @@ pub fn candidates(facts: &[ColumnFacts], clock: &ClockColumn) -> Candidates {
 }
 
 /// Columns whose name is that of a quantity, then those with the name of the same kind of quantity
-/// on another axis; empty without the former. Recorders differ in the order of the axes: the rate
+/// on another axis. Empty without the former. Recorders differ in the order of the axes: the rate
 /// about z may be that of pitch.
 fn candidates_by_name(quantity: Quantity, columns: &[&ColumnFacts]) -> Vec<Candidate> {
     let mut candidates: Vec<Candidate> =

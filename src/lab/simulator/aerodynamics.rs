@@ -117,8 +117,8 @@ impl Aerodynamics {
         self.aero_model.along_alpha_rate().next().is_some()
     }
 
-    /// Force, lbf, and moment about the c.g., ft lbf, in body axes, at rates relative to the air, and at a
-    /// rate of the angle of attack, rad/s.
+    /// Force, lbf, and moment about the c.g., ft lbf, in body axes. The rates are relative to the
+    /// air; that of the angle of attack is in rad/s.
     #[must_use]
     pub fn loads(
         &self,

@@ -1,7 +1,7 @@
 //! Durations and positions as whole numbers of samples.
 
-/// Fraction of a step by which a duration may fall short of a whole number of steps, because a
-/// clock's mean step differs from the nominal one by rounding.
+/// Fraction of a step by which a duration may fall short of a whole number of steps: a clock's mean
+/// step differs from the nominal one by rounding.
 const STEP_TOLERANCE: f64 = 1e-6;
 
 /// Whole number of steps that fit into a duration.

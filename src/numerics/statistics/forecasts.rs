@@ -3,8 +3,9 @@
 /// Bins of equal width that the stated probabilities are sorted into.
 const BINS: usize = 10;
 
-/// Reliability part of the Brier score (Murphy 1973). It is the mean square over the forecasts of a
-/// difference: mean probability of the forecast's bin less the fraction of the bin that came true.
+/// Reliability part of the Brier score (Murphy 1973). It is the mean square of a difference over
+/// the forecasts. The difference is the mean probability of the forecast's bin less the fraction of
+/// the bin that came true.
 pub fn reliability(forecasts: &[(f64, bool)]) -> f64 {
     let of_bin = |bin: usize| {
         let [low, high] = [bin, bin + 1].map(|edge| edge as f64 / BINS as f64);

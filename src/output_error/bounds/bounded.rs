@@ -1,4 +1,4 @@
-//! Data that the bounds (1.7) need in addition to the likelihood: residuals with their
+//! Data that the bounds (1.7) need in addition to the likelihood. They are residuals with their
 //! sensitivities in blocks, and the noise of signals that the equations take as exact.
 
 use nalgebra::DMatrix;

@@ -50,8 +50,8 @@ const SETTLED: f64 = 0.01;
 /// Change of the absorbed variance, as a share of the variance, below which settled white noise is
 /// not computed again. A bound is accurate to some hundredths only.
 const UNCHANGED: f64 = 1e-3;
-/// Smallest fraction of the noise variance that remains in the residuals for which white noise is
-/// found in one round, by dividing the residuals' variance by the fraction.
+/// Smallest fraction of the noise variance in the residuals for which white noise is found in one
+/// round: the residuals' variance is divided by the fraction.
 const MOSTLY_LEFT: f64 = 0.95;
 
 /// Estimated noise of each output, in the order of the outputs.

@@ -15,8 +15,8 @@ use nalgebra::SVector;
 
 use crate::dynamics::COEFFICIENTS;
 
-/// Term of the build-up: coefficient of one derivative; state to which its regressor is
-/// proportional, if any; and column of regressors, or of factors of proportion.
+/// Term of the build-up. It has the coefficient of one derivative, the state to which its regressor
+/// is proportional, if any, and a column of regressors or of factors of proportion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct BuildUpTerm {
     pub coefficient: usize,

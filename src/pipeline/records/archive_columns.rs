@@ -1,5 +1,5 @@
-//! Columns of the archive's files compared with the channel map, before any data are read: the
-//! signals that a run would lack, and the flights that it would refuse.
+//! Columns of the archive's files compared with the channel map, before any data are read. The
+//! result is the signals that a run would lack, and the flights that it would refuse.
 
 use std::collections::{BTreeMap, BTreeSet};
 

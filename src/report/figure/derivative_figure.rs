@@ -271,7 +271,7 @@ fn path_of(d: String, colour: &str, width: f64, fill: Option<&str>) -> Primitive
     }))
 }
 
-/// Adapts a drawing of the crate to a page with other drawings: scaled to its column, with
+/// Adapts a drawing of the crate to a page with other drawings. It is scaled to its column and has
 /// alternative text, unique ids and at most two decimals.
 fn inline(svg: &str, id: &str, title: &str, description: &str) -> String {
     let body = svg.split_once("-->").map_or(svg, |(_, body)| body);

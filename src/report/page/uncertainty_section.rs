@@ -88,8 +88,8 @@ fn medians(rows: &[(&PosteriorRow, f64)], axis: Axis) -> Vec<(f64, f64)> {
 /// A row of the posterior, and its standard deviation in percent of that before flight.
 type RemainingUncertainty<'a> = (&'a PosteriorRow, f64);
 
-/// Median of all derivatives, the derivatives about which flights gave least information, the
-/// maneuvers worth a repeat, the level to decide, and the command that plans the flight.
+/// Lines below the figure: median of all derivatives, derivatives about which flights gave least
+/// information, maneuvers worth a repeat, level to decide, command that plans the flight.
 fn answer(
     contents: &Contents,
     rows: &[RemainingUncertainty],

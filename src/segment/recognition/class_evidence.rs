@@ -15,8 +15,8 @@ const FLAG_CONTRADICTS: f64 = 0.8;
 /// its flag thus comes before a class that a flag contradicts.
 const FLAG_NOT_RECORDED: f64 = 0.95;
 
-/// Weight of a signal whose motion is neither clear nor absent, or is not recorded: half the loss
-/// of a contradiction, since either outcome is open.
+/// Weight of a signal whose motion is neither clear nor absent, or is not recorded. It is half the
+/// loss of a contradiction, since either outcome is open.
 const MOTION_UNCLEAR: f64 = 0.9;
 
 /// Weight of a record without pilot controls. All classes have it alike, so it lowers the published confidence

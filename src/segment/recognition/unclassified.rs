@@ -102,8 +102,8 @@ pub(super) fn ambiguous(
     unknown(search, segment, names, reason)
 }
 
-/// `true` for pilot steps beyond ordinary flying: at least [`FEWEST_PILOT_STEPS`], and at least
-/// half of the steps that the class requires of all its inputs together.
+/// `true` for pilot steps beyond ordinary flying. They are at least [`FEWEST_PILOT_STEPS`], and at
+/// least half of the steps that the class requires of all its inputs together.
 fn is_series(segment: &Segment, class: &Class) -> bool {
     let wanted: usize = class.recognition.steps.values().map(|c| c.at_least).sum();
     segment.count_explained(class) >= wanted.div_ceil(2).max(FEWEST_PILOT_STEPS)

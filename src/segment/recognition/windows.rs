@@ -4,7 +4,7 @@ use super::detections::Detections;
 use super::found::FoundManeuver;
 
 /// Number of levels after the last input within which another step of the pilot cannot be separated
-/// from it: one after the transit of the input, one before the transit of the step.
+/// from it. One follows the transit of the input, one precedes the transit of the step.
 const LEVELS_BETWEEN_STEPS: f64 = 2.0;
 
 /// The windows of maneuvers in order of time.

@@ -13,8 +13,8 @@ use super::super::object;
 use super::file_rules::{is_hidden, unreadable};
 use crate::error::Error;
 
-/// Finds the objects of an archive `s3://bucket/prefix`: the `.parquet` objects below the prefix,
-/// the object of this name, or the objects that match the name as a glob.
+/// Finds the objects of an archive `s3://bucket/prefix`. They are the `.parquet` objects below the
+/// prefix, the object of this name, or the objects that match the name as a glob.
 ///
 /// # Errors
 /// The objects cannot be listed.

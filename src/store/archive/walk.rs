@@ -43,8 +43,8 @@ impl Walk {
     }
 
     /// Adds the files below a folder, except names with a leading dot or underscore. A sub-folder
-    /// is added in place of its files if it cannot be read, if a link leads to it again, or if it
-    /// holds the archive.
+    /// is added in place of its files in three cases: it cannot be read, a link leads to it again,
+    /// or it holds the archive.
     ///
     /// # Errors
     /// The folder cannot be read, or there are more folders than an archive has.

@@ -39,9 +39,9 @@ impl HeadLine {
     }
 }
 
-/// Names and units from the lines above the numbers. Of two lines the upper one is the header if
-/// the lower one holds units known to harvest, or if the upper one names every column by another
-/// word. A line alone is the header.
+/// Names and units from the lines above the numbers. The upper of two lines is the header in two
+/// cases: the lower one holds units known to harvest, or the upper one names every column by
+/// another word. A line alone is the header.
 pub fn names_and_units(
     headers: &[HeadLine],
     width: usize,

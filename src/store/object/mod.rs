@@ -1,9 +1,10 @@
 //! Objects of an S3-compatible store, `s3://bucket/key`: listed, read by ranges, put whole.
 //!
-//! Endpoint and credentials come from the environment alone (`AWS_ACCESS_KEY_ID`,
-//! `AWS_SECRET_ACCESS_KEY`, `AWS_SESSION_TOKEN`, `AWS_REGION`, `AWS_ENDPOINT_URL`, `AWS_ALLOW_HTTP`
-//! and others that the `object_store` crate reads): no file of the pipeline and no option holds a
-//! secret. An object is replaced by a single request or not at all, so none is ever half written.
+//! Endpoint and credentials come from the environment alone: no file of the pipeline and no option
+//! holds a secret. The variables are `AWS_ACCESS_KEY_ID`, `AWS_SECRET_ACCESS_KEY`,
+//! `AWS_SESSION_TOKEN`, `AWS_REGION`, `AWS_ENDPOINT_URL`, `AWS_ALLOW_HTTP` and others that the
+//! `object_store` crate reads. An object is replaced by a single request or not at all, so none is
+//! ever half written.
 
 #[cfg(not(feature = "s3"))]
 #[path = "absent.rs"]
