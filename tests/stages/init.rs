@@ -180,8 +180,9 @@ impl Copy {
         (found, wrong, share)
     }
 
-    /// Checks that nothing is wrong and sure, and that at least so many columns are sure.
-    fn check(&self, least_sure: usize) {
+    /// Inspects the recordings. Checks that nothing is wrong and sure, and that at least so many
+    /// columns are sure.
+    fn check(&self, least_sure: usize) -> Inspection {
         let (found, wrong, _) = self.judged();
         assert!(wrong.is_empty(), "wrong and sure: {wrong:#?}");
         let sure: BTreeSet<&str> = found
@@ -206,6 +207,7 @@ impl Copy {
             "{} are sure; not sure: {unsure:#?}",
             sure.len()
         );
+        found
     }
 }
 
@@ -262,8 +264,7 @@ fn reversed_signs_follow_from_the_motion() {
         "pedal",
     ];
     let copy = Copy::new().reversed(&reversed);
-    copy.check(25);
-    let (found, _, _) = copy.judged();
+    let found = copy.check(25);
     for name in ["alpha_vane", "q", "p", "theta", "de"] {
         let channel = found.channels.iter().find(|c| c.column == name).unwrap();
         assert!(channel.sign < 0.0, "{name}");
@@ -307,8 +308,7 @@ fn columns_without_names_are_found_by_their_motion() {
     let pairs = names.iter().zip(&numbers);
     let pairs: Vec<(&str, &str)> = pairs.map(|(a, b)| (a.as_str(), b.as_str())).collect();
     let copy = Copy::new().renamed(&pairs).shuffled();
-    copy.check(12);
-    let (found, _, _) = copy.judged();
+    let found = copy.check(12);
     for name in ["alpha_vane", "V", "q", "theta", "an"] {
         let number = pairs.iter().find(|pair| pair.0 == name).unwrap().1;
         let channel = found.channels.iter().find(|c| c.column == number);
@@ -342,8 +342,7 @@ fn signs_that_only_gravity_determines_are_not_sure_without_it() {
 fn an_altitude_above_the_sea_determines_which_way_is_up() {
     let names = ["an", "ax", "ay", "qbar", "beta_vane", "mach"];
     let copy = Copy::new().without(&names).reversed(&["theta"]);
-    copy.check(12);
-    let (found, _, _) = copy.judged();
+    let found = copy.check(12);
     for (name, sign) in [("altitude", 1.0), ("theta", -1.0), ("q", 1.0)] {
         let channel = found.channels.iter().find(|c| c.column == name).unwrap();
         assert_eq!((channel.sign, channel.is_sure), (sign, true), "{name}");
@@ -365,8 +364,7 @@ fn axes_in_another_order_are_found_by_their_motion() {
         ("Iy", "JZ"),
         ("Iz", "JY"),
     ]);
-    copy.check(20);
-    let (found, _, _) = copy.judged();
+    let found = copy.check(20);
     for (name, signal) in [
         ("WZ", "q_deg_s"),
         ("WY", "r_deg_s"),
@@ -394,8 +392,7 @@ fn names_of_other_languages_are_known_and_ends_that_are_no_units_left_out() {
         ("stick_pitch", "CCPOS"),
         ("mass", "GW"),
     ]);
-    copy.check(12);
-    let (found, _, _) = copy.judged();
+    let found = copy.check(12);
     let names = [
         "alpha_m",
         "Schiebewinkel",
@@ -413,8 +410,7 @@ fn names_of_other_languages_are_known_and_ends_that_are_no_units_left_out() {
 #[test]
 fn surfaces_whose_names_mean_nothing_are_found_by_their_effects_and_not_sure() {
     let copy = Copy::new().renamed(&[("de", "S01"), ("da", "S02"), ("dr", "S03")]);
-    copy.check(20);
-    let (found, _, _) = copy.judged();
+    let found = copy.check(20);
     for (name, effect) in [("S01", "pitch"), ("S02", "roll"), ("S03", "yaw")] {
         let channel = found.channels.iter().find(|c| c.column == name);
         let channel = channel.unwrap_or_else(|| panic!("{name}: {:#?}", found.unused));
@@ -466,8 +462,7 @@ fn ailerons_that_are_mirror_images_are_proposed_as_their_half_difference() {
 fn an_incomplete_recording_is_not_filled_up_with_other_columns() {
     let gone = ["psi", "beta_vane", "mach", "altitude", "tvcs", "obes", "q"];
     let copy = Copy::new().without(&gone);
-    copy.check(12);
-    let (found, _, _) = copy.judged();
+    let found = copy.check(12);
     for signal in ["psi_deg", "beta_vane_deg", "mach", "altitude_ft"] {
         assert!(
             found.channels.iter().all(|c| c.signal != signal),
