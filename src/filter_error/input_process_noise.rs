@@ -17,7 +17,7 @@ use crate::output_error::Case;
 use crate::output_error::surface_noise::{DerivativeValue, NoisySurface};
 
 /// Stride of the samples at which the effects are computed: enough for a mean.
-const STRIDE: usize = 16;
+const NOISE_STRIDE: usize = 16;
 
 /// Noise of the inputs as noise of the states of a filter.
 #[derive(Clone, Debug, Default)]
@@ -40,7 +40,7 @@ impl<const NX: usize> InputNoise<NX> {
     /// Effect in the filter of a case.
     pub fn of<E: Equations<NX>>(case: &Case<NX, E>) -> Self {
         let inputs = &case.noisy_inputs;
-        let samples = (0..case.samples()).step_by(STRIDE);
+        let samples = (0..case.samples()).step_by(NOISE_STRIDE);
         let share = 1.0 / samples.len().max(1) as f64;
         let mut effects = vec![];
         for sample in samples {

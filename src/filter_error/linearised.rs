@@ -10,7 +10,7 @@ use crate::numerics::linear_algebra::small::product;
 use crate::output_error::Case;
 
 /// Stride of the samples at which the slopes are computed: enough for a mean.
-const STRIDE: usize = 4;
+const SLOPE_STRIDE: usize = 4;
 
 /// Slopes of the rates and outputs along the states, means along the measured motion.
 #[derive(Clone, Debug)]
@@ -56,7 +56,7 @@ impl<const NX: usize> Linearised<NX> {
             held: StateSlopes::zeros(),
             free: vec![StateSlopes::zeros(); case.derivatives()],
         };
-        let samples = (0..case.samples()).step_by(STRIDE);
+        let samples = (0..case.samples()).step_by(SLOPE_STRIDE);
         let share = 1.0 / samples.len().max(1) as f64;
         for sample in samples {
             linearised.add_sample(case, sample, share);
@@ -207,7 +207,7 @@ impl<const N: usize> Exponential<N> {
     fn of(a: SMatrix<f64, N, N>) -> Self {
         let mut sums = [SMatrix::identity(); ORDER + 1];
         for n in 1..=ORDER {
-            let rest = product(&a, &sums[n - 1]) * SHARES[n - 1];
+            let rest = product(&a, &sums[n - 1]) * SUM_FACTORS[n - 1];
             sums[n] += rest;
         }
         Exponential { a, sums }
@@ -218,11 +218,12 @@ impl<const N: usize> Exponential<N> {
     fn slope(&self, change: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
         let mut slope = SMatrix::zeros();
         for n in 1..=ORDER {
-            slope = (product(change, &self.sums[n - 1]) + product(&self.a, &slope)) * SHARES[n - 1];
+            slope = (product(change, &self.sums[n - 1]) + product(&self.a, &slope))
+                * SUM_FACTORS[n - 1];
         }
         slope
     }
 }
 
 /// Factor 1/(5 − n) of the n-th sum.
-const SHARES: [f64; ORDER] = [1.0 / 4.0, 1.0 / 3.0, 1.0 / 2.0, 1.0];
+const SUM_FACTORS: [f64; ORDER] = [1.0 / 4.0, 1.0 / 3.0, 1.0 / 2.0, 1.0];

@@ -28,7 +28,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// Shares λ: from 0, constant derivatives, to 1.5, changes half as large again as the tunnel's.
-const SHARES: [f64; 7] = [0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5];
+const TRIED_SHARES: [f64; 7] = [0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5];
 
 /// Effect of the slopes on the estimates.
 #[derive(Clone, Debug, PartialEq)]
@@ -100,7 +100,7 @@ impl SlopeInformation {
         let by_slopes = &self.inverse * &self.cross;
         let left = &self.slopes - self.cross.transpose() * &by_slopes;
         let gradient = &self.gradient + &left * &self.held_at;
-        let estimates: Vec<ShareEstimate> = SHARES
+        let estimates: Vec<ShareEstimate> = TRIED_SHARES
             .iter()
             .map(|share| self.estimate(*share, &gradient, &left, &by_slopes))
             .collect::<Option<_>>()?;
@@ -223,9 +223,9 @@ mod tests {
         let mut flat = line(0.0, 1.0);
         flat.cross[(0, 0)] = 1e-6;
         flat.slopes[(0, 0)] = 1e-9;
-        let count = SHARES.len() as f64;
-        let mean = SHARES.iter().sum::<f64>() / count;
-        let square = SHARES.iter().map(|s| s * s).sum::<f64>() / count;
+        let count = TRIED_SHARES.len() as f64;
+        let mean = TRIED_SHARES.iter().sum::<f64>() / count;
+        let square = TRIED_SHARES.iter().map(|s| s * s).sum::<f64>() / count;
         let effect = flat.effect().unwrap();
         assert_relative_eq!(effect.slopes[0], mean, max_relative = 1e-6);
         let gain = 1e-6 / 150.0;

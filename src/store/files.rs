@@ -27,7 +27,7 @@ pub fn text(path: &Path) -> Result<String> {
 }
 
 /// Largest file that is read whole, bytes: a tunnel database of a million rows has a quarter of it.
-const LARGEST: u64 = 1 << 28;
+const LARGEST_READ_WHOLE: u64 = 1 << 28;
 
 /// Largest number of rows of a table that an analyst wrote: more than any tunnel's.
 const MOST_ROWS: usize = 1_000_000;
@@ -41,10 +41,10 @@ pub(super) fn bytes(path: &Path) -> Result<Vec<u8>> {
     let unreadable = |cause| Error::io(path, "cannot read it")(cause);
     let file = regular::open(path).map_err(unreadable)?;
     let mut bytes = Vec::new();
-    file.take(LARGEST + 1)
+    file.take(LARGEST_READ_WHOLE + 1)
         .read_to_end(&mut bytes)
         .map_err(unreadable)?;
-    if bytes.len() as u64 > LARGEST {
+    if bytes.len() as u64 > LARGEST_READ_WHOLE {
         let what = "it is larger than 268 MB, more than any such file has";
         return Err(Error::config(path, None, what));
     }

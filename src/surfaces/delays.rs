@@ -32,7 +32,7 @@ const OWN_S: f64 = 0.02;
 const FREEDOM: f64 = 5.0;
 
 /// Number of times that the weights of the maneuvers are estimated anew.
-const ROUNDS: usize = 8;
+const WEIGHT_ROUNDS: usize = 8;
 
 /// Least number of flights for which the jackknife leaves out one flight at a time; with fewer it
 /// leaves out one maneuver at a time.
@@ -177,7 +177,7 @@ fn robust(groups: &[Vec<DelayInformation>], count: usize) -> Option<Robust> {
     let mut weights: Vec<Vec<f64>> = groups.iter().map(|g| vec![1.0; g.len()]).collect();
     let mut sums = weighted_sums(groups, &weights, count);
     let mut posterior = DelayPosterior::of(&total(&sums, count))?;
-    for _ in 0..ROUNDS {
+    for _ in 0..WEIGHT_ROUNDS {
         let (mut square, mut freedom) = (0.0, 0.0);
         for (group, weights) in groups.iter().zip(&mut weights) {
             for (maneuver, weight) in group.iter().zip(weights) {

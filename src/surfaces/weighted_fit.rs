@@ -14,7 +14,7 @@ use crate::numerics::linear_algebra::symmetric;
 const SMOOTHED_HZ: f64 = 0.5;
 
 /// Number of times that the weights are estimated anew.
-const ROUNDS: usize = 3;
+const SPECTRUM_ROUNDS: usize = 3;
 
 /// Least residual power, as a share of the mean power of the coefficient: rounding errors of the
 /// sums.
@@ -52,7 +52,7 @@ impl WeightedFit {
         let mut weights = vec![2.0 / (power + least); implied.len()];
         let lost = 0.5 * columns.len() as f64;
         let freedom = count / (count - lost).max(count / 3.0);
-        for _ in 0..ROUNDS {
+        for _ in 0..SPECTRUM_ROUNDS {
             let (values, _) = solve(implied, columns, priors, &weights)?;
             let residuals = residuals(implied, columns, &values);
             weights = smoothed_power(frequencies_hz, &residuals)

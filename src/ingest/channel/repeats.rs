@@ -22,7 +22,7 @@ const CENTRED_REPEATS: f64 = 1.5;
 
 /// Probability of a run of equal values below which it is not chance: once in 10¹² samples, far
 /// more than a campaign has.
-const CHANCE: f64 = 1e-12;
+const LEAST_PROBABILITY: f64 = 1e-12;
 
 /// Largest number of stuck runs in one spell; with more, unchanged values are normal for the
 /// channel. Trade-off: a channel that sticks more often in one spell is kept as recorded. With a
@@ -77,7 +77,7 @@ pub fn stuck_run(values: &[f64], step_s: f64, settings: &Stuck) -> StuckRun {
     if repeats > settings.most_repeats || turn_share(values) < LEAST_TURNS {
         return StuckRun::Never;
     }
-    let by_chance = CHANCE.ln() / (CENTRED_REPEATS * repeats).max(f64::EPSILON).ln();
+    let by_chance = LEAST_PROBABILITY.ln() / (CENTRED_REPEATS * repeats).max(f64::EPSILON).ln();
     let longest = least.max(nearest(by_chance));
     let finite = |v: &f64| v.is_finite();
     let (first, last) = (

@@ -331,7 +331,7 @@ fn reduced_information(
 }
 
 /// Standard deviations of chance by which a sum of squares must exceed that of white noise.
-const CHANCE: f64 = 3.0;
+const CHANCE_DEVIATIONS: f64 = 3.0;
 
 /// Sum of squares of the part that continues from sample to sample, without white noise. White
 /// noise of variance s² exceeds its expectation by chance: the sum of v(k) v(k + 1) has the
@@ -342,7 +342,7 @@ fn slow_squares(values: &[f64]) -> f64 {
         .map(|w| (w[1] - w[0]).powi(2))
         .sum::<f64>()
         / 2.0;
-    let chance = CHANCE / (values.len().max(1) as f64).sqrt();
+    let chance = CHANCE_DEVIATIONS / (values.len().max(1) as f64).sqrt();
     (values.iter().map(|v| v * v).sum::<f64>() - noise * (1.0 + chance)).max(0.0)
 }
 

@@ -34,7 +34,7 @@ const ACCEPTED: f64 = 1e-8;
 const LEAST_SPEED_FT_S: f64 = 50.0;
 
 /// Relative step of the central differences. It affects the rate of convergence, not the trim.
-const DIFFERENCE_STEP: f64 = 1e-4;
+const RELATIVE_STEP: f64 = 1e-4;
 
 /// Flight condition to trim.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -262,7 +262,7 @@ impl TrimProblem<'_> {
     fn jacobian(&self, x: &Unknowns) -> SMatrix<f64, 6, 6> {
         let mut jacobian = SMatrix::<f64, 6, 6>::zeros();
         for j in 0..6 {
-            let h = DIFFERENCE_STEP * x[j].abs().max(0.1);
+            let h = RELATIVE_STEP * x[j].abs().max(0.1);
             let residual_at = |d: f64| {
                 let mut x = *x;
                 x[j] += d;

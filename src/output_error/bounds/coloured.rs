@@ -44,7 +44,7 @@ use crate::numerics::statistics::student;
 use crate::output_error::case::blocks::BlockSums;
 
 /// Largest number of rounds in which the absorbed part is added back.
-const ROUNDS: usize = 30;
+const MOST_ROUNDS: usize = 30;
 /// Relative change of an output's long-run variance in a round below which its noise has settled.
 const SETTLED: f64 = 0.01;
 /// Change of the absorbed variance, as a share of the variance, below which settled white noise is
@@ -189,7 +189,7 @@ fn settle_noise<'a>(
         .iter()
         .map(|output| NoiseIteration::new(inverse, output))
         .collect();
-    for _ in 0..ROUNDS {
+    for _ in 0..MOST_ROUNDS {
         let covariance = total_covariance(&outputs, inverse.columns());
         for output in &mut outputs {
             output.iterate(&covariance);

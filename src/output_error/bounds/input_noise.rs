@@ -264,14 +264,14 @@ fn cholesky_root(
     covariance: &[[f64; COEFFICIENTS]; COEFFICIENTS],
 ) -> [[f64; COEFFICIENTS]; COEFFICIENTS] {
     /// Share of a variance that rounding leaves, where there are fewer surfaces than coefficients.
-    const ROUNDING: f64 = 1e-14;
+    const ROUNDED_VARIANCE: f64 = 1e-14;
     let mut root = [[0.0; COEFFICIENTS]; COEFFICIENTS];
     for j in 0..COEFFICIENTS {
         for i in j..COEFFICIENTS {
             let products = root[i].iter().zip(&root[j]).take(j).map(|(a, b)| a * b);
             let left = covariance[i][j] - products.sum::<f64>();
             if i == j {
-                root[j][j] = if left > ROUNDING * covariance[j][j] {
+                root[j][j] = if left > ROUNDED_VARIANCE * covariance[j][j] {
                     left.sqrt()
                 } else {
                     0.0

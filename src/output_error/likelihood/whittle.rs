@@ -14,13 +14,13 @@ use crate::numerics::statistics::student::widening_95;
 
 /// Rounds of parameters and spectrum. Simulated estimates and their coverage are the same after 3, 5
 /// and 10.
-const ROUNDS: usize = 3;
+const SPECTRUM_ROUNDS: usize = 3;
 /// Condition number of the scaled normal matrix beyond which a regression has no result.
 const MAX_CONDITION_NUMBER: f64 = 1e10;
 /// Least number of degrees of freedom of the residuals, as for Student's t.
 const FEWEST_FREE: f64 = 3.0;
 /// Smallest spectrum, relative to the response's: rounding errors of an exact fit.
-const ROUNDING: f64 = 1e-24;
+const ROUNDED_SPECTRUM: f64 = 1e-24;
 /// Largest leverage for which variances are corrected. An equation with a larger one has no
 /// residual of its own.
 const MOST_LEVERAGE: f64 = 0.95;
@@ -61,7 +61,7 @@ impl SpectralEquations<'_> {
         }
         let mut spectrum = vec![1.0; equations / 2];
         let mut last = self.fit(&spectrum)?;
-        for _ in 1..ROUNDS {
+        for _ in 1..SPECTRUM_ROUNDS {
             spectrum = self.smoothed_spectrum(&last);
             last = self.fit(&spectrum)?;
         }
@@ -109,7 +109,7 @@ impl SpectralEquations<'_> {
         let frequencies = residuals.len() / 2;
         let both = |v: &DVector<f64>, k: usize| v[k] + v[frequencies + k];
         let squares = residuals.map(|e| e * e);
-        let least = ROUNDING * self.response.norm_squared() / residuals.len() as f64;
+        let least = ROUNDED_SPECTRUM * self.response.norm_squared() / residuals.len() as f64;
         let at = |k: usize| {
             let (mut sum, mut free) = (0.0, 0.0);
             for l in 0..frequencies {

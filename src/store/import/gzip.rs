@@ -14,7 +14,7 @@ use crate::store::regular;
 pub const SIGNATURE: &[u8] = b"\x1f\x8b";
 
 /// Largest unpacked file: more than any recording, less than a disk.
-const LARGEST: u64 = 64 << 30;
+const LARGEST_UNPACKED: u64 = 64 << 30;
 
 /// Name of a file without `.gz` at its end.
 pub fn unpacked_name(path: &Path) -> PathBuf {
@@ -35,7 +35,7 @@ pub fn unpacked(source: &Path, folder: &Path) -> Result<NamedTempFile> {
         .map_or_else(String::new, |e| format!(".{}", e.to_string_lossy()));
     let mut unpacked = scratch_in(folder, &extension)?;
     let packed = regular::open(source).map_err(Error::io(source, "cannot open it"))?;
-    let mut decoder = MultiGzDecoder::new(BufReader::new(packed)).take(LARGEST);
+    let mut decoder = MultiGzDecoder::new(BufReader::new(packed)).take(LARGEST_UNPACKED);
     let mut bytes = vec![0; 1 << 16];
     loop {
         let count = decoder.read(&mut bytes).map_err(|e| {

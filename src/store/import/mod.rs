@@ -31,7 +31,7 @@ use imported_contents::{ImportedContents, of_scratch, refused};
 pub use imported_contents::{Imported, ImportedColumn};
 
 /// Name of the manifest in the folder of imported files.
-pub const MANIFEST: &str = "import.json";
+const IMPORT_MANIFEST: &str = "import.json";
 
 /// Extensions of files that may be recordings.
 const EXTENSIONS: [&str; 9] = [
@@ -160,7 +160,7 @@ fn unknown_units(columns: &[ImportedColumn]) -> Option<String> {
 /// # Errors
 /// [`Error::Io`] or [`Error::Store`] naming the manifest.
 pub fn write_manifest(folder: &Path, imported: &[Imported]) -> Result<PathBuf> {
-    let path = folder.join(MANIFEST);
+    let path = folder.join(IMPORT_MANIFEST);
     let mut text = serde_json::to_string_pretty(imported).map_err(|e| Error::store(&path, &e))?;
     text.push('\n');
     atomic::place(&path, text.as_bytes())?;

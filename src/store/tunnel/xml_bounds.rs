@@ -2,7 +2,7 @@
 //! an element's attributes, and entities multiply the text.
 
 /// Largest file, bytes: a hundred times a simulator's aerodynamic model.
-const LARGEST: usize = 1 << 25;
+const LARGEST_XML: usize = 1 << 25;
 
 /// Largest number of attributes of an element; those of DAVE-ML have some ten.
 const MOST_ATTRIBUTES: usize = 1000;
@@ -14,7 +14,7 @@ pub fn excess(text: &str) -> Option<(Option<usize>, &'static str)> {
         let before = text.get(..at).unwrap_or_default();
         Some(1 + before.matches('\n').count())
     };
-    if text.len() > LARGEST {
+    if text.len() > LARGEST_XML {
         return Some((None, "it is larger than 33 MB, more than any model has"));
     }
     if let Some(at) = text.find("<!ENTITY") {

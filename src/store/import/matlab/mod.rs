@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use columns::{Table, Value};
 
 /// Largest file: more than any flight.
-const LARGEST: u64 = 4 << 30;
+const LARGEST_MATLAB: u64 = 4 << 30;
 
 type Variables = std::result::Result<Vec<(String, Value)>, String>;
 
@@ -32,7 +32,7 @@ pub fn import_hdf5(source: &Path, file: &Path) -> Result<ImportedContents> {
 fn bytes(source: &Path) -> Result<Vec<u8>> {
     let opened = std::fs::File::open(source).map_err(Error::io(source, "cannot open it"))?;
     let mut bytes = Vec::new();
-    let mut limited = opened.take(LARGEST);
+    let mut limited = opened.take(LARGEST_MATLAB);
     let read = limited.read_to_end(&mut bytes);
     read.map_err(Error::io(source, "cannot read it"))?;
     Ok(bytes)
