@@ -2,11 +2,12 @@
 //! tunnel is the prior, and the maneuvers are the evidence.
 //!
 //! Each coefficient is one Gaussian problem. Its unknowns are the differences of its derivatives
-//! from the tunnel at the points of a grid ([`prior::derivative_prior`]), linear between them. A maneuver counts with
-//! its whole corrected covariance, the exact effect of its held values, and the calibration errors
-//! that it shares with its flight ([`fusion::observation`]). Sizes and lengths of the differences are the
-//! most probable ones ([`fusion::scales`]); their remaining uncertainty is added to the covariance
-//! ([`fusion::open_scales`]). A maneuver that the others contradict has a lower weight ([`fusion::posterior`]).
+//! from the tunnel at the points of a grid ([`prior::derivative_prior`]), linear between them. A
+//! maneuver counts with its whole corrected covariance, the exact effect of its held values, and
+//! the calibration errors that it shares with its flight ([`fusion::observation`]). Sizes and
+//! lengths of the differences are the most probable ones ([`fusion::scales`]); their remaining
+//! uncertainty is added to the covariance ([`fusion::open_scales`]). A maneuver that the others
+//! contradict has a lower weight ([`fusion::posterior`]).
 
 mod prior;
 mod fusion;

@@ -1,12 +1,13 @@
 //! The pipeline: the stages of a campaign, brought up to date in order.
 //!
 //! Ingest, segment, surfaces, estimate, joint estimate, prediction and proof of match are steps
-//! ([`steps::step::Step`]): artefacts of the store, each a function of a key. [`steps::step_runner::StepRunner`]
-//! loads an artefact or makes it, so nothing is computed twice, and a killed run continues where it
-//! ended. Trends, posterior, flying qualities, comparison and report are small and made anew each
-//! time. [`Conductor`] runs the stages in order. A run, `status`, `explain` and the shards of a
-//! cluster all use it. Its [`Campaign`] carries the state of each flight and maneuver. Results do
-//! not depend on threads: they are collected in the order of flights and maneuvers.
+//! ([`steps::step::Step`]): artefacts of the store, each a function of a key.
+//! [`steps::step_runner::StepRunner`] loads an artefact or makes it, so nothing is computed twice,
+//! and a killed run continues where it ended. Trends, posterior, flying qualities, comparison and
+//! report are small and made anew each time. [`Conductor`] runs the stages in order. A run,
+//! `status`, `explain` and the shards of a cluster all use it. Its [`Campaign`] carries the state
+//! of each flight and maneuver. Results do not depend on threads: they are collected in the order
+//! of flights and maneuvers.
 
 mod records;
 mod steps;
