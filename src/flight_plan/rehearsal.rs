@@ -114,10 +114,10 @@ pub fn remaining_errors(rows: &[InstrumentRow]) -> BTreeMap<String, RemainingErr
         let remaining = |error: InstrumentError| {
             let determined = rows.iter().filter(|row| row.error(error).is_some());
             let bounds = determined.clone().filter_map(|row| row.error(error));
+            let bound = median(bounds.map(|(_, bound)| bound))?;
             Some(RemainingError {
-                uncorrected: None,
-                bound: median(bounds.map(|(_, bound)| bound))?,
                 scatter: median(determined.map(|row| row.scatter(error)))?,
+                ..RemainingError::corrected(bound)
             })
         };
         let errors = RemainingErrors {

@@ -66,9 +66,11 @@ fn an_error_that_the_flight_determines_replaces_the_stated_one() {
     };
     let by_calibration = part(None);
     let by_flight = part(Some(RemainingError::corrected(0.001)));
-    assert_relative_eq!(by_flight, by_calibration / 5.0, max_relative = 1e-2);
+    // Of the 0.5 % and the flight's 0.1 %.
+    let joined = by_calibration / 26.0_f64.sqrt();
+    assert_relative_eq!(by_flight, joined, max_relative = 1e-2);
     let left = RemainingError {
-        uncorrected: Some(0.0),
+        is_corrected: false,
         ..RemainingError::corrected(0.005)
     };
     let by_both = part(Some(left));

@@ -34,11 +34,12 @@ fn remaining(
     settings: &Compatibility,
 ) -> Option<RemainingError> {
     let (value, bound) = row.error(error)?;
-    let uncorrected = (!row.is_applied(error)).then_some(value);
+    let is_corrected = row.is_applied(error);
     let is_chance = value.abs() <= settings.standard_errors * bound;
-    (uncorrected.is_none() || is_chance).then(|| RemainingError {
-        uncorrected,
+    (is_corrected || is_chance).then(|| RemainingError {
+        estimate: value,
         bound,
+        is_corrected,
         scatter: row.scatter(error),
     })
 }
@@ -65,10 +66,14 @@ mod tests {
             bias: Some(bias),
             scale: None,
         };
-        let corrected = RemainingError::corrected(0.01);
+        let corrected = RemainingError {
+            estimate: 0.05,
+            ..RemainingError::corrected(0.01)
+        };
         assert_eq!(of(row(0.05, "bias")), Some((0.05, remaining(corrected))));
         let small = RemainingError {
-            uncorrected: Some(0.015),
+            estimate: 0.015,
+            is_corrected: false,
             ..RemainingError::corrected(0.01)
         };
         assert_eq!(of(row(0.015, "")), Some((0.0, remaining(small))));
