@@ -14,7 +14,9 @@
 //! | of a derivative | σ (α − ᾱ) r; along α itself σ (α − ᾱ)²/2 | mean 0, standard deviation λ |
 //!
 //! The share is 1 where flight changes as the tunnel does, and 0 where the derivatives are constant. σ is the
-//! standard uncertainty of a derivative's change per degree. Filter error estimates the slopes
+//! standard uncertainty of a derivative's change per degree. Along α itself the difference between
+//! T(α) − T(ᾱ) − T'(ᾱ) (α − ᾱ) and the integral of t(α) − t(ᾱ) is one more slope with the prior of a
+//! derivative: its two tables contradict each other by that much. Filter error estimates the slopes
 //! ([`filter_error::slopes`](crate::filter_error::slopes)).
 
 use super::tunnel_change::{AlphaRange, TunnelChange};
@@ -205,6 +207,12 @@ fn changes<const NX: usize, E: Equations<NX>>(
         let mut change = CoefficientChange::none(name, derivative.coefficient, alphas);
         change.add(&deviation, alphas, regressor.as_deref());
         changes.push((change, SlopePrior::DEVIATION));
+        if let Some(contradiction) = tunnel.contradiction(derivative) {
+            let name = format!("{name} by its sum");
+            let mut change = CoefficientChange::none(&name, derivative.coefficient, alphas);
+            change.add(&contradiction, alphas, None);
+            changes.push((change, SlopePrior::DEVIATION));
+        }
     }
     changes.extend(in_tunnel.map(|change| (change, SlopePrior::SHARE)));
     changes

@@ -45,20 +45,46 @@ impl TunnelChange<'_, '_> {
         self.range.angles().map(at).collect()
     }
 
-    /// Tunnel's change of a coefficient beyond that by its slope along α at the mean.
+    /// Tunnel's change of a coefficient beyond that by its slope along α at the mean: by the tabulated
+    /// sum if there is one, else by the table of the slope.
     fn change_along_alpha(&self, slope: &str) -> Option<Vec<f64>> {
+        self.change_of_sum(slope)
+            .or_else(|| self.change_of_slope(slope))
+    }
+
+    /// As [`Self::change_along_alpha`], by the cubic through the tabulated sum of constant and slope.
+    fn change_of_sum(&self, slope: &str) -> Option<Vec<f64>> {
         let range = self.range;
         let sums = &self.task.context.aero_model.combined;
-        let sum = sums.iter().find(|sum| sum.slope == slope);
-        let Some(curve) = sum.and_then(|sum| self.tabulated_sum(&sum.name, slope)) else {
-            return Some(range.integrate_from_mean(&self.change_from_mean(slope)?));
-        };
+        let sum = sums.iter().find(|sum| sum.slope == slope)?;
+        let curve = self.tabulated_sum(&sum.name, slope)?;
         let (mean, slope) = curve.at(range.mean);
         let beyond = range.angles().map(|alpha| {
             let (value, _) = curve.at(alpha);
             value - mean - slope * (alpha - range.mean)
         });
         Some(beyond.collect())
+    }
+
+    /// As [`Self::change_along_alpha`], by the integral over the table of the slope.
+    fn change_of_slope(&self, slope: &str) -> Option<Vec<f64>> {
+        let change = self.change_from_mean(slope)?;
+        Some(self.range.integrate_from_mean(&change))
+    }
+
+    /// Change of a coefficient at the samples by its tabulated sum, less that by the table of its slope
+    /// along α. `None` without both tables, and for other derivatives.
+    ///
+    /// The two tables would agree if they had no errors and their points were close.
+    pub fn contradiction(&self, derivative: &Derivative) -> Option<Vec<f64>> {
+        if derivative.regressor != Regressor::Alpha {
+            return None;
+        }
+        let by_sum = self.change_of_sum(&derivative.name)?;
+        let by_slope = self.change_of_slope(&derivative.name)?;
+        let pairs = by_sum.iter().zip(by_slope);
+        let difference: Vec<f64> = pairs.map(|(sum, slope)| sum - slope).collect();
+        Some(self.range.interpolate_at_samples(&difference))
     }
 
     /// Tabulated sum over α, with its slope. `None` without both tables.

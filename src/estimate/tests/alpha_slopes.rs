@@ -1,6 +1,7 @@
 //! Derivatives that change over the angles of attack of a maneuver.
 
 use super::*;
+use crate::aero::Combined;
 use crate::aero::wind_tunnel::TunnelPoint;
 use crate::filter_error::tests::{plain_outputs, plain_step};
 use crate::units::DEG;
@@ -10,6 +11,9 @@ const TRIM_DEG: f64 = -8.0;
 
 /// Change of `Cm_de` per degree of angle of attack, as a share of its value at 20°.
 const CHANGE_PER_DEG: f64 = -0.03;
+
+/// True `Cm_alpha`, per degree.
+const STATIC_STABILITY: f64 = -0.006;
 
 /// Factor on the inputs of the other tests, so that the angle of attack sweeps some 6°.
 const LARGER: f64 = 3.0;
@@ -61,15 +65,36 @@ fn flown_with_changing_derivative(bench: &Bench, seed: u64, vane_noise_deg: f64)
     record
 }
 
+/// Bench whose tunnel tabulates the slope of `Cm` along α without an error, and the sum of constant and
+/// slope with an error at one point.
+fn bench_with_contradicting_tables(error: f64) -> Bench {
+    let mut bench = bench_with_tunnel(1.0);
+    bench.aero_model.combined.push(Combined {
+        name: "Cm_ba".into(),
+        constant: "Cm_0".into(),
+        slope: "Cm_alpha".into(),
+    });
+    for alpha_deg in [15.0, 20.0, 25.0] {
+        let wrong = if alpha_deg > 20.0 { error } else { 0.0 };
+        let mut insert = |name, value| {
+            bench
+                .tunnel
+                .insert(name, TunnelPoint::new(alpha_deg, value));
+        };
+        insert("Cm_alpha", STATIC_STABILITY);
+        insert("Cm_ba", STATIC_STABILITY * alpha_deg + wrong);
+    }
+    bench
+}
+
 /// Errors of `Cm_alpha` over some flights, and their mean square in bounds.
-fn errors_of_static_stability(factor: f64, vane_noise_deg: f64) -> (f64, f64) {
-    let bench = bench_with_tunnel(factor);
+fn errors_of_static_stability(bench: &Bench, vane_noise_deg: f64) -> (f64, f64) {
     let errors = (1..=6).map(|seed| {
-        let record = flown_with_changing_derivative(&bench, seed, vane_noise_deg);
+        let record = flown_with_changing_derivative(bench, seed, vane_noise_deg);
         let estimated = bench.estimate(&record, &maneuver("a", 20.0));
         let mut rows = estimated.estimates.iter();
         let row = rows.find(|row| row.derivative == "Cm_alpha").unwrap();
-        let error = row.value.unwrap() + 0.006;
+        let error = row.value.unwrap() - STATIC_STABILITY;
         (error, (error / row.bound_corrected.unwrap()).powi(2))
     });
     let errors: Vec<(f64, f64)> = errors.collect();
@@ -81,9 +106,19 @@ fn errors_of_static_stability(factor: f64, vane_noise_deg: f64) -> (f64, f64) {
 fn the_change_of_a_trimmed_surface_s_derivative_is_not_charged_to_static_stability() {
     let by_change = (TRIM_DEG * CHANGE_PER_DEG * 0.012).abs();
     for (factor, vane_noise_deg) in [(1.0, 0.08), (0.8, 0.08), (1.25, 0.08), (1.0, 0.3)] {
-        let (error, square) = errors_of_static_stability(factor, vane_noise_deg);
+        let bench = bench_with_tunnel(factor);
+        let (error, square) = errors_of_static_stability(&bench, vane_noise_deg);
         let case = format!("{factor}, {vane_noise_deg} deg: {error} of {by_change}, {square}");
         assert!(error.abs() < 0.1 * by_change, "{case}");
         assert!(square < 4.0, "{case}");
+    }
+}
+
+#[test]
+fn a_sum_that_contradicts_the_table_of_its_slope_is_not_believed() {
+    for error in [-0.02, 0.02, 0.03] {
+        let bench = bench_with_contradicting_tables(error);
+        let (mean, square) = errors_of_static_stability(&bench, 0.08);
+        assert!(square < 2.0, "{error}: {mean}, {square}");
     }
 }
