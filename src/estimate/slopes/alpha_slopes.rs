@@ -2,9 +2,9 @@
 //!
 //! The build-up has one value of each derivative in a maneuver. In the wind tunnel's tables t(α) it
 //! changes. For a regressor r other than α the coefficient gains the term (t(α) − t(ᾱ)) r. For α
-//! itself it gains T(α) − T(ᾱ) − T'(ᾱ) (α − ᾱ). T is the tabulated sum of the constant and α t,
-//! with the slope t at its points. Without such a sum T is the integral of t. Held derivatives
-//! change as estimated ones do.
+//! itself it gains T(α) − T(ᾱ) − T'(ᾱ) (α − ᾱ). T is the sum of the constant and α t, as tabulated or
+//! from the tables of both, with the slope t at its points. Without such tables T is the integral of t.
+//! Held derivatives change as estimated ones do.
 //!
 //! Slopes of two kinds act in a maneuver:
 //!

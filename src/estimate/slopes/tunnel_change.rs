@@ -1,6 +1,6 @@
 //! Change of the wind tunnel's derivatives over the angles of attack that a maneuver sweeps.
 
-use crate::aero::{Condition, Derivative, Regressor};
+use crate::aero::{Combined, Condition, Derivative, Regressor};
 use crate::estimate::task::Task;
 use crate::numerics::cubic_curve::CubicCurve;
 use crate::numerics::series::trapezoid::running_integral;
@@ -45,19 +45,18 @@ impl TunnelChange<'_, '_> {
         self.range.angles().map(at).collect()
     }
 
-    /// Tunnel's change of a coefficient beyond that by its slope along α at the mean: by the tabulated
-    /// sum if there is one, else by the table of the slope.
+    /// Tunnel's change of a coefficient beyond that by its slope along α at the mean: by the sum of
+    /// constant and slope times α if the tunnel has it, else by the table of the slope.
     fn change_along_alpha(&self, slope: &str) -> Option<Vec<f64>> {
         self.change_of_sum(slope)
             .or_else(|| self.change_of_slope(slope))
     }
 
-    /// As [`Self::change_along_alpha`], by the cubic through the tabulated sum of constant and slope.
+    /// As [`Self::change_along_alpha`], by the cubic through the sum of constant and slope times α.
     fn change_of_sum(&self, slope: &str) -> Option<Vec<f64>> {
         let range = self.range;
         let sums = &self.task.context.aero_model.combined;
-        let sum = sums.iter().find(|sum| sum.slope == slope)?;
-        let curve = self.tabulated_sum(&sum.name, slope)?;
+        let curve = self.curve_of(sums.iter().find(|sum| sum.slope == slope)?)?;
         let (mean, slope) = curve.at(range.mean);
         let beyond = range.angles().map(|alpha| {
             let (value, _) = curve.at(alpha);
@@ -72,8 +71,8 @@ impl TunnelChange<'_, '_> {
         Some(self.range.integrate_from_mean(&change))
     }
 
-    /// Change of a coefficient at the samples by its tabulated sum, less that by the table of its slope
-    /// along α. `None` without both tables, and for other derivatives.
+    /// Change of a coefficient at the samples by its sum, less that by the table of its slope along α.
+    /// `None` without both, and for other derivatives.
     ///
     /// The two tables would agree if they had no errors and their points were close.
     pub fn contradiction(&self, derivative: &Derivative) -> Option<Vec<f64>> {
@@ -87,12 +86,19 @@ impl TunnelChange<'_, '_> {
         Some(self.range.interpolate_at_samples(&difference))
     }
 
-    /// Tabulated sum over α, with its slope. `None` without both tables.
-    fn tabulated_sum(&self, sum: &str, slope: &str) -> Option<CubicCurve> {
-        let (value, slope_at) = (self.table(sum), self.table(slope));
-        let points = self.task.context.tunnel.alphas_deg(sum).into_iter();
-        let knots = points.map(|alpha| Some((alpha, value(alpha)?, slope_at(alpha)?)));
-        CubicCurve::through(knots.collect::<Option<_>>()?)
+    /// Sum of constant and slope times α over α, as tabulated, else from the tables of both. `None` without
+    /// them.
+    fn curve_of(&self, sum: &Combined) -> Option<CubicCurve> {
+        let [tabulated, constant, slope] =
+            [&sum.name, &sum.constant, &sum.slope].map(|name| self.table(name));
+        let points = [&sum.name, &sum.slope].map(|name| self.task.context.tunnel.alphas_deg(name));
+        let points = points.into_iter().find(|points| !points.is_empty())?;
+        let knot = |alpha: f64| {
+            let slope = slope(alpha)?;
+            let value = tabulated(alpha).or_else(|| Some(constant(alpha)? + slope * alpha));
+            Some((alpha, value?, slope))
+        };
+        CubicCurve::through(points.into_iter().map(knot).collect::<Option<_>>()?)
     }
 
     /// Tunnel's table of a derivative over α in deg, at the maneuver's condition.

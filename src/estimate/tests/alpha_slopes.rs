@@ -65,9 +65,16 @@ fn flown_with_changing_derivative(bench: &Bench, seed: u64, vane_noise_deg: f64)
     record
 }
 
+/// Table of a tunnel from which the sum of constant and slope follows.
+#[derive(Clone, Copy)]
+enum SumTable {
+    Sum,
+    Constant,
+}
+
 /// Bench whose tunnel tabulates the slope of `Cm` along α without an error, and the sum of constant and
 /// slope with an error at one point.
-fn bench_with_contradicting_tables(error: f64) -> Bench {
+fn bench_with_contradicting_tables(table: SumTable, error: f64) -> Bench {
     let mut bench = bench_with_tunnel(1.0);
     bench.aero_model.combined.push(Combined {
         name: "Cm_ba".into(),
@@ -75,14 +82,16 @@ fn bench_with_contradicting_tables(error: f64) -> Bench {
         slope: "Cm_alpha".into(),
     });
     for alpha_deg in [15.0, 20.0, 25.0] {
-        let wrong = if alpha_deg > 20.0 { error } else { 0.0 };
+        let constant = if alpha_deg > 20.0 { error } else { 0.0 };
         let mut insert = |name, value| {
-            bench
-                .tunnel
-                .insert(name, TunnelPoint::new(alpha_deg, value));
+            let point = TunnelPoint::new(alpha_deg, value);
+            bench.tunnel.insert(name, point);
         };
         insert("Cm_alpha", STATIC_STABILITY);
-        insert("Cm_ba", STATIC_STABILITY * alpha_deg + wrong);
+        match table {
+            SumTable::Sum => insert("Cm_ba", STATIC_STABILITY * alpha_deg + constant),
+            SumTable::Constant => insert("Cm_0", constant),
+        }
     }
     bench
 }
@@ -117,8 +126,19 @@ fn the_change_of_a_trimmed_surface_s_derivative_is_not_charged_to_static_stabili
 #[test]
 fn a_sum_that_contradicts_the_table_of_its_slope_is_not_believed() {
     for error in [-0.02, 0.02, 0.03] {
-        let bench = bench_with_contradicting_tables(error);
+        let bench = bench_with_contradicting_tables(SumTable::Sum, error);
         let (mean, square) = errors_of_static_stability(&bench, 0.08);
         assert!(square < 2.0, "{error}: {mean}, {square}");
     }
+}
+
+#[test]
+fn a_sum_without_a_table_follows_from_constant_and_slope() {
+    let [sum, constant] = [SumTable::Sum, SumTable::Constant].map(|table| {
+        errors_of_static_stability(&bench_with_contradicting_tables(table, 0.03), 0.08)
+    });
+    assert_relative_eq!(sum.0, constant.0, epsilon = 1e-6);
+    assert_relative_eq!(sum.1, constant.1, max_relative = 1e-2);
+    let (without, _) = errors_of_static_stability(&bench_with_tunnel(1.0), 0.08);
+    assert!((without - sum.0).abs() > 1e-5, "{without} {}", sum.0);
 }
