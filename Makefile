@@ -71,9 +71,9 @@ init: build ## draft the pipeline NAME from the recordings FROM
 	$(if $(and $(NAME),$(FROM)),,$(error make init NAME=<pipeline> FROM=<file or folder>))
 	cargo run --release --locked --quiet -- init '$(NAME)' --from $(FROM)
 
-import: build ## write the recordings FROM (CSV, MATLAB, tall Parquet) as Parquet into the folder TO
+import: build ## write the recordings FROM (CSV, MATLAB, tall Parquet) as Parquet into the folder TO [NAMES='time [s], …'] [STEP=0.02]
 	$(if $(and $(TO),$(FROM)),,$(error make import FROM=<files or folder> TO=<folder>))
-	cargo run --release --locked --quiet -- import $(FROM) --to '$(TO)'
+	cargo run --release --locked --quiet -- import $(FROM) --to '$(TO)' $(if $(NAMES),--names '$(NAMES)') $(if $(STEP),--step $(STEP))
 
 check: build ## check the configuration and print what a run would do
 	$(call harvest,check)

@@ -20,6 +20,7 @@ fingerprint, the columns with their units, and what was left out.
 
 Examples:
   harvest import recordings/*.csv --to data/mine/flights
+  harvest import runs/*.asc --to data/mine/flights --step 0.04 --names 'p [rad/s], q [rad/s], r [rad/s], phi [rad]'
   harvest init mine --from data/mine/flights
 
 Exit codes: 0 written; 1 not written, the message says why.";
@@ -32,10 +33,18 @@ pub struct ImportOptions {
     /// Folder of the archive to write into
     #[arg(long, value_name = "FOLDER")]
     to: PathBuf,
+    /// Names of the columns in the order of the source, with their units: 'time [s], de [rad], -, V [m/s]'; - leaves one out
+    #[arg(long, value_name = "LIST")]
+    names: Option<String>,
+    /// Time from row to row in s, of recordings without a clock
+    #[arg(long, value_name = "SECONDS")]
+    step: Option<f64>,
 }
 
 /// Imports recordings and prints what was written.
 pub fn import(options: &ImportOptions) -> anyhow::Result<ExitCode> {
+    let naming =
+        import::Naming::of(options.names.as_deref(), options.step).map_err(anyhow::Error::msg)?;
     let mut imported: Vec<import::Imported> = Vec::new();
     for place in &options.from {
         for source in import::sources(place)? {
@@ -45,14 +54,16 @@ pub fn import(options: &ImportOptions) -> anyhow::Result<ExitCode> {
                 "{}: another source has this name too; import it into another folder",
                 source.display()
             );
-            let one = import::import(&source, &options.to)?;
+            let one = import::import(&source, &options.to, &naming)?;
             let (columns, rows) = (one.columns.len(), one.rows);
             out!(
                 "{}: {columns} columns, {rows} rows from {}",
                 one.file.display(),
                 source.display()
             );
-            for note in &one.notes {
+            // A note that many files share is printed once; the manifest has it with each.
+            let is_new = |note: &&String| imported.iter().all(|other| !other.notes.contains(note));
+            for note in one.notes.iter().filter(is_new) {
                 out!("  {note}");
             }
             imported.push(one);

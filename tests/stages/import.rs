@@ -37,11 +37,7 @@ fn columns(rows: u32) -> Vec<(&'static str, &'static str, Vec<f64>)> {
 }
 
 fn import(folder: &Path, file: &str) -> Outcome {
-    let mut command = harvest();
-    command
-        .current_dir(folder)
-        .args(["import", file, "--to", "flights"]);
-    run(&mut command)
+    import_with(folder, file, &[])
 }
 
 /// The imported recording.
@@ -305,6 +301,78 @@ fn matlab_vectors_structs_and_matrices_come_back_to_the_bit() {
     check(&recording, "roll", None, &columns[1].2);
     check(&recording, "yaw", None, &columns[2].2);
     assert_eq!(recording.columns.len(), 5);
+}
+
+/// Imports a file with further arguments.
+fn import_with(folder: &Path, file: &str, options: &[&str]) -> Outcome {
+    let mut command = harvest();
+    command
+        .current_dir(folder)
+        .args(["import", file, "--to", "flights"])
+        .args(options);
+    run(&mut command)
+}
+
+#[test]
+fn columns_without_names_take_those_of_the_analyst_and_a_step_their_clock() {
+    let folder = tempfile::tempdir().unwrap();
+    let columns = columns(900);
+    let rows = (0..900).map(|k| format!("{:?} 7 {:?}\n", columns[1].2[k], columns[2].2[k]));
+    fs::write(folder.path().join("f.asc"), rows.collect::<String>()).unwrap();
+    let outcome = import(folder.path(), "f.asc");
+    let note = "names none of its 3 columns";
+    assert!(outcome.stdout.contains(note), "{}", outcome.stdout);
+    let names = ["--names", "q [rad/s], -, de [deg]", "--step", "0.02"];
+    let outcome = import_with(folder.path(), "f.asc", &names);
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    assert!(!outcome.stdout.contains("names none"), "{}", outcome.stdout);
+    let recording = imported(folder.path());
+    for (name, unit, values) in &columns {
+        check(&recording, name, Some(unit), values);
+    }
+    assert_eq!(recording.columns.len(), 3);
+    let refused = import_with(folder.path(), "f.asc", &["--names", "q, de"]);
+    let message = "--names has 2 names, and the file 3 columns";
+    assert!(
+        refused.code == Some(1) && refused.stderr.contains(message),
+        "{}",
+        refused.stderr
+    );
+}
+
+#[test]
+fn a_matrix_without_names_takes_those_of_the_analyst() {
+    let folder = tempfile::tempdir().unwrap();
+    let columns = columns(900);
+    let all: Vec<f64> = columns
+        .iter()
+        .flat_map(|(_, _, v)| v.iter().copied())
+        .collect();
+    matlab(folder.path(), &[doubles("fdata", [900, 3], &all)]);
+    let outcome = import(folder.path(), "f.mat");
+    let note = "names none of its 3 columns";
+    assert!(outcome.stdout.contains(note), "{}", outcome.stdout);
+    let names = ["--names", "time [s],q [rad/s],de [deg]"];
+    let outcome = import_with(folder.path(), "f.mat", &names);
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let recording = imported(folder.path());
+    for (name, unit, values) in &columns {
+        check(&recording, name, Some(unit), values);
+    }
+}
+
+#[test]
+fn a_tall_text_takes_no_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "time,name,value\n0,q,1\n0,de,2\n0.1,q,3\n";
+    fs::write(folder.path().join("f.csv"), text).unwrap();
+    let refused = import_with(folder.path(), "f.csv", &["--names", "time, q"]);
+    assert_eq!(refused.code, Some(1));
+    assert!(
+        refused.stderr.contains("leave --names and --step out"),
+        "{}",
+        refused.stderr
+    );
 }
 
 /// File of tests/data as a recording in a folder.

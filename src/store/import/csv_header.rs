@@ -9,7 +9,7 @@ use crate::units::Unit;
 #[derive(Clone, Debug)]
 pub struct HeadLine {
     /// Its place in the text.
-    at: usize,
+    pub at: usize,
     is_comment: bool,
     pub fields: Vec<String>,
 }
@@ -23,6 +23,16 @@ impl HeadLine {
             is_comment: line.starts_with(signs),
             fields: fields(text, delimiter),
         }
+    }
+
+    /// `true` if each field is a word, as in a line of names. Comments are above tables.
+    pub fn is_all_names(&self) -> bool {
+        let is_word = |field: &String| !field.is_empty() && !is_number(field);
+        !self.is_comment && self.fields.iter().all(is_word)
+    }
+
+    pub fn has_number(&self) -> bool {
+        self.fields.iter().any(|field| is_number(field))
     }
 
     /// `true` if the line names every column that the line below has a field for, each by another

@@ -1,6 +1,6 @@
 //! Layout of a delimited text, found from its beginning: delimiter, decimal sign, header, columns.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::calendar_time::{CalendarTime, is_ambiguous, is_time_of_day};
 use super::csv_header::{HeadLine, names_and_units};
@@ -18,10 +18,14 @@ pub struct Layout {
     dialect: Dialect,
     /// Lines before the first row of numbers.
     pub skipped: usize,
+    /// Number of fields of a row.
+    width: usize,
     /// Columns of numbers.
     pub columns: Vec<NumberColumn>,
     /// Columns of text.
     pub dropped: Vec<String>,
+    /// `false` if no line above the numbers names the columns.
+    pub has_names: bool,
 }
 
 /// Column of numbers.
@@ -51,6 +55,9 @@ impl Layout {
             return Err(message);
         }
         let layout = layout.ok_or_else(|| {
+            if head.trim().is_empty() {
+                return "it is empty".to_owned();
+            }
             "no table of numbers: harvest imports text with one row a sample and a header, MATLAB, HDF5 and tall Parquet"
                 .to_owned()
         })?;
@@ -63,14 +70,18 @@ impl Layout {
     /// Layout in one dialect, and the count of numbers that it reads; `None` without a row of two or
     /// more numbers.
     fn in_dialect(lines: &[&str], dialect: Dialect) -> Option<(usize, Layout)> {
-        let first = lines.iter().position(|line| is_data(line, dialect))?;
-        let width = dialect.fields(lines[first]).len();
-        let headers: Vec<HeadLine> = lines[..first]
+        let mut first = lines.iter().position(|line| is_data(line, dialect))?;
+        let width = frequent_width(&lines[first..], dialect)?;
+        let mut headers: Vec<HeadLine> = lines[..first]
             .iter()
             .enumerate()
             .map(|(at, line)| HeadLine::of(at, line, dialect.delimiter))
             .filter(|line| line.fields.len() == width)
             .collect();
+        if let Some(row) = first_row_below_names(&headers) {
+            first = headers[row].at;
+            headers.truncate(row);
+        }
         let (names, units) = names_and_units(&headers, width, dialect.delimiter);
         let rows: Vec<Vec<String>> = lines[first..]
             .iter()
@@ -97,8 +108,10 @@ impl Layout {
         let layout = Layout {
             dialect,
             skipped: first,
+            width,
             dropped: dropped.into_iter().map(|at| names[at].clone()).collect(),
             columns,
+            has_names: !headers.is_empty(),
         };
         (layout.columns.len() >= 2).then_some((numbers_read, layout))
     }
@@ -173,16 +186,46 @@ impl Layout {
             }
             column.push(value.unwrap_or(f64::NAN));
         }
+        failures.long_rows += usize::from(fields.len() > self.width);
     }
 }
+
+/// Number of fields that most of the rows at the beginning have: single rows may be short or long.
+fn frequent_width(lines: &[&str], dialect: Dialect) -> Option<usize> {
+    let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
+    let rows = lines.iter().filter(|line| is_data(line, dialect));
+    for line in rows.take(HEAD_ROWS) {
+        *counts.entry(dialect.fields(line).len()).or_default() += 1;
+    }
+    let most = counts
+        .into_iter()
+        .max_by_key(|(width, rows)| (*rows, *width));
+    most.map(|(width, _)| width)
+}
+
+/// Place of the first line with a number below a line of names alone, among lines of words above the numbers: it is
+/// a row that begins the table with text in its columns.
+fn first_row_below_names(headers: &[HeadLine]) -> Option<usize> {
+    let names = headers.iter().position(HeadLine::is_all_names)?;
+    let below = headers
+        .iter()
+        .skip(names + 1)
+        .position(HeadLine::has_number);
+    below.map(|row| names + 1 + row)
+}
+
+/// Characters that separate fields in rare recorders. Signs of numbers, dates, brackets, quotes and comments are not
+/// among them.
+const RARE_DELIMITERS: [char; 8] = ['~', '^', '&', '$', '@', '\u{1}', '\u{1e}', '\u{1f}'];
 
 /// Dialects that a text may have, the likeliest first.
 fn dialects(head: &str) -> Vec<Dialect> {
     // Between commas only quotes make a decimal comma: `"1,5","2,5"`.
     let has_quotes = head.contains('"');
-    let delimiters = ['\t', ';', ',', '|'].map(Delimiter::Character);
+    let rare = RARE_DELIMITERS.into_iter().filter(|c| head.contains(*c));
+    let delimiters = ['\t', ';', ',', '|'].into_iter().chain(rare);
     let mut dialects: Vec<Dialect> = delimiters
-        .into_iter()
+        .map(Delimiter::Character)
         .chain([Delimiter::Space])
         .flat_map(|delimiter| {
             [false, true].map(|decimal_comma| Dialect {
@@ -367,6 +410,33 @@ mod tests {
     }
 
     #[test]
+    fn rows_with_text_or_another_number_of_fields_are_no_header() {
+        let text = layout("time,q,mode\n0.0,ERR,AUTO\n0.1,1,AUTO\n0.2,2,AUTO\n");
+        assert_eq!(names(&text), [("time", ""), ("q", "")]);
+        assert_eq!(
+            (text.skipped, &text.dropped[..]),
+            (1, &["mode".to_owned()][..])
+        );
+        let short = layout("time,q,p\n0,1\n1,2,3\n2,3,4\n3,4,5,6\n");
+        assert_eq!((short.skipped, names(&short).len()), (1, 3));
+        let (mut batch, mut failures) = (vec![Vec::new(); 3], Failures::default());
+        short.append("0,1", 2, &mut batch, &mut failures);
+        short.append("3,4,5,6", 5, &mut batch, &mut failures);
+        assert!(
+            batch[2][0].is_nan() && failures.notes().len() == 2,
+            "{failures:?}"
+        );
+    }
+
+    #[test]
+    fn rare_delimiters_are_found() {
+        for delimiter in ['~', '^', '\u{1f}'] {
+            let text = "time,q,p\n0.0,1,2\n0.1,2,3\n".replace(',', &delimiter.to_string());
+            assert_eq!(names(&layout(&text)).len(), 3, "{delimiter:?}");
+        }
+    }
+
+    #[test]
     fn decimal_commas_between_commas_are_read_in_quotes_and_else_named() {
         let quoted = layout("time,q\n\"0,0\",\"1,5\"\n\"0,1\",\"2,5\"\n");
         assert_eq!(
@@ -464,6 +534,6 @@ mod tests {
     #[test]
     fn a_text_without_numbers_is_refused() {
         assert!(Layout::of("Dear reader,\nthis is prose\n").is_err());
-        assert!(Layout::of("").is_err());
+        assert!(Layout::of("\n").unwrap_err().contains("empty"));
     }
 }

@@ -6,23 +6,29 @@ use std::path::Path;
 
 use super::csv_layout::{HEAD_BYTES, Layout, whole_lines};
 use super::delimited::{Failures, next_line};
-use super::flight_file::{FlightWriter, batch_rows};
+use super::flight_file::batch_rows;
 use super::imported_contents::{ImportedColumn, ImportedContents, refused};
+use super::naming::{NamedWriter, Naming, note_on_nameless};
 use super::tall_text::TallLayout;
 use crate::error::{Error, Result};
 
 /// Imports a delimited text.
-pub fn import(source: &Path, file: &Path) -> Result<ImportedContents> {
+pub fn import(source: &Path, file: &Path, naming: &Naming) -> Result<ImportedContents> {
     let head = beginning(source)?;
     if let Some(tall) = TallLayout::of(&whole_lines(&head)) {
+        naming.refuse_tall(source)?;
         return tall.import(source, file);
     }
     let layout = Layout::of(&head).map_err(|message| refused(source, &message))?;
     let columns = layout.columns.iter().map(|column| column.head.clone());
     let columns: Vec<ImportedColumn> = columns.collect();
-    let writer = FlightWriter::of(file, &columns)?;
+    let writer = naming.writer(source, file, &columns)?;
+    let heads = writer.heads.clone();
     let (rows, failures) = write_rows(source, &layout, writer)?;
     let mut notes = failures.notes();
+    if !layout.has_names && !naming.has_names() {
+        notes.push(note_on_nameless(&columns));
+    }
     if !layout.dropped.is_empty() {
         notes.push(format!(
             "columns of text are left out: {}",
@@ -32,7 +38,7 @@ pub fn import(source: &Path, file: &Path) -> Result<ImportedContents> {
     notes.extend(layout.notes_on_times());
     Ok(ImportedContents {
         rows,
-        columns,
+        columns: heads,
         notes,
         folder: None,
     })
@@ -59,7 +65,7 @@ fn opened(source: &Path) -> Result<File> {
 fn write_rows(
     source: &Path,
     layout: &Layout,
-    mut writer: FlightWriter,
+    mut writer: NamedWriter,
 ) -> Result<(usize, Failures)> {
     let mut reader = BufReader::new(opened(source)?);
     let mut failures = Failures::default();
@@ -78,6 +84,12 @@ fn write_rows(
         }
     }
     writer.write(&batch)?;
+    if writer.rows < 2 {
+        return Err(refused(
+            source,
+            "it has a single row of numbers: a recording has more",
+        ));
+    }
     Ok((writer.place()?, failures))
 }
 

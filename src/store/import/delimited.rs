@@ -50,6 +50,7 @@ pub struct Failures {
     fields: usize,
     first: Option<(usize, String)>,
     pub short_rows: usize,
+    pub long_rows: usize,
 }
 
 impl Failures {
@@ -71,6 +72,12 @@ impl Failures {
             notes.push(format!(
                 "{} rows have fewer fields than the header",
                 self.short_rows
+            ));
+        }
+        if self.long_rows > 0 {
+            notes.push(format!(
+                "{} rows have more fields than the others, which are left out",
+                self.long_rows
             ));
         }
         notes

@@ -66,9 +66,9 @@ impl FlightWriter {
     ///
     /// # Errors
     /// [`Error::Store`] naming the file.
-    pub fn write(&mut self, values: &[Vec<f64>]) -> Result<()> {
-        self.rows += values.first().map_or(0, Vec::len);
-        let arrays = values.iter().map(|values| array(values));
+    pub fn write<C: AsRef<[f64]>>(&mut self, values: &[C]) -> Result<()> {
+        self.rows += values.first().map_or(0, |column| column.as_ref().len());
+        let arrays = values.iter().map(|values| array(values.as_ref()));
         let path = self.draft.path();
         let batch = RecordBatch::try_new(self.schema.clone(), arrays.collect())
             .map_err(|e| Error::store(path, &e))?;

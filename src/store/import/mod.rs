@@ -14,6 +14,7 @@ mod flight_file;
 mod gzip;
 mod imported_contents;
 mod matlab;
+mod naming;
 pub(super) mod tall;
 mod tall_text;
 mod time_order;
@@ -29,6 +30,7 @@ use crate::units::Unit;
 use imported_contents::{ImportedContents, of_scratch, refused};
 
 pub use imported_contents::{Imported, ImportedColumn};
+pub use naming::Naming;
 
 /// Name of the manifest in the folder of imported files.
 const IMPORT_MANIFEST: &str = "import.json";
@@ -84,11 +86,11 @@ pub fn target(source: &Path, folder: &Path) -> PathBuf {
     folder.join(format!("{}.parquet", stem.unwrap_or_default()))
 }
 
-/// Imports a file into a folder.
+/// Imports a file into a folder, its columns named as the source or the analyst does.
 ///
 /// # Errors
 /// [`Error::Archive`] for a file that is no recording, with the reason; [`Error::Io`] for the disk.
-pub fn import(source: &Path, folder: &Path) -> Result<Imported> {
+pub fn import(source: &Path, folder: &Path, naming: &Naming) -> Result<Imported> {
     let file = target(source, folder);
     let same = source.canonicalize().ok().zip(file.canonicalize().ok());
     if same.is_some_and(|(a, b)| a == b) {
@@ -101,11 +103,11 @@ pub fn import(source: &Path, folder: &Path) -> Result<Imported> {
         Format::Gzip => {
             let unpacked = gzip::unpacked(source, folder)?;
             let place = unpacked.path();
-            let contents = import_format(Format::of(place)?, place, &file);
+            let contents = import_format(Format::of(place)?, place, &file, naming);
             // The temporary file is gone when the message is read.
             contents.map_err(|e| of_scratch(e, source))?
         }
-        format => import_format(format, source, &file)?,
+        format => import_format(format, source, &file, naming)?,
     };
     let mut notes = contents.notes;
     notes.extend(unknown_units(&contents.columns));
@@ -120,12 +122,20 @@ pub fn import(source: &Path, folder: &Path) -> Result<Imported> {
     })
 }
 
-fn import_format(format: Format, source: &Path, file: &Path) -> Result<ImportedContents> {
+fn import_format(
+    format: Format,
+    source: &Path,
+    file: &Path,
+    naming: &Naming,
+) -> Result<ImportedContents> {
     match format {
-        Format::Csv => csv_text::import(source, file),
-        Format::Matlab => matlab::import_level_5(source, file),
-        Format::Hdf5 => matlab::import_hdf5(source, file),
-        Format::Parquet => tall::import(source, file),
+        Format::Csv => csv_text::import(source, file, naming),
+        Format::Matlab => matlab::import_level_5(source, file, naming),
+        Format::Hdf5 => matlab::import_hdf5(source, file, naming),
+        Format::Parquet => {
+            naming.refuse_tall(source)?;
+            tall::import(source, file)
+        }
         Format::Gzip => Err(refused(source, "it is packed twice; unpack it first")),
     }
 }

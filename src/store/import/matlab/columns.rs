@@ -113,13 +113,15 @@ impl Table {
     }
 
     /// Names the columns of a matrix by a list of as many texts, and takes their units from
-    /// another.
-    pub fn name_matrix_columns(&mut self) {
+    /// another. Returns `false` if all columns are those of matrices without names.
+    pub fn name_matrix_columns(&mut self) -> bool {
+        let mut named = self.columns.len();
         let is_units = |name: &str| name.to_lowercase().contains("unit");
         for (first, width) in self.matrices.clone() {
             let mut of_width = self.lists.iter().filter(|(_, list)| list.len() == width);
             let names = of_width.clone().find(|(name, _)| !is_units(name));
             let units = of_width.find(|(name, _)| is_units(name));
+            named -= if names.is_none() { width } else { 0 };
             let columns = self.columns.iter_mut().skip(first).take(width).enumerate();
             for (n, (head, _)) in columns {
                 if let Some((_, names)) = names {
@@ -130,6 +132,7 @@ impl Table {
                     .or(head.unit.take());
             }
         }
+        named > 0 || self.columns.is_empty()
     }
 
     /// Length that most columns have.

@@ -7,8 +7,9 @@ mod level_5;
 use std::io::Read;
 use std::path::Path;
 
-use super::flight_file::{FlightWriter, batch_rows};
+use super::flight_file::batch_rows;
 use super::imported_contents::{ImportedColumn, ImportedContents, refused};
+use super::naming::{Naming, note_on_nameless};
 use crate::error::{Error, Result};
 use columns::{Table, Value};
 
@@ -18,15 +19,15 @@ const LARGEST_MATLAB: u64 = 4 << 30;
 type Variables = std::result::Result<Vec<(String, Value)>, String>;
 
 /// Imports a MATLAB file of level 5.
-pub fn import_level_5(source: &Path, file: &Path) -> Result<ImportedContents> {
+pub fn import_level_5(source: &Path, file: &Path, naming: &Naming) -> Result<ImportedContents> {
     let variables = level_5::variables(&bytes(source)?);
-    write_columns(source, file, variables)
+    write_columns(source, file, variables, naming)
 }
 
 /// Imports an HDF5 file: MATLAB 7.3, or another program's.
-pub fn import_hdf5(source: &Path, file: &Path) -> Result<ImportedContents> {
+pub fn import_hdf5(source: &Path, file: &Path, naming: &Naming) -> Result<ImportedContents> {
     let variables = hdf5::variables(bytes(source)?);
-    write_columns(source, file, variables)
+    write_columns(source, file, variables, naming)
 }
 
 fn bytes(source: &Path) -> Result<Vec<u8>> {
@@ -39,22 +40,31 @@ fn bytes(source: &Path) -> Result<Vec<u8>> {
 }
 
 /// Writes the columns that the variables of a file make.
-fn write_columns(source: &Path, file: &Path, variables: Variables) -> Result<ImportedContents> {
+fn write_columns(
+    source: &Path,
+    file: &Path,
+    variables: Variables,
+    naming: &Naming,
+) -> Result<ImportedContents> {
     let variables = variables.map_err(|what| refused(source, &what))?;
     let mut table = Table::default();
     let single = variables.len() == 1;
     for (name, value) in variables {
         table.add(if single { "" } else { &name }, &name, value);
     }
-    table.name_matrix_columns();
+    let is_named = table.name_matrix_columns();
     let rows = table.frequent_length();
-    let (columns, notes) = table.of_length(rows);
+    let (columns, mut notes) = table.of_length(rows);
     if columns.len() < 2 || rows < 2 {
         let what = "it has no two vectors of one length, which could be a recording's columns";
         return Err(refused(source, what));
     }
     let heads: Vec<ImportedColumn> = columns.iter().map(|(head, _)| head.clone()).collect();
-    let mut writer = FlightWriter::of(file, &heads)?;
+    if !is_named && !naming.has_names() {
+        notes.push(note_on_nameless(&heads));
+    }
+    let mut writer = naming.writer(source, file, &heads)?;
+    let heads = writer.heads.clone();
     let at_once = batch_rows(columns.len());
     for from in (0..rows).step_by(at_once) {
         let to = (from + at_once).min(rows);
