@@ -1,8 +1,8 @@
 //! Clock of a recording: the column that counts time, and its unit.
 
-use super::names::vocabulary::meanings;
+use super::names::vocabulary::{EXACT, meanings};
 use super::names::words::Spelling;
-use super::recording::{Recording, column_names};
+use super::recording::{Column, Recording, column_names};
 use crate::flight::signal;
 use crate::numerics::statistics::mean::finite_mean;
 use crate::numerics::statistics::order_statistics::{median, quantile};
@@ -38,6 +38,39 @@ pub fn find_clock(recordings: &[Recording]) -> Option<ClockColumn> {
     candidates
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, clock)| clock)
+}
+
+/// Column whose name is exactly that of time, and which does not rise evenly: its name with the reason in words. `None`
+/// if another column is a clock by its name.
+#[must_use]
+pub fn uneven_clock(recordings: &[Recording]) -> Option<String> {
+    let means_time = |name: &&str| {
+        let meanings = meanings(&Spelling::of(name));
+        // A name that only contains the word may be another time, such as that of an engine.
+        meanings.contains(&(signal::TIME, EXACT))
+    };
+    let names = column_names(recordings).into_iter().filter(means_time);
+    let names: Vec<&str> = names.collect();
+    if names.iter().any(|name| clock(recordings, name).is_some()) {
+        return None;
+    }
+    names.first().map(|name| {
+        let columns = recordings.iter().filter_map(|r| Some((r, r.column(name)?)));
+        let backwards = |(recording, column): (&Recording, &Column)| {
+            let steps = column.values.windows(2).map(|pair| pair[1] - pair[0]);
+            let is_back = |step: &f64| step.is_nan() || *step <= 0.0;
+            let rows = steps.clone().filter(is_back).count();
+            let first = steps.clone().position(|step| is_back(&step))?;
+            Some((recording.name.clone(), rows, steps.count(), first + 2))
+        };
+        let most = columns.filter_map(backwards).max_by_key(|found| found.1);
+        match most {
+            Some((file, rows, all, first)) => format!(
+                "`{name}` does not count time in {file}: it does not rise in {rows} of {all} steps, first in row {first}"
+            ),
+            None => format!("`{name}` does not count time: its steps are uneven"),
+        }
+    })
 }
 
 /// A column as a clock, with the weight of its name; `None` for a column that is no clock.
@@ -105,7 +138,6 @@ fn of_step(step: f64) -> Option<Unit> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::recording::Column;
     use super::*;
 
     /// Step of the clock that is found in rows of 40 Hz with a gap after every 800 rows, s.
@@ -129,6 +161,27 @@ mod tests {
             let found = step_s(gap_s).unwrap();
             assert!((found - 0.025).abs() < 1e-9, "{gap_s} s: {found}");
         }
+    }
+
+    #[test]
+    fn a_column_named_time_that_goes_backwards_is_named_with_its_row() {
+        let back = |k: i32| f64::from(if k < 250 { k } else { 500 - k });
+        let column = |name: &str, value: &dyn Fn(i32) -> f64| Column {
+            name: name.to_owned(),
+            stated: None,
+            values: (0..500).map(|k| 0.02 * value(k)).collect(),
+        };
+        let mut recording = Recording {
+            name: "f".to_owned(),
+            columns: vec![column("time", &back), column("q", &f64::from)],
+        };
+        let reason = uneven_clock(std::slice::from_ref(&recording)).unwrap();
+        assert!(
+            reason.contains("in f: it does not rise in 249 of 499 steps, first in row 252"),
+            "{reason}"
+        );
+        recording.columns.push(column("clock", &f64::from));
+        assert_eq!(uneven_clock(&[recording]), None);
     }
 
     #[test]

@@ -69,24 +69,42 @@ impl Grid {
         }
     }
 
-    /// Grid of the parts in which most columns change most, up to a number of samples.
+    /// Grid of the parts in which the columns change most, up to a number of samples. Each further part of changes of a
+    /// column counts less, so that no column is left out because others change elsewhere.
     #[must_use]
     pub fn liveliest(&self, most: usize) -> Grid {
         let total: usize = self.stretches.iter().map(Range::len).sum();
         if total <= most {
             return self.clone();
         }
-        let mut parts = self.parts();
-        let activity = self.activity(&parts);
-        let mut order: Vec<usize> = (0..parts.len()).collect();
-        order.sort_by(|a, b| activity[*b].total_cmp(&activity[*a]));
-        let mut kept = 0;
-        order.retain(|part| {
-            kept += parts[*part].len();
-            kept <= most
-        });
-        order.sort_unstable();
-        parts = order.into_iter().map(|part| parts[part].clone()).collect();
+        let parts = self.parts();
+        let shares = self.shares_of_change(&parts);
+        let mut covered = vec![0.0; shares.len()];
+        let mut left: Vec<usize> = (0..parts.len()).collect();
+        let (mut chosen, mut samples) = (Vec::new(), 0);
+        while !left.is_empty() {
+            let gain = |part: usize| {
+                let columns = shares.iter().zip(&covered);
+                let gains =
+                    columns.map(|(share, covered)| (covered + share[part]).sqrt() - covered.sqrt());
+                gains.sum::<f64>()
+            };
+            let gains = left.iter().map(|part| gain(*part)).enumerate();
+            let best = gains.max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
+            let Some(part) = best.map(|(at, _)| left.remove(at)) else {
+                break;
+            };
+            samples += parts[part].len();
+            if samples > most {
+                break;
+            }
+            for (covered, share) in covered.iter_mut().zip(&shares) {
+                *covered += share[part];
+            }
+            chosen.push(part);
+        }
+        chosen.sort_unstable();
+        let parts: Vec<Range<usize>> = chosen.into_iter().map(|part| parts[part].clone()).collect();
         self.cut(&parts)
     }
 
@@ -107,10 +125,10 @@ impl Grid {
         self.stretches.iter().flat_map(split).collect()
     }
 
-    /// Change of all columns in each part, each column in units of its change over all parts.
-    fn activity(&self, parts: &[Range<usize>]) -> Vec<f64> {
-        let mut activity = vec![0.0; parts.len()];
-        for values in self.columns.values() {
+    /// Change of each column in each part, in units of its change over all parts. Columns that do not change are left
+    /// out.
+    fn shares_of_change(&self, parts: &[Range<usize>]) -> Vec<Vec<f64>> {
+        let shares = |values: &Vec<f64>| {
             let changes = parts.iter().map(|part| {
                 let values = values.get(part.clone()).unwrap_or_default();
                 let steps = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
@@ -118,13 +136,10 @@ impl Grid {
             });
             let changes: Vec<f64> = changes.collect();
             let all: f64 = changes.iter().sum();
-            if all > 0.0 && all.is_finite() {
-                for (sum, change) in activity.iter_mut().zip(changes) {
-                    *sum += change / all;
-                }
-            }
-        }
-        activity
+            let changes_at_all = all > 0.0 && all.is_finite();
+            changes_at_all.then(|| changes.into_iter().map(|change| change / all).collect())
+        };
+        self.columns.values().filter_map(shares).collect()
     }
 
     fn cut(&self, parts: &[Range<usize>]) -> Grid {
@@ -196,6 +211,36 @@ fn fill(values: &mut [f64], longest: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_liveliest_parts_have_the_motion_of_each_column() {
+        // Three columns move in the first two minutes, one in the last.
+        let moves = |from: usize, to: usize| -> Vec<f64> {
+            let value = |k: usize| {
+                if (from..to).contains(&k) {
+                    (k as f64).sin()
+                } else {
+                    0.0
+                }
+            };
+            (0..1800).map(value).collect()
+        };
+        let mut grid = Grid {
+            step_s: 0.1,
+            stretches: vec![0..1800; 1],
+            columns: (0..3).map(|n| (format!("a{n}"), moves(0, 1200))).collect(),
+        };
+        grid.columns.insert("b".to_owned(), moves(1200, 1800));
+        let lively = grid.liveliest(1000);
+        assert!(lively.columns["b"].iter().any(|value| value.abs() > 0.1));
+        assert!(
+            lively.columns["a0"]
+                .iter()
+                .filter(|value| value.abs() > 0.0)
+                .count()
+                >= 600
+        );
+    }
 
     #[test]
     fn a_block_is_the_median_of_its_samples_and_short_gaps_are_filled() {

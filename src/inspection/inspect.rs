@@ -6,7 +6,7 @@ use super::channels::{
     constant_channel, input_unit, plain_channel, rounded, suffix, temperature_channel,
     time_channel, unless_shared, unless_unknown_unit,
 };
-use super::clock::find_clock;
+use super::clock::{find_clock, uneven_clock};
 use super::controls::inputs::{InputColumn, inputs, kind_of, rate};
 use super::controls::steps::{Excursions, InputActivity, steps};
 use super::findings::{Channel, Inspection, Role, Unused};
@@ -53,8 +53,15 @@ pub fn inspect(recordings: &[Recording]) -> Result<Inspection, String> {
 
 /// Inspects recordings column by column.
 fn inspect_columns(recordings: &[Recording]) -> Result<Inspection, String> {
-    let clock = find_clock(recordings).ok_or(
-        "no column counts time: one column must rise evenly from row to row, in s, ms, us or ns",
+    let clock = find_clock(recordings);
+    if clock.as_ref().is_none_or(|clock| !clock.is_sure)
+        && let Some(reason) = uneven_clock(recordings)
+    {
+        return Err(reason);
+    }
+    let clock = clock.ok_or(
+        "no column counts time: one column must rise evenly from row to row, in s, ms, us or ns; \
+         `harvest import` with `--step SECONDS` adds one to recordings of a constant step",
     )?;
     let grid = Grid::of(recordings, &clock);
     let facts = facts(recordings);

@@ -304,15 +304,86 @@ fn other_names_mean_the_same() {
 #[test]
 fn columns_without_names_are_found_by_their_motion() {
     let names: Vec<String> = truth().into_keys().collect();
-    let numbers: Vec<String> = (0..names.len()).map(|n| format!("CH{n:03}")).collect();
-    let pairs = names.iter().zip(&numbers);
-    let pairs: Vec<(&str, &str)> = pairs.map(|(a, b)| (a.as_str(), b.as_str())).collect();
-    let copy = Copy::new().renamed(&pairs).shuffled();
-    let found = copy.check(12);
-    for name in ["alpha_vane", "V", "q", "theta", "an"] {
-        let number = pairs.iter().find(|pair| pair.0 == name).unwrap().1;
-        let channel = found.channels.iter().find(|c| c.column == number);
-        assert!(channel.is_some_and(|c| c.is_sure), "{name}");
+    // `column_3` is what import calls a column of a text without a header.
+    for place in ["CH", "column_"] {
+        let numbers: Vec<String> = (0..names.len()).map(|n| format!("{place}{n}")).collect();
+        let pairs = names.iter().zip(&numbers);
+        let pairs: Vec<(&str, &str)> = pairs.map(|(a, b)| (a.as_str(), b.as_str())).collect();
+        let copy = Copy::new().renamed(&pairs).shuffled();
+        let found = copy.check(12);
+        for name in ["alpha_vane", "V", "q", "theta", "an"] {
+            let number = pairs.iter().find(|pair| pair.0 == name).unwrap().1;
+            let channel = found.channels.iter().find(|c| c.column == number);
+            assert!(channel.is_some_and(|c| c.is_sure), "{name} in {number}");
+        }
+    }
+}
+
+/// A copy whose names tell nothing, without some columns.
+fn nameless_without(names: &[&str]) -> Copy {
+    let copy = Copy::new().without(names);
+    let numbered = copy.truth.keys().enumerate();
+    let pairs: Vec<(String, String)> = numbered
+        .map(|(n, name)| (name.clone(), format!("c{n:02}")))
+        .collect();
+    let pairs: Vec<(&str, &str)> = pairs
+        .iter()
+        .map(|(a, b)| (a.as_str(), b.as_str()))
+        .collect();
+    copy.renamed(&pairs).shuffled()
+}
+
+#[test]
+fn a_flap_that_follows_the_angle_of_attack_is_not_taken_for_it() {
+    let (_, wrong, _) = nameless_without(&["alpha_vane"]).judged();
+    assert!(wrong.is_empty(), "wrong and sure: {wrong:#?}");
+}
+
+#[test]
+fn one_equation_does_not_confirm_two_columns_whose_names_mean_nothing() {
+    // Bank and its rate satisfy the equation of sideslip and yaw rate.
+    let (_, wrong, _) =
+        nameless_without(&["theta", "q", "r", "psi", "beta_vane", "alpha_vane"]).judged();
+    assert!(wrong.is_empty(), "wrong and sure: {wrong:#?}");
+}
+
+#[test]
+fn gravity_proposes_pitch_and_bank_of_a_recorder_without_names_and_heading() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/navion/flights");
+    let flights = archive::find(&root.display().to_string()).unwrap();
+    let read = |flight| unmapped_recording::first_rows(flight, 60_000).unwrap();
+    let mut recordings: Vec<Recording> = flights.iter().flat_map(read).collect();
+    let names = [
+        ("PITCH", "theta_deg"),
+        ("GYRO_Y", "q_deg_s"),
+        ("ROLL", "phi_deg"),
+        ("GYRO_X", "p_deg_s"),
+    ];
+    for column in recordings.iter_mut().flat_map(|r| &mut r.columns) {
+        let code = column
+            .name
+            .bytes()
+            .fold(7_u32, |h, b| (h * 31 + u32::from(b)) % 8191);
+        if column.name != "time" {
+            column.name = format!("X{code}");
+        }
+    }
+    let found = inspect(&recordings).unwrap();
+    for (name, signal) in names {
+        let code = name
+            .bytes()
+            .fold(7_u32, |h, b| (h * 31 + u32::from(b)) % 8191);
+        let own = found
+            .channels
+            .iter()
+            .find(|c| c.column == format!("X{code}"));
+        let own = own.unwrap_or_else(|| panic!("{name} has no signal"));
+        assert_eq!(
+            (own.signal.as_str(), own.is_sure),
+            (signal, false),
+            "{}",
+            own.evidence
+        );
     }
 }
 
@@ -721,6 +792,42 @@ fn a_required_signal_that_no_column_gives_is_a_question() {
         "{}",
         aircraft.text
     );
+}
+
+#[test]
+fn a_recorder_of_one_axis_is_not_asked_for_inertias_and_positions_of_the_other() {
+    let lateral = [
+        "beta_vane",
+        "p",
+        "r",
+        "phi",
+        "ay",
+        "psi",
+        "Ix",
+        "Iy",
+        "Iz",
+        "Ixz",
+    ];
+    let (inspection, _, _) = Copy::new().without(&lateral).judged();
+    let files = draft::files(&Draft {
+        name: "mine",
+        archive: "flights",
+        inspection: &inspection,
+    });
+    let mut files = files.iter();
+    let aircraft = &files
+        .find(|file| file.path == "aircraft.yaml")
+        .unwrap()
+        .text;
+    assert!(aircraft.contains("\n  iy_slug_ft2: FILL_IN"), "{aircraft}");
+    for absent in [
+        "ix_slug_ft2",
+        "iz_slug_ft2",
+        "ay: { x_ft: FILL_IN",
+        "beta_vane: { x_ft: FILL_IN",
+    ] {
+        assert!(!aircraft.contains(absent), "{absent} in\n{aircraft}");
+    }
 }
 
 #[test]

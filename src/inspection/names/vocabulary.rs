@@ -4,7 +4,7 @@ use super::words::Spelling;
 use crate::flight::signal;
 
 /// Weight of a name that is exactly one of the usual ones.
-const EXACT: f64 = 1.0;
+pub const EXACT: f64 = 1.0;
 /// Weight of a name that contains the words of a quantity among others.
 const CONTAINED: f64 = 0.6;
 
@@ -317,9 +317,15 @@ const INPUTS: &[InputWords] = &[
             &["timon"]]),
 ];
 
-/// Input that a name means.
+/// Input that a name means. `column 3` is a place in a table without names, and no control column.
 #[must_use]
 pub fn input(spelling: &Spelling) -> Option<Input> {
+    if let [word, number] = &spelling.words[..]
+        && word == "column"
+        && number.chars().all(|c| c.is_ascii_digit())
+    {
+        return None;
+    }
     let joined = spelling.joined();
     let is_derived = is_derived(spelling);
     let fits = |(_, names, words): &&(Input, &[&str], &[&[&str]])| {
@@ -422,6 +428,8 @@ mod tests {
             ("pedal", Some(Input::Pedals)),
             ("flap_deg", Some(Input::OtherSurface)),
             ("elevator_cmd", None),
+            ("control column", Some(Input::PitchStick)),
+            ("column_3", None),
             ("fuel", None),
         ] {
             assert_eq!(input(&Spelling::of(name)), kind, "{name}");

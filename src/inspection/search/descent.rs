@@ -103,13 +103,10 @@ impl Search<'_> {
         for equation in Equation::ALL {
             let needed = equation.quantities().0.iter().copied();
             let missing: Vec<Quantity> = needed.filter(|q| !assignment.contains_key(q)).collect();
-            let mut trials = vec![assignment.clone()];
-            for quantity in &missing {
-                trials = self.extended(&trials, *quantity);
-            }
-            if missing.is_empty() || trials.is_empty() || lacks_axis(&missing, assignment) {
+            if missing.is_empty() || lacks_axis(&missing, assignment) {
                 continue;
             }
+            let trials = self.extended(assignment, &missing, MOST_TRIALS);
             let fit = |trial: Assignment| Some((self.misfit(equation, &trial)?.ratio, trial));
             let mut fits: Vec<(f64, Assignment)> = trials.into_iter().filter_map(fit).collect();
             fits.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -133,18 +130,27 @@ impl Search<'_> {
         false
     }
 
-    /// Assignments with each choice of one more quantity; empty if there are too many.
-    fn extended(&self, assignments: &[Assignment], quantity: Quantity) -> Vec<Assignment> {
-        let mut extended = Vec::new();
-        for assignment in assignments {
-            for choice in self.choices(quantity, assignment) {
-                extended.push(with(assignment, [(quantity, choice)]));
+    /// Assignments with each choice of some more quantities; empty if there are more than `most`.
+    pub fn extended(
+        &self,
+        assignment: &Assignment,
+        missing: &[Quantity],
+        most: usize,
+    ) -> Vec<Assignment> {
+        let mut trials = vec![assignment.clone()];
+        for quantity in missing {
+            let mut extended = Vec::new();
+            for trial in &trials {
+                for choice in self.choices(*quantity, trial) {
+                    extended.push(with(trial, [(*quantity, choice)]));
+                }
+                if extended.len() > most {
+                    return Vec::new();
+                }
             }
-            if extended.len() > MOST_TRIALS {
-                return Vec::new();
-            }
+            trials = extended;
         }
-        extended
+        trials
     }
 
     /// Each quantity by the best name, each column once, in one of some units where that is possible.
@@ -219,7 +225,7 @@ impl Search<'_> {
 
     /// The assignment with the angles and rates of the longitudinal and the lateral axis in some units, where
     /// their columns may have them.
-    fn in_units(
+    pub fn in_units(
         &self,
         assignment: &Assignment,
         units: &[&str],

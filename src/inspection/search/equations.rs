@@ -171,6 +171,15 @@ impl Equation {
         }
     }
 
+    /// `true` for the equation of an attitude and its rate.
+    #[must_use]
+    pub fn is_of_attitude(self) -> bool {
+        matches!(
+            self,
+            Equation::PitchAttitude | Equation::RollAttitude | Equation::Heading
+        )
+    }
+
     /// `true` if the change is of an angle that wraps around.
     fn is_angle(self) -> bool {
         matches!(self, Equation::RollAttitude | Equation::Heading)

@@ -1,8 +1,8 @@
 //! Attitudes and rates with names outside the vocabulary: an attitude is nearly the integral of its rate.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
-use super::assignment::{Assignment, Choice, Search, with};
+use super::assignment::{Assignment, Choice, HOLDS, Search, with};
 use super::equations::Equation;
 use crate::inspection::quantity::Quantity;
 
@@ -13,6 +13,9 @@ const INTEGRAL_FIT: f64 = 0.3;
 const MOST_INTEGRALS: usize = 5;
 /// Cost by which every other order of attitudes and rates must be worse than the best.
 const ROTATION_LEAD: f64 = 2.0;
+/// Largest number of speeds and axial accelerations that are tried for a pitch attitude: those of 40 columns without
+/// units, in a second.
+const MOST_AXIAL_TRIALS: usize = 40_000;
 /// Attitudes with their rates.
 const AXES: [(Quantity, Quantity); 3] = [
     (Quantity::Theta, Quantity::Q),
@@ -47,18 +50,29 @@ impl Search<'_> {
             }
         }
         let best = best_of(ranked, &rotation);
-        let Some((best, leads)) = best.filter(|(best, leads)| *leads || self.all_hold(best)) else {
-            self.seed_without_heading(&integrals, assignment);
+        if let Some((best, true)) = &best {
+            assignment.clone_from(best);
+            return BTreeSet::new();
+        }
+        let proposed = self.seed_without_heading(&integrals, assignment);
+        if rotation.iter().any(|q| assignment.contains_key(q)) {
+            return proposed;
+        }
+        let Some((best, _)) = best.filter(|(best, _)| self.all_hold(best)) else {
             return BTreeSet::new();
         };
         *assignment = best;
-        let proposed = rotation.into_iter().filter(|_| !leads);
-        proposed.collect()
+        rotation.into_iter().collect()
     }
 
-    /// Adds pitch and bank with all rates, with names outside the vocabulary, where no heading is recorded and no other
-    /// columns fit nearly as well. Pitch and bank differ only by the terms of the yaw rate.
-    fn seed_without_heading(&self, integrals: &[(Choice, Choice)], assignment: &mut Assignment) {
+    /// Adds pitch and bank with all rates, with names outside the vocabulary, where no heading is recorded. Pitch and
+    /// bank differ only by the terms of the yaw rate. If other columns fit nearly as well, gravity decides: the axial
+    /// acceleration contains the sine of the pitch attitude. Returns what only gravity decides.
+    fn seed_without_heading(
+        &self,
+        integrals: &[(Choice, Choice)],
+        assignment: &mut Assignment,
+    ) -> BTreeSet<Quantity> {
         use Quantity::{P, Phi, Q, R, Theta};
         let orders = (0..integrals.len())
             .flat_map(|a| (0..integrals.len()).map(move |b| [a, b]))
@@ -82,10 +96,51 @@ impl Search<'_> {
                 }
             }
         }
-        let best = best_of(ranked, &[Theta, Q, Phi, P, R]);
-        if let Some((best, _)) = best.filter(|(best, leads)| *leads && self.all_hold(best)) {
-            *assignment = best;
+        ranked.retain(|(_, trial)| self.all_hold(trial));
+        let rotation = [Theta, Q, Phi, P, R];
+        match best_of(ranked.clone(), &rotation) {
+            Some((best, true)) => *assignment = best,
+            Some(_) => {
+                let pitch = [Theta, Q];
+                if let Some((best, true)) = best_of(self.with_gravity(ranked), &pitch) {
+                    *assignment = best;
+                    return rotation.into();
+                }
+            }
+            None => {}
         }
+        BTreeSet::new()
+    }
+
+    /// Assignments of a ranking with the cost of the axial equation, for the speed and acceleration that fit best. It is
+    /// computed once for each pitch attitude. Gravity also decides between degrees and radians.
+    fn with_gravity(&self, ranked: Vec<(f64, Assignment)>) -> Vec<(f64, Assignment)> {
+        let attitudes = [Quantity::Theta, Quantity::Phi];
+        let mut costs: BTreeMap<String, Option<f64>> = BTreeMap::new();
+        let mut found = Vec::new();
+        for (_, trial) in ranked {
+            for units in [["deg", "deg/s"], ["rad", "rad/s"]] {
+                let trial = self.in_units(&trial, &units, (true, true));
+                let pitch = format!("{:?}", trial.get(&Quantity::Theta));
+                let gravity = *costs
+                    .entry(pitch)
+                    .or_insert_with(|| self.axial_cost(&trial));
+                let cost = self.physical_cost(&trial, &attitudes);
+                found.extend(gravity.map(|gravity| (cost + gravity, trial)));
+            }
+        }
+        found
+    }
+
+    /// Least cost of the axial equation over all speeds and axial accelerations; `None` unless it holds.
+    fn axial_cost(&self, assignment: &Assignment) -> Option<f64> {
+        let missing = [Quantity::Velocity, Quantity::Ax];
+        let trials = self
+            .extended(assignment, &missing, MOST_AXIAL_TRIALS)
+            .into_iter();
+        let misfits = trials.filter_map(|trial| self.misfit(Equation::Forward, &trial));
+        let least = misfits.map(|misfit| misfit.ratio).reduce(f64::min)?;
+        (least <= HOLDS).then(|| least.ln())
     }
 
     /// Pairs of columns of which the first is the integral of the second, the best first.
