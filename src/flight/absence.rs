@@ -92,6 +92,8 @@ fn dispensable_where(signal: &str) -> Option<String> {
             signal::VELOCITY,
             signal::QBAR
         )),
+        signal::IX | signal::IZ => Some(format!("none of {} is recorded", list(&LATERAL))),
+        signal::IY => Some(format!("none of {} is recorded", list(&LONGITUDINAL))),
         _ if LATERAL.contains(&signal) => Some(format!("all of {} are given", list(&LONGITUDINAL))),
         _ if LONGITUDINAL.contains(&signal) => Some(format!("all of {} are given", list(&LATERAL))),
         _ => None,

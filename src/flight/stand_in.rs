@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::record::{Mark, Record, Series};
+use super::remaining_errors::{RemainingError, RemainingErrors};
 use super::signal as s;
 use crate::earth::air;
 use crate::numerics::bisection::last_that_holds;
@@ -18,6 +19,9 @@ pub enum StandIn {
     Value(f64),
     /// Mean of the recorded samples, in the signal's unit: for gaps of a signal that changes little.
     Mean(f64),
+    /// Mean of the recorded samples, in the signal's unit, with their standard deviation as the error that remains: for
+    /// gaps of a signal that changes.
+    Typical { mean: f64, deviation: f64 },
     /// V over the speed of sound. The air is that of the standard atmosphere, with the recorded
     /// temperature where there is one, here and in the following.
     MachOfVelocity,
@@ -31,9 +35,27 @@ pub enum StandIn {
     AltitudeOfPressure,
     /// Pitch attitude of level flight: θ = α.
     ThetaOfAlpha,
+    /// The moment of inertia about another axis, for the inertias of an axis without any state.
+    InertiaOf(Inertia),
     /// No value: the record is as if the signal were not recorded. For a signal that no equation of
     /// motion reads.
     Absent,
+}
+
+/// Moment of inertia that stands for another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Inertia {
+    Pitch,
+    Yaw,
+}
+
+impl Inertia {
+    fn signal(self) -> &'static str {
+        match self {
+            Inertia::Pitch => s::IY,
+            Inertia::Yaw => s::IZ,
+        }
+    }
 }
 
 /// States that only the lateral derivatives need. Without one of them the longitudinal equations
@@ -50,6 +72,7 @@ impl StandIn {
     #[must_use]
     pub fn of(signal: &str, has: impl Fn(&str) -> bool) -> Option<StandIn> {
         let has_all = |signals: &[&str]| signals.iter().all(|signal| has(signal));
+        let has_none = |signals: &[&str]| !signals.iter().any(|signal| has(signal));
         match signal {
             s::RPM_LEFT | s::RPM_RIGHT | s::THRUST | s::IXZ | s::AX | s::AY => {
                 Some(StandIn::Value(0.0))
@@ -64,6 +87,13 @@ impl StandIn {
             s::THETA if has_all(&LATERAL) => Some(StandIn::ThetaOfAlpha),
             s::Q if has_all(&LATERAL) => Some(StandIn::Value(0.0)),
             s::AN => Some(StandIn::Value(1.0)),
+            // Nothing turns about the axes of the other states, so the size has no effect.
+            s::IX | s::IZ => {
+                (has(s::IY) && has_none(&LATERAL)).then_some(StandIn::InertiaOf(Inertia::Pitch))
+            }
+            s::IY => {
+                (has(s::IZ) && has_none(&LONGITUDINAL)).then_some(StandIn::InertiaOf(Inertia::Yaw))
+            }
             lateral if LATERAL.contains(&lateral) => {
                 has_all(&LONGITUDINAL).then_some(StandIn::Value(0.0))
             }
@@ -82,6 +112,12 @@ impl StandIn {
                     rounded(value)
                 )
             }
+            StandIn::Typical { mean, deviation } => {
+                let (mean, deviation) = (rounded(mean), rounded(deviation));
+                format!(
+                    "is taken as {mean} ± {deviation}, its mean and scatter where it is recorded"
+                )
+            }
             StandIn::MachOfVelocity => "is computed from V in the standard atmosphere".to_owned(),
             StandIn::VelocityOfMach => "is computed from Mach and altitude".to_owned(),
             StandIn::VelocityOfPressure | StandIn::PressureOfVelocity => {
@@ -89,6 +125,7 @@ impl StandIn {
             }
             StandIn::AltitudeOfPressure => "is computed from V and q̄".to_owned(),
             StandIn::ThetaOfAlpha => "is taken as α, as in level flight".to_owned(),
+            StandIn::InertiaOf(inertia) => format!("is taken as `{}`", inertia.signal()),
             StandIn::Absent => "is left out".to_owned(),
         }
     }
@@ -97,12 +134,14 @@ impl StandIn {
     #[must_use]
     pub fn sources(self) -> &'static [&'static str] {
         match self {
-            StandIn::Value(_) | StandIn::Mean(_) | StandIn::Absent => &[],
+            StandIn::Value(_) | StandIn::Mean(_) | StandIn::Typical { .. } | StandIn::Absent => &[],
             StandIn::MachOfVelocity | StandIn::PressureOfVelocity => &[s::VELOCITY, s::ALTITUDE],
             StandIn::VelocityOfMach => &[s::MACH, s::ALTITUDE],
             StandIn::VelocityOfPressure => &[s::QBAR, s::ALTITUDE],
             StandIn::AltitudeOfPressure => &[s::VELOCITY, s::QBAR],
             StandIn::ThetaOfAlpha => &[s::ALPHA_VANE],
+            StandIn::InertiaOf(Inertia::Pitch) => &[s::IY],
+            StandIn::InertiaOf(Inertia::Yaw) => &[s::IZ],
         }
     }
 
@@ -112,13 +151,15 @@ impl StandIn {
         let [a, b] = [0, 1].map(|i| sources.get(i).copied().unwrap_or(f64::NAN));
         let air = |altitude_ft: f64| air(altitude_ft).at_temperature(kelvin);
         match self {
-            StandIn::Value(value) | StandIn::Mean(value) => value,
+            StandIn::Value(value) | StandIn::Mean(value) | StandIn::Typical { mean: value, .. } => {
+                value
+            }
             StandIn::MachOfVelocity => a / air(b).sound_ft_s,
             StandIn::VelocityOfMach => a * air(b).sound_ft_s,
             StandIn::VelocityOfPressure => (2.0 * a / air(b).density_slug_ft3).sqrt(),
             StandIn::PressureOfVelocity => 0.5 * air(b).density_slug_ft3 * a * a,
             StandIn::AltitudeOfPressure => altitude_ft(2.0 * b / (a * a), kelvin),
-            StandIn::ThetaOfAlpha => a,
+            StandIn::ThetaOfAlpha | StandIn::InertiaOf(_) => a,
             StandIn::Absent => f64::NAN,
         }
     }
@@ -133,6 +174,13 @@ impl StandIn {
             record
                 .signals
                 .insert(signal.to_owned(), Series::assumed(values));
+        }
+        if let StandIn::Typical { deviation, .. } = self {
+            let errors = RemainingErrors {
+                bias: Some(RemainingError::corrected(deviation)),
+                scale: None,
+            };
+            record.remaining_errors.insert(signal.to_owned(), errors);
         }
     }
 
@@ -245,9 +293,8 @@ fn altitude_ft(density_slug_ft3: f64, kelvin: f64) -> f64 {
 const FIRST: [&str; 2] = [s::VELOCITY, s::ALTITUDE];
 
 /// Signals whose gaps a stand-in fills. The states and outputs of the equations of motion are not among
-/// them: a maneuver needs their measurements. Neither is the thrust: without it the constant of CA is
-/// another one than that of the flight's other maneuvers.
-const WITH_FILLED_GAPS: [&str; 7] = [
+/// them: a maneuver needs their measurements.
+const WITH_FILLED_GAPS: [&str; 8] = [
     s::VELOCITY,
     s::ALTITUDE,
     s::MACH,
@@ -255,6 +302,7 @@ const WITH_FILLED_GAPS: [&str; 7] = [
     s::RPM_LEFT,
     s::RPM_RIGHT,
     s::IXZ,
+    s::THRUST,
 ];
 
 /// Signals of [`WITH_FILLED_GAPS`] that change little within a flight. In a gap their mean is
@@ -263,17 +311,20 @@ const NEARLY_CONSTANT: [&str; 3] = [s::RPM_LEFT, s::RPM_RIGHT, s::IXZ];
 
 /// Stand-ins in the gaps of recorded signals, in the order in which they are computed.
 /// `is_complete` is `true` for a signal that is given as a constant or recorded without a gap;
-/// `mean` returns the mean of a signal's finite samples.
+/// `mean_and_deviation` returns those of a signal's finite samples.
 #[must_use]
 pub fn gap_stand_ins(
     with_gaps: &[&str],
     is_complete: impl Fn(&str) -> bool,
-    mean: impl Fn(&str) -> Option<f64>,
+    mean_and_deviation: impl Fn(&str) -> Option<(f64, f64)>,
 ) -> Vec<(String, StandIn)> {
     let filled = WITH_FILLED_GAPS.iter().filter(|s| with_gaps.contains(s));
     let stand_in = |signal: &&str| {
         let stand_in = if NEARLY_CONSTANT.contains(signal) {
-            StandIn::Mean(mean(signal)?)
+            StandIn::Mean(mean_and_deviation(signal)?.0)
+        } else if *signal == s::THRUST {
+            let (mean, deviation) = mean_and_deviation(signal)?;
+            StandIn::Typical { mean, deviation }
         } else {
             StandIn::of(signal, &is_complete)?
         };
@@ -313,6 +364,9 @@ pub fn consequence_of_absence(signal: &str, has: impl Fn(&str) -> bool) -> &'sta
         }
         s::IXZ => {
             "roll and yaw are taken as uncoupled: Cl and Cn derivatives take a share of each other"
+        }
+        s::IX | s::IY | s::IZ => {
+            "nothing turns about the axes of the states that are not recorded, so it has no effect"
         }
         s::MACH => "tunnel tables over Mach are read at the standard atmosphere's",
         s::VELOCITY | s::QBAR => {
@@ -387,6 +441,27 @@ mod tests {
     }
 
     #[test]
+    fn an_axis_without_states_needs_no_inertia_of_its_own() {
+        let of = |signal: &str, missing: &[&str]| StandIn::of(signal, all_but(missing));
+        let lateral = [&LATERAL[..], &[s::IX, s::IZ]].concat();
+        let pitch = Some(StandIn::InertiaOf(Inertia::Pitch));
+        assert_eq!([s::IX, s::IZ].map(|ix| of(ix, &lateral)), [pitch; 2]);
+        let longitudinal = [&LONGITUDINAL[..], &[s::IY]].concat();
+        assert_eq!(
+            of(s::IY, &longitudinal),
+            Some(StandIn::InertiaOf(Inertia::Yaw))
+        );
+        // A state that is recorded turns the aircraft.
+        let with_p: Vec<&str> = lateral
+            .iter()
+            .copied()
+            .filter(|name| *name != s::P)
+            .collect();
+        assert_eq!(of(s::IX, &with_p), None);
+        assert_eq!(of(s::IX, &[&lateral[..], &[s::IY]].concat()), None);
+    }
+
+    #[test]
     fn an_acceleration_costs_its_own_derivatives_and_no_axis_while_the_states_are_recorded() {
         let all = [s::AN, s::AX, s::AY];
         for (absent, coefficient) in all.into_iter().zip(["CN", "CA", "CY"]) {
@@ -457,7 +532,7 @@ mod tests {
         (series.values[2], series.marks[2]) = (f64::NAN, Mark::Missing);
         let completion = Completion {
             stand_ins: vec![],
-            gaps: gap_stand_ins(&[signal], all_but(&[signal]), |_| Some(0.75)),
+            gaps: gap_stand_ins(&[signal], all_but(&[signal]), |_| Some((0.75, 0.25))),
         };
         (record, completion)
     }
@@ -485,6 +560,17 @@ mod tests {
     }
 
     #[test]
+    fn a_gap_of_the_thrust_leaves_its_scatter_as_an_error_of_the_maneuver() {
+        let (mut record, completion) = with_gap(s::THRUST);
+        completion.apply(&mut record, GapExtent::WholePart);
+        assert_eq!(record.signals[s::THRUST], Series::assumed(vec![0.75; 3]));
+        let bias = record.remaining_errors[s::THRUST].bias;
+        assert_eq!(bias, Some(RemainingError::corrected(0.25)));
+        let words = completion.gaps[0].1.in_words();
+        assert!(words.contains("0.75 ± 0.25"), "{words}");
+    }
+
+    #[test]
     fn a_part_without_a_gap_keeps_what_was_recorded() {
         let (mut record, completion) = with_gap(s::MACH);
         record = record.cut(None, 0..2);
@@ -496,10 +582,11 @@ mod tests {
     #[test]
     fn gaps_of_states_and_of_signals_without_a_complete_source_stay() {
         let stand_ins = |with_gaps: &[&str], incomplete: &[&str]| {
-            let stand_ins = gap_stand_ins(with_gaps, all_but(incomplete), |_| Some(-2000.0));
+            let stand_ins =
+                gap_stand_ins(with_gaps, all_but(incomplete), |_| Some((-2000.0, 90.0)));
             stand_ins.into_iter()
         };
-        let needed = [s::THETA, s::AN, s::MASS, s::THRUST];
+        let needed = [s::THETA, s::AN, s::MASS];
         assert_eq!(stand_ins(&needed, &needed).count(), 0);
         // Mach and V give each other.
         let neither = [s::MACH, s::VELOCITY, s::QBAR];

@@ -209,25 +209,30 @@ fn fill_gaps<'r>(
     let is_complete = |signal: &str| {
         is_recorded(signal) && !signals.contains(&signal) || context.constants.contains_key(signal)
     };
-    let mean = |signal: &str| mean_value(signal, clock.samples, read);
-    let gaps = gap_stand_ins(&signals, is_complete, mean);
+    let moments = |signal: &str| mean_and_deviation(signal, clock.samples, read);
+    let gaps = gap_stand_ins(&signals, is_complete, moments);
     let mut reports = with_gaps;
     reports.retain(|channel| gaps.iter().any(|(signal, _)| signal == channel.signal));
     (gaps, reports)
 }
 
-/// Mean of the samples of a signal with a value; `None` without any.
-fn mean_value(signal: &str, samples: usize, read: &RecordReader) -> Option<f64> {
+/// Mean and standard deviation of the samples of a signal with a value; `None` without any.
+fn mean_and_deviation(signal: &str, samples: usize, read: &RecordReader) -> Option<(f64, f64)> {
     let signals = BTreeSet::from([signal.to_owned()]);
-    let (mut sum, mut count) = (0.0, 0_usize);
-    for first in (0..samples).step_by(PART_SAMPLES) {
-        let part = read(&signals, first..(first + PART_SAMPLES).min(samples))?;
-        for value in part.values(signal)?.iter().filter(|v| v.is_finite()) {
-            sum += value;
-            count += 1;
+    let sum = |term: &dyn Fn(f64) -> f64| {
+        let (mut sum, mut count) = (0.0, 0_usize);
+        for first in (0..samples).step_by(PART_SAMPLES) {
+            let part = read(&signals, first..(first + PART_SAMPLES).min(samples))?;
+            for value in part.values(signal)?.iter().filter(|v| v.is_finite()) {
+                sum += term(*value);
+                count += 1;
+            }
         }
-    }
-    (count > 0).then(|| sum / count as f64)
+        (count > 0).then(|| sum / count as f64)
+    };
+    let mean = sum(&|value| value)?;
+    let variance = sum(&|value| (value - mean).powi(2))?;
+    Some((mean, variance.sqrt()))
 }
 
 /// Number of samples of a channel that have a value.

@@ -38,6 +38,12 @@ impl Refusal {
                     stand_in.in_words()
                 )
             }
+            Some((name, stand_in @ StandIn::Typical { .. })) => {
+                format!(
+                    "; `{name}` {}: the scatter is in the bounds of the derivatives",
+                    stand_in.in_words()
+                )
+            }
             Some((name, stand_in)) => format!("; `{name}` {}: {consequence}", stand_in.in_words()),
             None if signal::OPTIONAL.contains(&signal) => format!("; {consequence}"),
             None => String::new(),
@@ -87,7 +93,9 @@ impl Refusal {
         self.of_stage(ProblemStage::Ingest, flight_id)
     }
 
-    fn of_stage(self, stage: ProblemStage, flight_id: &str) -> Problem {
+    /// The problem of a flight or stretch at a stage.
+    #[must_use]
+    pub(super) fn of_stage(self, stage: ProblemStage, flight_id: &str) -> Problem {
         Problem {
             stage,
             flight_id: flight_id.to_owned(),

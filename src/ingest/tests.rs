@@ -1005,6 +1005,8 @@ fn a_clock_that_starts_anew_or_a_long_gap_makes_a_stretch_with_an_id_of_its_own(
         assert!(
             reasons(&stretches[0])[0].ends_with("what follows is a record of its own, `007.2`")
         );
+        // Nothing is rejected.
+        assert_eq!(stretches[0].problems[0].stage, ProblemStage::Recording);
         assert_eq!(reasons(&stretches[1]), Vec::<&str>::new());
     }
 }

@@ -14,7 +14,7 @@ use super::pieces::{Piece, PieceScanner, ScannedFile, UnusableRows};
 use super::sample_clock::{Clock, ClockBuilder};
 use super::stream::Stream;
 use super::time_channels::TimeChannels;
-use crate::error::Problem;
+use crate::error::{Problem, ProblemStage};
 use crate::flight::{Channel, signal::TIME};
 use crate::ingest::column_source::ColumnSource;
 use crate::ingest::refusal::Refusal;
@@ -259,10 +259,14 @@ impl<S: ColumnSource + ?Sized> Surveyor<'_, S> {
                 self.report_short_record(&flight_id, sequence);
             }
             if let Some(cause) = &sequence.cause {
-                self.report(Refusal {
+                // Nothing is rejected: recordings may hold several runs whose time starts again.
+                let refusal = Refusal {
                     place: format!("stretch `{flight_id}`"),
                     reason: format!("{cause}: what follows is a record of its own, `{flight_id}`"),
-                });
+                };
+                let flight_id = self.times.source.flight_id();
+                self.problems
+                    .push(refusal.of_stage(ProblemStage::Recording, flight_id));
             }
             let beside = other_clocks
                 .iter()

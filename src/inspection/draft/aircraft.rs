@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::contents::{Draft, OPEN, UNSURE, comment, scalar};
+use crate::flight::stand_in::{LATERAL, LONGITUDINAL};
 use crate::flight::{StandIn, signal};
 use crate::inspection::findings::Channel;
 use crate::inspection::quantity::Quantity;
@@ -19,7 +20,37 @@ pub fn text(draft: &Draft) -> String {
 
 fn geometry(draft: &Draft) -> String {
     let name = scalar(draft.name);
-    let point = format!("x_ft: {OPEN}, y_ft: {OPEN}, z_ft: {OPEN}");
+    let coordinates = |value: &str| format!("x_ft: {value}, y_ft: {value}, z_ft: {value}");
+    let sensor = |name: &str, signal: &str, factor: &str, effect: &str| {
+        let (point, effect) = if draft.has(signal) {
+            (coordinates(OPEN), effect)
+        } else {
+            (
+                coordinates("0"),
+                "no column was found: give the position with its channel",
+            )
+        };
+        format!("    {name}: {{ {point}{factor} }} # {effect}")
+    };
+    let [an, ax, ay] = [
+        ("an", signal::AN, "x times the pitch acceleration is in it"),
+        ("ax", signal::AX, "z times the pitch acceleration is in it"),
+        ("ay", signal::AY, "x times the yaw acceleration is in it"),
+    ]
+    .map(|(name, signal, effect)| sensor(name, signal, "", effect));
+    let [alpha_vane, beta_vane] = [
+        (
+            "alpha_vane",
+            signal::ALPHA_VANE,
+            "x q/V is in it; the factor scales the slopes over alpha",
+        ),
+        (
+            "beta_vane",
+            signal::BETA_VANE,
+            "x r/V is in it; the factor scales the slopes over beta",
+        ),
+    ]
+    .map(|(name, signal, effect)| sensor(name, signal, ", factor: 1", effect));
     format!(
         "\
 # The aircraft and its recorder, drafted by `harvest init` from the recording. Every {OPEN} is a question: put the value in
@@ -36,12 +67,12 @@ aircraft:
   # Positions: ft aft (x), right (y) and above (z) of any reference point; those of the centre of gravity count from the
   # same point. Where a position is not known, give the centre of gravity's: the sensor then counts as mounted there.
   sensors:
-    an: {{ {point} }} # x times the pitch acceleration is in it
-    ax: {{ {point} }} # z times the pitch acceleration is in it
-    ay: {{ {point} }} # x times the yaw acceleration is in it
+{an}
+{ax}
+{ay}
     # A vane reads its factor times the local angle (upwash, sidewash): 1 where that is not known, or for a computed angle.
-    alpha_vane: {{ {point}, factor: 1 }} # x q/V is in it; the factor scales the slopes over alpha
-    beta_vane: {{ {point}, factor: 1 }} # x r/V is in it; the factor scales the slopes over beta
+{alpha_vane}
+{beta_vane}
 
 ",
         draft_name = draft.name
@@ -166,6 +197,17 @@ const NOT_RECORDED: [(&str, &str, &str); 7] = [
     (signal::Z_CG, "0", "as x"),
 ];
 
+/// `true` for an inertia about an axis of which no state is recorded, beside states of the other axis.
+fn has_no_effect(inertia: &str, draft: &Draft) -> bool {
+    let mut states = LATERAL.iter().chain(&LONGITUDINAL);
+    if !states.any(|state| draft.has(state)) {
+        return false;
+    }
+    let is_given = |name: &str| NOT_RECORDED.iter().any(|(given, _, _)| *given == name);
+    let stand_in = StandIn::of(inertia, |name| draft.has(name) || is_given(name));
+    matches!(stand_in, Some(StandIn::InertiaOf(_)))
+}
+
 /// Required signals that neither a column gives nor a stand-in, each with the place where it matters.
 /// An altitude that is asked for makes the stand-ins of other air data possible.
 fn asked(draft: &Draft) -> Vec<(&'static str, &'static str)> {
@@ -206,7 +248,7 @@ fn question(signal: &str) -> &'static str {
 fn constants(draft: &Draft) -> String {
     let mut lines = String::new();
     for (name, value, effect) in NOT_RECORDED {
-        if !draft.has(name) {
+        if !draft.has(name) && !has_no_effect(name, draft) {
             let _ = writeln!(lines, "  {name}: {value} # {effect}");
         }
     }
@@ -347,7 +389,9 @@ fn instruments(draft: &Draft) -> String {
     });
     let surfaces = draft.inputs().filter(|(_, input)| input.kind.is_surface());
     let of_surfaces = surfaces.map(|(channel, _)| OF_SURFACES.line(&channel.signal));
-    let constant = OF_CONSTANTS.iter().filter(|(name, _)| !draft.has(name));
+    let constant = OF_CONSTANTS
+        .iter()
+        .filter(|(name, _)| !draft.has(name) && !has_no_effect(name, draft));
     let of_constants = constant.map(|(name, errors)| errors.line(name));
     let lines: String = of_signals.chain(of_surfaces).chain(of_constants).collect();
     let map = if lines.is_empty() { " {}\n" } else { "\n" };
