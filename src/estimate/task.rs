@@ -52,9 +52,11 @@ impl<'a> Task<'a> {
         let stated = stated.copied().unwrap_or_default();
         let remaining = self.record.remaining_errors.get(signal);
         let remaining = remaining.copied().unwrap_or_default();
+        // The calibration of an instrument does not apply to an assumed value.
+        let is_assumed = self.record.is_assumed(signal);
         let size = |remaining: Option<RemainingError>, stated: f64| {
-            let is_stated = (stated > 0.0).then_some(stated);
-            remaining.map_or(stated, |error| error.root_mean_square(is_stated))
+            let calibration = (stated > 0.0 && !is_assumed).then_some(stated);
+            remaining.map_or(stated, |error| error.root_mean_square(calibration))
         };
         Calibration {
             bias: size(remaining.bias, stated.bias),

@@ -40,16 +40,6 @@ impl RemainingError {
         }
     }
 
-    /// Error of an assumed value that no instrument has read. The estimate contradicts every calibration, so that none
-    /// of the instrument lessens the error.
-    #[must_use]
-    pub fn of_assumed_value(deviation: f64) -> RemainingError {
-        RemainingError {
-            estimate: f64::MAX,
-            ..RemainingError::corrected(deviation)
-        }
-    }
-
     /// Root mean square of the error. Calibration may state a standard deviation σ of the recorded
     /// signal's error.
     ///

@@ -177,7 +177,7 @@ impl StandIn {
         }
         if let StandIn::Typical { deviation, .. } = self {
             let errors = RemainingErrors {
-                bias: Some(RemainingError::of_assumed_value(deviation)),
+                bias: Some(RemainingError::corrected(deviation)),
                 scale: None,
             };
             record.remaining_errors.insert(signal.to_owned(), errors);
@@ -565,11 +565,7 @@ mod tests {
         completion.apply(&mut record, GapExtent::WholePart);
         assert_eq!(record.signals[s::THRUST], Series::assumed(vec![0.75; 3]));
         let bias = record.remaining_errors[s::THRUST].bias;
-        // What calibration states of the instrument does not apply to the mean.
-        for stated in [None, Some(0.01)] {
-            let size = bias.map_or(f64::NAN, |bias| bias.root_mean_square(stated));
-            assert_relative_eq!(size, 0.25);
-        }
+        assert_eq!(bias, Some(RemainingError::corrected(0.25)));
         let words = completion.gaps[0].1.in_words();
         assert!(words.contains("0.75 ± 0.25"), "{words}");
     }

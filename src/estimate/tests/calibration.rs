@@ -82,6 +82,28 @@ fn an_error_that_the_flight_determines_replaces_the_stated_one() {
 }
 
 #[test]
+fn the_calibration_of_an_instrument_does_not_apply_to_an_assumed_value() {
+    let part = |scale_pct: f64| {
+        let stated = Calibration {
+            bias: 0.0,
+            scale_pct,
+        };
+        let bench = calibrated(&[(signal::QBAR, stated)]);
+        let mut record = bench.flown(5, 1.0, 0.0);
+        let series = record.signals.get_mut(signal::QBAR).unwrap();
+        *series = Series::assumed(series.values.clone());
+        let errors = RemainingErrors {
+            bias: None,
+            scale: Some(RemainingError::corrected(0.002)),
+        };
+        record.remaining_errors = [(signal::QBAR.to_owned(), errors)].into();
+        let estimated = bench.estimate(&record, &maneuver("m", 20.0));
+        row(&estimated, "Cm_de").bound_calibration.unwrap()
+    };
+    assert_relative_eq!(part(0.01), part(1.0), max_relative = 1e-9);
+}
+
+#[test]
 fn a_bias_without_calibration_has_a_prior_where_the_flight_determines_it() {
     let mut bench = calibrated(&[]);
     bench.settings.ordinary_bias = [(Output::An, 1e-4)].into();
