@@ -200,12 +200,12 @@ fn a_reversed_sign_is_found_by_the_kinematics() {
     record_is_refused(&reversed, "`r`", &["`r`: its sign is reversed"]);
 }
 
-/// A healthy flight whose file was spoiled in a way that costs it little: it is a flight still, and
-/// the only problem says all of `words`.
-fn is_repaired_and_named(record: &RecordBatch, words: &[&str]) -> Campaign {
+/// A healthy flight whose file was spoiled in a way that costs it little: it is a flight still, the
+/// run ends with `code`, and the only problem says all of `words`.
+fn is_repaired_and_named(record: &RecordBatch, code: i32, words: &[&str]) -> Campaign {
     let campaign = Campaign::new();
     campaign.add("spoiled", record);
-    campaign.ends("ingest", 2);
+    campaign.ends("ingest", code);
     let problems = campaign.table("problems");
     assert_eq!(problems.len(), 1, "{problems:?}");
     for word in words {
@@ -234,8 +234,10 @@ fn time_that_starts_anew_begins_a_stretch_and_is_reported_with_its_place() {
         "time",
         |row, t| if row >= 1000 { t - 10.0 } else { t },
     );
+    // Nothing is rejected.
     let campaign = is_repaired_and_named(
         &back,
+        0,
         &["time jumps back from", "in row 1001 of ", "`spoiled.2`"],
     );
     let ids: Vec<String> = lengths(&campaign).into_iter().map(|l| l.0).collect();
@@ -267,7 +269,7 @@ fn rows_with_a_time_that_cannot_be_are_left_out_and_named() {
         "time",
         |row, t| if row == 1000 { times[999] } else { t },
     );
-    is_repaired_and_named(&still, &["time stands still in 1 rows", "row 1001"]);
+    is_repaired_and_named(&still, 2, &["time stands still in 1 rows", "row 1001"]);
     let hole = with_values(
         &record,
         "time",
@@ -275,6 +277,7 @@ fn rows_with_a_time_that_cannot_be_are_left_out_and_named() {
     );
     is_repaired_and_named(
         &hole,
+        2,
         &["1 rows have a time that is not a number", "row 1001"],
     );
 }
