@@ -50,20 +50,18 @@ impl RemainingError {
     #[must_use]
     pub fn root_mean_square(self, stated: Option<f64>) -> f64 {
         let variance = self.bound.powi(2);
-        let stated_variance = stated.unwrap_or(f64::INFINITY).powi(2);
-        let agrees = self.estimate.powi(2) <= AGREEMENT.powi(2) * (stated_variance + variance);
-        let share = if stated_variance.is_finite() && agrees {
-            stated_variance / (stated_variance + variance)
-        } else {
-            1.0
-        };
+        let agrees = |prior: &f64| self.estimate.powi(2) <= AGREEMENT.powi(2) * (prior + variance);
+        let share = stated
+            .map(|sigma| sigma.powi(2))
+            .filter(agrees)
+            .map_or(1.0, |prior| prior / (prior + variance));
         let removed = if self.is_corrected {
             self.estimate
         } else {
             0.0
         };
         let mean = share * self.estimate - removed;
-        let scatter = self.scatter.min(stated.unwrap_or(f64::INFINITY));
+        let scatter = stated.map_or(self.scatter, |sigma| self.scatter.min(sigma));
         (share * variance + mean.powi(2) + scatter.powi(2)).sqrt()
     }
 }
