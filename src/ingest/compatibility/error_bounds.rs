@@ -12,8 +12,10 @@ use super::window_fit::{Squares, squares_about_mean};
 use crate::flight::signal;
 use crate::numerics::statistics::student;
 
-/// Relative error of the equations themselves: the accuracy of gravity, arms and positions.
-pub const MODEL_SCALE: f64 = 0.002;
+/// Relative error of the equations themselves. Gravity and positions are right to some 10⁻⁴. An arm
+/// that is half an inch wrong adds 0.001 g at an angular acceleration of 1 rad/s², where the maneuvers
+/// change the force by about 1 g.
+pub const MODEL_SCALE: f64 = 0.001;
 
 /// Assumed fraction of a vane's residual that correlates with the fitted motion, and with its rate.
 /// The aircraft turns into a gust at once and with a delay. The correlated part therefore resembles
