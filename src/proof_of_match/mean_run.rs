@@ -79,24 +79,17 @@ impl MeanRun {
         let flown = mean.len().min(self.run.outputs.len());
         let mut deficiency = vec![[0.0; COUNT]; mean.len()];
         for output in 0..COUNT {
-            let (mut observed, mut explained) = (0.0, 0.0);
-            for (sample, computed) in mean[..flown].iter().enumerate() {
-                let recorded = sample * self.stride;
-                if recording.repaired[recorded][output] {
-                    continue;
-                }
-                let difference = recording.measured[recorded][output] - computed[output];
+            let counted = (0..flown).filter(|k| !recording.repaired[k * self.stride][output]);
+            let mut observed = 0.0;
+            for sample in counted.clone() {
+                let difference =
+                    recording.measured[sample * self.stride][output] - mean[sample][output];
                 deficiency[sample][output] = difference;
                 observed += difference * difference;
-                explained += self.variance((output, sample), roots)
-                    + recording.noise[output] * recording.noise[output];
             }
-            let limit = EXPLAINED_DEVIATIONS * EXPLAINED_DEVIATIONS * explained;
-            let share = if observed > limit {
-                1.0 - limit / observed
-            } else {
-                0.0
-            };
+            let noise = recording.noise[output] * recording.noise[output];
+            let variances = counted.map(|sample| self.variance((output, sample), roots) + noise);
+            let share = unexplained_share(observed, variances);
             for own in &mut deficiency {
                 own[output] *= share;
             }
@@ -117,6 +110,24 @@ impl MeanRun {
             .zip(roots)
             .map(of_kind)
             .sum()
+    }
+}
+
+/// Share of the observed mean square beyond what the variances explain. The sum of the variances
+/// ends where it explains all: no later one makes it smaller.
+fn unexplained_share(observed: f64, variances: impl Iterator<Item = f64>) -> f64 {
+    let (mut explained, mut limit) = (0.0, 0.0);
+    for variance in variances {
+        explained += variance;
+        limit = EXPLAINED_DEVIATIONS * EXPLAINED_DEVIATIONS * explained;
+        if observed <= limit {
+            return 0.0;
+        }
+    }
+    if observed > limit {
+        1.0 - limit / observed
+    } else {
+        0.0
     }
 }
 

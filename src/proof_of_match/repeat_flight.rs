@@ -10,8 +10,9 @@
 //! A flight may differ from the mean by more than these parts explain. A derivative may vary in a
 //! way that the posterior smooths, or the equations may lack an effect. This *deficiency* belongs
 //! to the aircraft, so a repeat flight shows it again.
+#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 
 use super::dutch_roll::{DutchRoll, LateralModes};
 use super::free_run::{FreeRun, Simulation};
@@ -27,6 +28,8 @@ use crate::model::LocalPosterior;
 use crate::numerics::linear_algebra::root::continuous_root;
 use crate::numerics::statistics::normal;
 use crate::numerics::statistics::random::RandomStream;
+use crate::numerics::vectors::lanes::Lanes;
+use crate::numerics::vectors::simd::{AlignedBuffer, VECTOR};
 
 /// Seed of the draws.
 const SEED: u64 = 60;
@@ -158,18 +161,20 @@ impl Repeats {
         });
         let repeat = Repeat {
             repeats: self,
-            judged,
-            limits: limits.collect(),
             simulated,
             bias: self.bias(&simulated.run),
         };
+        let pairs = judged.iter().zip(limits);
+        let inside: Vec<Vec<f64>> = pairs
+            .map(|(own, limits)| repeat.inside(&own.tolerance, limits.as_ref()))
+            .collect();
         let count = self.draws.len() as f64;
-        for draw in &self.draws {
-            let drawn = repeat.probabilities(draw);
-            for (sum, inside) in sums.tolerances.iter_mut().zip(&drawn.tolerances) {
+        for draw in 0..self.draws.len() {
+            let tolerances: Vec<f64> = inside.iter().map(|own| own[draw]).collect();
+            for (sum, inside) in sums.tolerances.iter_mut().zip(&tolerances) {
                 *sum += inside / count;
             }
-            sums.all_requirements += drawn.all_requirements / count;
+            sums.all_requirements += of_all_requirements(judged, &tolerances) / count;
         }
         sums.clamped()
     }
@@ -186,52 +191,108 @@ impl Repeats {
         })
     }
 
-    /// Drawn differences of one output at every `stride`-th sample.
-    fn drawn(&self, bias: &Histories, deviations: &[f64], output: usize) -> Vec<f64> {
-        let mut drawn = bias[output].clone();
-        Arch::new().dispatch(|| {
-            for (slopes, deviation) in self.slopes.iter().zip(deviations) {
-                for (sum, slope) in drawn.iter_mut().zip(&slopes[output]) {
-                    *sum += deviation * slope;
+    /// Slopes of one output: parameter by parameter, each sample. Zeros fill the last vector.
+    fn slopes_of(&self, output: usize) -> AlignedBuffer {
+        let width = self.width();
+        let mut slopes = AlignedBuffer::zeros(self.slopes.len() * width);
+        let rows = slopes.slice_mut().chunks_exact_mut(width);
+        for (row, own) in rows.zip(&self.slopes) {
+            row[..own[output].len()].copy_from_slice(&own[output]);
+        }
+        slopes
+    }
+
+    /// Number of the samples, padded to whole vectors.
+    fn width(&self) -> usize {
+        self.expected.len().next_multiple_of(VECTOR)
+    }
+}
+
+/// Draws whose differences are summed side by side: one sum would wait for itself.
+const SIDE_BY_SIDE: usize = 4;
+
+/// Differences of some draws from a model's run, at the samples of one output.
+struct DrawnDifferences<'a> {
+    /// Difference of the expected repeat flight at each sample.
+    bias: &'a [f64],
+    /// Slopes, parameter by parameter.
+    slopes: &'a [f64],
+    /// Deviations of each parameter.
+    deviations: &'a [[f64; SIDE_BY_SIDE]],
+    /// Draw by draw, each sample.
+    drawn: &'a mut [f64],
+}
+
+impl WithSimd for DrawnDifferences<'_> {
+    type Output = ();
+
+    #[expect(
+        clippy::needless_range_loop,
+        reason = "an iterator's functions are not inlined"
+    )]
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let width = self.bias.len();
+        for sample in (0..width).step_by(S::F64_LANES) {
+            let mut sums = [Lanes::load(simd, self.bias, sample); SIDE_BY_SIDE];
+            for parameter in 0..self.deviations.len() {
+                let slope = Lanes::load(simd, self.slopes, parameter * width + sample);
+                for draw in 0..SIDE_BY_SIDE {
+                    sums[draw] = sums[draw] + slope * self.deviations[parameter][draw];
                 }
             }
-        });
-        drawn
+            for draw in 0..SIDE_BY_SIDE {
+                sums[draw].store(self.drawn, draw * width + sample);
+            }
+        }
     }
+}
+
+/// Deviations of some draws, parameter by parameter; zeros in place of absent draws.
+fn side_by_side(draws: &[Draw]) -> Vec<[f64; SIDE_BY_SIDE]> {
+    let count = draws.first().map_or(0, |draw| draw.deviations.len());
+    let of = |parameter: usize| {
+        std::array::from_fn(|draw| draws.get(draw).map_or(0.0, |own| own.deviations[parameter]))
+    };
+    (0..count).map(of).collect()
 }
 
 /// Repeat flights compared with one model's simulation.
 struct Repeat<'a> {
     repeats: &'a Repeats,
-    judged: &'a [Judged<'a>],
-    /// Limits of each tolerance; `None` for one of the Dutch roll.
-    limits: Vec<Option<SampleLimits>>,
     simulated: &'a Simulated,
     bias: Histories,
 }
 
 impl Repeat<'_> {
-    /// Probabilities of one aircraft and start, over the sensors' noise.
-    fn probabilities(&self, draw: &Draw) -> Probabilities {
-        let repeats = self.repeats;
-        let inside = |(own, limits): (&Judged, &Option<SampleLimits>)| match limits {
-            None => f64::from(u8::from(self.meets(draw.dutch_roll, &own.tolerance))),
-            Some(limits) => {
-                limits.inside(&repeats.drawn(&self.bias, &draw.deviations, limits.output))
-            }
+    /// Probability of each draw that it meets a tolerance, over the sensors' noise. A tolerance of the
+    /// Dutch roll has no limits of samples.
+    fn inside(&self, tolerance: &Tolerance, limits: Option<&SampleLimits>) -> Vec<f64> {
+        let draws = &self.repeats.draws;
+        let Some(limits) = limits else {
+            let meets = |draw: &Draw| self.meets(draw.dutch_roll, tolerance);
+            return draws
+                .iter()
+                .map(|d| f64::from(u8::from(meets(d))))
+                .collect();
         };
-        let tolerances: Vec<f64> = self.judged.iter().zip(&self.limits).map(inside).collect();
-        let mut all_requirements = 1.0;
-        let mut rest = tolerances.as_slice();
-        for requirement in self.judged.chunk_by(Judged::is_alternative) {
-            let (own, others) = rest.split_at(requirement.len());
-            all_requirements *= 1.0 - own.iter().map(|inside| 1.0 - inside).product::<f64>();
-            rest = others;
+        let slopes = self.repeats.slopes_of(limits.output);
+        let mut bias = self.bias[limits.output].clone();
+        let width = self.repeats.width();
+        bias.resize(width, 0.0);
+        let mut drawn = AlignedBuffer::zeros(SIDE_BY_SIDE * width);
+        let mut inside = Vec::with_capacity(draws.len());
+        for draws in draws.chunks(SIDE_BY_SIDE) {
+            Arch::new().dispatch(DrawnDifferences {
+                bias: &bias,
+                slopes: slopes.slice(),
+                deviations: &side_by_side(draws),
+                drawn: drawn.slice_mut(),
+            });
+            let drawn = drawn.slice().chunks_exact(width).take(draws.len());
+            inside.extend(drawn.map(|drawn| limits.inside(drawn)));
         }
-        Probabilities {
-            tolerances,
-            all_requirements,
-        }
+        inside
     }
 
     /// `true` if the model's Dutch roll is within the tolerance of a repeat flight's.
@@ -243,22 +304,46 @@ impl Repeat<'_> {
     }
 }
 
+/// Probability that all requirements are met, from those of the tolerances. One of a requirement's
+/// alternatives must be met.
+fn of_all_requirements(judged: &[Judged], tolerances: &[f64]) -> f64 {
+    let mut all_requirements = 1.0;
+    let mut rest = tolerances;
+    for requirement in judged.chunk_by(Judged::is_alternative) {
+        let (own, others) = rest.split_at(requirement.len());
+        all_requirements *= 1.0 - own.iter().map(|inside| 1.0 - inside).product::<f64>();
+        rest = others;
+    }
+    all_requirements
+}
+
 /// Limits of a tolerance at the samples that count.
 struct SampleLimits {
     output: usize,
     noise: f64,
     /// Samples that may be outside.
     allowed: usize,
+    intervals: Vec<Interval>,
+}
+
+/// Samples between two samples of the effects.
+struct Interval {
+    /// Samples of the effects on either side.
+    ends: [usize; 2],
+    least_width: f64,
     samples: Vec<SampleLimit>,
 }
 
 /// Limit at one sample.
 struct SampleLimit {
     width: f64,
-    /// Samples of the effects on either side of this one, and its fractional position between them.
-    between: [usize; 2],
+    /// Fractional position in the interval.
     share: f64,
 }
+
+/// Size of a value between two others, over the larger of their sizes: one, and more than the rounding
+/// errors of its computation.
+const BETWEEN: f64 = 1.0 + 1e-12;
 
 impl SampleLimits {
     fn new(
@@ -270,16 +355,25 @@ impl SampleLimits {
         let last = recording.samples.div_ceil(stride).saturating_sub(1);
         let limit = |sample: usize| SampleLimit {
             width: tolerance.width(recording.measured[sample][output]),
-            between: [sample / stride, (sample / stride + 1).min(last)],
             share: (sample % stride) as f64 / stride as f64,
         };
-        let counted = (0..recording.samples).filter(|k| !recording.repaired[*k][output]);
-        let samples: Vec<SampleLimit> = counted.map(limit).collect();
+        let interval = |first: usize| {
+            let samples = first * stride..((first + 1) * stride).min(recording.samples);
+            let counted = samples.filter(|k| !recording.repaired[*k][output]);
+            let samples: Vec<SampleLimit> = counted.map(limit).collect();
+            Interval {
+                ends: [first, (first + 1).min(last)],
+                least_width: samples.iter().map(|own| own.width).fold(f64::MAX, f64::min),
+                samples,
+            }
+        };
+        let intervals: Vec<Interval> = (0..=last).map(interval).collect();
+        let counted = intervals.iter().map(|own| own.samples.len()).sum();
         SampleLimits {
             output,
             noise: recording.noise[output],
-            allowed: allowed_outside(samples.len(), required_pct),
-            samples,
+            allowed: allowed_outside(counted, required_pct),
+            intervals,
         }
     }
 
@@ -288,22 +382,24 @@ impl SampleLimits {
         let noise = self.noise;
         let mut outside = 0;
         let mut doubtful = Vec::new();
-        for SampleLimit {
-            width,
-            between,
-            share,
-        } in &self.samples
-        {
-            let [a, b] = between.map(|k| drawn[k]);
-            let difference = a + share * (b - a);
-            let margin = width - difference.abs();
-            if margin < -CERTAIN * noise {
-                outside += 1;
-                if outside > self.allowed {
-                    return 0.0;
+        for interval in &self.intervals {
+            let [first, last] = interval.ends;
+            let (a, b) = (drawn[first], drawn[last]);
+            let largest = BETWEEN * a.abs().max(b.abs());
+            if interval.least_width - largest >= CERTAIN * noise {
+                continue;
+            }
+            for SampleLimit { width, share } in &interval.samples {
+                let difference = a + share * (b - a);
+                let margin = width - difference.abs();
+                if margin < -CERTAIN * noise {
+                    outside += 1;
+                    if outside > self.allowed {
+                        return 0.0;
+                    }
+                } else if margin < CERTAIN * noise {
+                    doubtful.push((*width, difference));
                 }
-            } else if margin < CERTAIN * noise {
-                doubtful.push((*width, difference));
             }
         }
         let inside = doubtful.into_iter();
