@@ -132,6 +132,14 @@ pub struct SimulationTrim {
     pub alpha_deg: f64,
 }
 
+impl SimulationTrim {
+    /// Coefficients from their change relative to the trim.
+    #[must_use]
+    pub fn plus(&self, change: [f64; COEFFICIENTS]) -> [f64; COEFFICIENTS] {
+        std::array::from_fn(|i| self.coefficients[i] + change[i])
+    }
+}
+
 impl<'a> Aerodynamics<'a> {
     #[must_use]
     pub fn new(
@@ -217,6 +225,10 @@ pub struct TrimmedAerodynamics<'a> {
     factors: Vec<&'a Factor>,
     /// Values of the factors at the present instant.
     values: Vec<f64>,
+    /// Slopes of the factors along the flow at the present instant.
+    slopes: Vec<FlowSlopes>,
+    /// Slope of each derivative's coefficient along the derivative at the present instant.
+    by_derivative: Vec<f64>,
     has_alpha_rate: bool,
     trim_alpha_deg: f64,
 }
@@ -264,6 +276,8 @@ impl<'a> TrimmedAerodynamics<'a> {
             table,
             terms,
             values: vec![0.0; factors.len()],
+            slopes: vec![[0.0; FLOW]; factors.len()],
+            by_derivative: vec![0.0; table.derivatives()],
             has_alpha_rate: aerodynamics.has_alpha_rate,
             factors,
             trim_alpha_deg: trim.alpha_deg,
@@ -279,14 +293,14 @@ impl<'a> TrimmedAerodynamics<'a> {
     /// Change of the coefficients from the trim.
     #[must_use]
     pub fn change(&mut self, flow: &AeroInputs, recorded: &[f64]) -> [f64; COEFFICIENTS] {
-        for (value, factor) in self.values.iter_mut().zip(&self.factors) {
-            *value = factor.value(flow, recorded);
+        for (place, factor) in self.factors.iter().enumerate() {
+            self.values[place] = factor.value(flow, recorded);
         }
         let entries = self.table.entries(self.table.position_of(flow.alpha_deg));
         let mut change = [0.0; COEFFICIENTS];
-        for (sum, terms) in change.iter_mut().zip(&self.terms) {
+        for (coefficient, terms) in self.terms.iter().enumerate() {
             for term in terms {
-                *sum += if term.is_along_alpha {
+                change[coefficient] += if term.is_along_alpha {
                     entries.integral(term.derivative) - term.at_trim
                 } else {
                     entries.value(term.derivative) * (self.values[term.factor] - term.at_trim)
@@ -299,44 +313,48 @@ impl<'a> TrimmedAerodynamics<'a> {
     /// Change of the coefficients from the trim, with its slopes along the flow and along each
     /// derivative. A derivative is raised by the same amount at every angle of attack.
     #[must_use]
-    pub fn change_with_slopes(&mut self, flow: &AeroInputs, recorded: &[f64]) -> CoefficientSlopes {
+    pub fn change_with_slopes(
+        &mut self,
+        flow: &AeroInputs,
+        recorded: &[f64],
+    ) -> CoefficientSlopes<'_> {
         let change = self.change(flow, recorded);
         let entries = self.table.entries(self.table.position_of(flow.alpha_deg));
-        let along = self.factors.iter().map(|f| f.slopes(flow, recorded));
-        let along: Vec<FlowSlopes> = along.collect();
+        for (slopes, factor) in self.slopes.iter_mut().zip(&self.factors) {
+            *slopes = factor.slopes(flow, recorded);
+        }
         let mut by_flow = [[0.0; FLOW]; COEFFICIENTS];
-        let mut by_derivative = vec![0.0; self.table.derivatives()];
         for (sums, terms) in by_flow.iter_mut().zip(&self.terms) {
             for term in terms {
                 if term.is_along_alpha {
                     sums[AeroInputs::ALPHA] += entries.integral_slope(term.derivative);
-                    by_derivative[term.derivative] = flow.alpha_deg - self.trim_alpha_deg;
+                    self.by_derivative[term.derivative] = flow.alpha_deg - self.trim_alpha_deg;
                     continue;
                 }
                 let moved = self.values[term.factor] - term.at_trim;
                 sums[AeroInputs::ALPHA] += entries.value_slope(term.derivative) * moved;
                 let value = entries.value(term.derivative);
-                for (sum, slope) in sums.iter_mut().zip(&along[term.factor]) {
+                for (sum, slope) in sums.iter_mut().zip(&self.slopes[term.factor]) {
                     *sum += value * slope;
                 }
-                by_derivative[term.derivative] = moved;
+                self.by_derivative[term.derivative] = moved;
             }
         }
         CoefficientSlopes {
             change,
             by_flow,
-            by_derivative,
+            by_derivative: &self.by_derivative,
         }
     }
 }
 
 /// Change of the coefficients from the trim, with its slopes, at an instant.
 #[derive(Clone, Debug)]
-pub struct CoefficientSlopes {
+pub struct CoefficientSlopes<'a> {
     pub change: [f64; COEFFICIENTS],
     pub by_flow: [FlowSlopes; COEFFICIENTS],
     /// Slope of each derivative's coefficient along the derivative.
-    pub by_derivative: Vec<f64>,
+    pub by_derivative: &'a [f64],
 }
 
 /// Index of a coefficient among the coefficients of both axes.

@@ -2,9 +2,7 @@
 //! used.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
-use super::aerodynamics::{
-    AeroInputs, Aerodynamics, COEFFICIENTS, SimulationTrim, TrimmedAerodynamics,
-};
+use super::aerodynamics::{AeroInputs, Aerodynamics, SimulationTrim, TrimmedAerodynamics};
 use super::load_changes::LoadSlopes;
 use super::maneuver_recording::ManeuverRecording;
 use super::outputs::{Outputs, outputs};
@@ -239,7 +237,7 @@ impl RunEquations<'_> {
 
     /// Slopes of the loads at an instant, and slope of each derivative's coefficient along the
     /// derivative.
-    pub fn load_slopes(&mut self, instant: &Instant, point: usize) -> (LoadSlopes, Vec<f64>) {
+    pub fn load_slopes(&mut self, instant: &Instant, point: usize) -> (LoadSlopes, &[f64]) {
         let has_alpha_rate = self.aerodynamics.have_alpha_rate();
         let state = &instant.state;
         let alpha_rate = if has_alpha_rate {
@@ -253,17 +251,11 @@ impl RunEquations<'_> {
         let loads = LoadSlopes::new(
             &self.simulation.aerodynamics,
             instant,
-            &self.coefficients(slopes.change),
+            &self.start.trim.plus(slopes.change),
             slopes.by_flow,
             has_alpha_rate,
         );
         (loads, slopes.by_derivative)
-    }
-
-    /// Coefficients from their change relative to the trim.
-    fn coefficients(&self, change: [f64; COEFFICIENTS]) -> [f64; COEFFICIENTS] {
-        let level = self.start.trim.coefficients;
-        std::array::from_fn(|i| level[i] + change[i])
     }
 
     /// Motion for loads at this α̇, rad/s.
@@ -274,7 +266,7 @@ impl RunEquations<'_> {
         air.qbar_psf *= self.start.density_ratio;
         let flow = AeroInputs::new(&air, state.rates.into(), alpha_rate);
         let change = self.aerodynamics.change(&flow, recording.signals(point));
-        let coefficients = self.coefficients(change);
+        let coefficients = self.start.trim.plus(change);
         let model = &self.simulation.aerodynamics;
         let (force, moment) = model.loads(&coefficients, air.qbar_psf);
         let thrust = inputs.thrust;

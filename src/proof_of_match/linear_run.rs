@@ -51,7 +51,8 @@ impl Simulation<'_> {
         (samples, stride): (usize, usize),
     ) -> RunWithSensitivities {
         let step_s = stride as f64 * self.recording.step_s;
-        let mut slopes = RunSlopes::new(self, (start, parameters), step_s);
+        let steps = samples.div_ceil(stride);
+        let mut slopes = RunSlopes::new(self, (start, parameters), (steps, step_s));
         let run = self.fly_with(start, (samples, stride), &mut slopes);
         RunWithSensitivities {
             run,
@@ -92,7 +93,7 @@ impl<'a> RunSlopes<'a> {
     fn new(
         simulation: &'a Simulation<'a>,
         (start, parameters): (&Start, &'a [Parameter]),
-        step_s: f64,
+        (steps, step_s): (usize, f64),
     ) -> RunSlopes<'a> {
         let width = parameters.len().next_multiple_of(VECTOR);
         let mut states = AlignedBuffer::zeros(CHANGING * width);
@@ -117,7 +118,10 @@ impl<'a> RunSlopes<'a> {
             states,
             outputs: AlignedBuffer::zeros(COUNT * width),
             width,
-            histories: vec![[const { Vec::new() }; COUNT]; parameters.len()],
+            histories: parameters
+                .iter()
+                .map(|_| from_fn(|_| Vec::with_capacity(steps)))
+                .collect(),
         }
     }
 }
@@ -270,6 +274,10 @@ struct StateUpdateSlopes<'a> {
 impl WithSimd for StateUpdateSlopes<'_> {
     type Output = ();
 
+    #[expect(
+        clippy::redundant_closure_for_method_calls,
+        reason = "a method passed by its name is not inlined"
+    )]
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         for column in (0..self.width).step_by(S::F64_LANES) {
@@ -282,7 +290,8 @@ impl WithSimd for StateUpdateSlopes<'_> {
                     let direct = load(simd, self.direct[stage], self.width, column);
                     self.stages[stage].rate(at, &direct).0
                 },
-                StateChange::plus,
+                #[inline(always)]
+                |at, rate, factor| at.plus(rate, factor),
             );
             for (row, value) in end.normalised(&self.end).0.into_iter().enumerate() {
                 value.store(self.states, row * self.width + column);

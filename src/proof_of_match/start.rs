@@ -64,7 +64,7 @@ pub fn matched(simulation: &Simulation) -> MatchedStart {
 /// Slopes of the outputs along the parameters of a start, over the noise of each output.
 struct StartSlopes {
     /// Sample, output and slopes of each row; outputs that ingest has repaired have no row.
-    rows: Vec<(usize, usize, DVector<f64>)>,
+    rows: Vec<(usize, usize, [f64; PARAMETERS])>,
     covariance: DMatrix<f64>,
 }
 
@@ -79,16 +79,21 @@ impl StartSlopes {
         if run.has_departed {
             return None;
         }
-        let mut information = DMatrix::zeros(PARAMETERS, PARAMETERS);
+        let mut information = [[0.0; PARAMETERS]; PARAMETERS];
         let mut rows = Vec::with_capacity(recording.trim_samples * COUNT);
-        for sample in 0..recording.trim_samples {
-            for output in (0..COUNT).filter(|output| !recording.repaired[sample][*output]) {
-                let own = slopes.iter().map(|slopes| slopes[output][sample]);
-                let own = DVector::from_iterator(PARAMETERS, own) / recording.noise[output];
-                information.ger(1.0, &own, &own, 1.0);
+        let trim = recording.repaired.iter().take(recording.trim_samples);
+        for (sample, repaired) in trim.enumerate() {
+            for output in (0..COUNT).filter(|output| !repaired[*output]) {
+                let noise = recording.noise[output];
+                let own: [f64; PARAMETERS] =
+                    std::array::from_fn(|i| slopes[i][output][sample] / noise);
+                for (sums, slope) in information.iter_mut().zip(own) {
+                    add_multiple(sums, slope, &own);
+                }
                 rows.push((sample, output, own));
             }
         }
+        let information = DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| information[j][i]);
         let covariance = symmetric::inverse(&information)?;
         Some((StartSlopes { rows, covariance }, run))
     }
@@ -98,14 +103,21 @@ impl StartSlopes {
         if computed.has_departed {
             return None;
         }
-        let mut gradient = DVector::zeros(PARAMETERS);
+        let mut gradient = [0.0; PARAMETERS];
         for (sample, output, slopes) in &self.rows {
             let residual =
                 recording.measured[*sample][*output] - computed.outputs[*sample][*output];
-            gradient.axpy(residual / recording.noise[*output], slopes, 1.0);
+            add_multiple(&mut gradient, residual / recording.noise[*output], slopes);
         }
-        let step = &self.covariance * gradient;
+        let step = &self.covariance * DVector::from_column_slice(&gradient);
         step.iter().all(|s| s.is_finite()).then_some(step)
+    }
+}
+
+/// Adds a multiple of values to sums.
+fn add_multiple(sums: &mut [f64; PARAMETERS], factor: f64, values: &[f64; PARAMETERS]) {
+    for i in 0..PARAMETERS {
+        sums[i] += factor * values[i];
     }
 }
 

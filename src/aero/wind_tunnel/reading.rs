@@ -95,7 +95,8 @@ fn interpolated(
 ) -> TunnelValue {
     let (low, fraction) = interval_at(n, &x_of, x);
     let high = (low + 1).min(n.saturating_sub(1));
-    let (a, b) = (value_of(low), value_of(high));
+    let a = value_of(low);
+    let b = if high == low { a } else { value_of(high) };
     let value = match scheme {
         Interpolation::Linear => linear(a.value, b.value, fraction),
         Interpolation::MonotoneCubic => monotone(n, low, fraction, &x_of, |i| value_of(i).value),

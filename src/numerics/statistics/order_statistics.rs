@@ -24,10 +24,16 @@ pub const SIGMA_PER_MAD: f64 = 1.482_602_218_505_602;
 /// Median of the finite values; the mean of the two middle ones of an even count.
 #[must_use]
 pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
-    let sorted = sorted_finite(values);
-    let lower = sorted.get(sorted.len().checked_sub(1)? / 2)?;
-    let upper = sorted.get(sorted.len() / 2)?;
-    Some(lower.midpoint(*upper))
+    let mut values = finite(values);
+    if values.is_empty() {
+        return None;
+    }
+    let (count, middle) = (values.len(), values.len() / 2);
+    let (below, upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
+    let upper = *upper;
+    let largest_below = below.iter().copied().max_by(f64::total_cmp);
+    let lower = largest_below.filter(|_| count % 2 == 0).unwrap_or(upper);
+    Some(lower.midpoint(upper))
 }
 
 /// Median of the finite values; the larger of the two middle ones of an even count.

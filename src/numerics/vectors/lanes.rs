@@ -81,14 +81,18 @@ impl<S: Simd> Mul<f64> for Lanes<S> {
     }
 }
 
-/// Numbers that a function returns for each place. Unlike `std::array::from_fn` it is inlined with
-/// its function; otherwise each operation would be a call, as the called function is compiled
-/// without the processor's vectors.
+/// Numbers that a function returns for each place. Unlike `std::array::from_fn` and iterators it is
+/// inlined with its function; otherwise each operation would be a call, as the called function is
+/// compiled without the processor's vectors.
+#[expect(
+    clippy::needless_range_loop,
+    reason = "an iterator's functions are not inlined"
+)]
 #[inline(always)]
 pub(crate) fn each<S: Simd, const N: usize>(of: impl Fn(usize) -> Lanes<S>) -> [Lanes<S>; N] {
     let mut all = [of(0); N];
-    for (place, own) in all.iter_mut().enumerate().skip(1) {
-        *own = of(place);
+    for place in 1..N {
+        all[place] = of(place);
     }
     all
 }
@@ -100,8 +104,8 @@ pub(crate) fn combination<S: Simd, const N: usize>(
     of: &[Lanes<S>; N],
 ) -> Lanes<S> {
     let mut sum = of[0] * factors[0];
-    for (factor, own) in factors.iter().zip(of).skip(1) {
-        sum = sum.plus(*factor, *own);
+    for place in 1..N {
+        sum = sum.plus(factors[place], of[place]);
     }
     sum
 }
