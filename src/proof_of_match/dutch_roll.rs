@@ -16,8 +16,8 @@ use crate::maneuver::{Maneuver, Means};
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
 use crate::numerics::linear_algebra::root::continuous_root;
 use crate::numerics::statistics::random::RandomStream;
-use crate::qualities::{Controls, Differentiation, FlownConditions, LinearModel, SteadyFlight};
-use crate::tables::{FlyingQuality, MatchedQuantity};
+use crate::qualities::{Controls, FlownConditions, LinearModel, SteadyFlight};
+use crate::tables::MatchedQuantity;
 
 /// Estimates of a maneuver.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -246,13 +246,8 @@ fn nothing_by_surface() -> BTreeMap<String, BTreeMap<String, f64>> {
 
 /// Dutch roll of the equations at values of their derivatives; `None` if it does not oscillate.
 fn dutch_roll(linear: &LinearModel, values: &DVector<f64>) -> Option<DutchRoll> {
-    let found = linear.quantities(Axis::Lateral, values, Differentiation::ValuesAlone)?;
-    let value = |quantity: FlyingQuality| {
-        let own = found.quantities.iter().find(|(q, _)| *q == quantity);
-        own.map(|(_, dual)| dual.value)
-    };
-    let frequency = value(FlyingQuality::DutchRollFrequency)?;
-    let damping = value(FlyingQuality::DutchRollDamping)?;
+    let pair = linear.modes(Axis::Lateral, values)?.fast_pair();
+    let (frequency, damping) = (pair.frequency().value, pair.damping().value);
     let damped = frequency * (1.0 - damping * damping).sqrt();
     let found = DutchRoll {
         period_s: 2.0 * std::f64::consts::PI / damped,

@@ -35,7 +35,7 @@ use analysis::Analysis;
 
 pub use judged_aircraft::JudgedAircraft;
 pub use judged_quantity::judged_quantity;
-pub use linear::{Controls, Differentiation, LinearModel, SteadyFlight};
+pub use linear::{Controls, LinearModel, SteadyFlight};
 pub use specification::{LevelLimit, Range, Requirement, Specification};
 pub use trim::FlownConditions;
 

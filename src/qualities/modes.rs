@@ -27,9 +27,6 @@ type ComplexVector = SVector<Complex<f64>, STATES>;
 pub struct Root {
     pub value: Complex<f64>,
     pub slopes: Vec<Complex<f64>>,
-    /// Ratio of the last state to the first in the mode, with its slopes.
-    pub last_over_first: Complex<f64>,
-    pub ratio_slopes: Vec<Complex<f64>>,
 }
 
 impl Root {
@@ -42,14 +39,6 @@ impl Root {
     #[must_use]
     pub fn real(&self) -> Dual {
         Dual::new(self.value.re, self.slopes.iter().map(|s| s.re).collect())
-    }
-
-    /// Magnitude of the ratio of the last state to the first.
-    #[must_use]
-    pub fn magnitude_of_ratio(&self) -> Dual {
-        let (ratio, magnitude) = (self.last_over_first, self.last_over_first.norm());
-        let slope = |s: &Complex<f64>| (ratio.conj() * s).re / magnitude;
-        Dual::new(magnitude, self.ratio_slopes.iter().map(slope).collect())
     }
 }
 
@@ -184,41 +173,78 @@ fn roots(matrix: &Matrix, along: &[Matrix]) -> Option<Vec<Root>> {
     Some(values.into_iter().map(|v| root(matrix, v, along)).collect())
 }
 
-/// Root with its mode. Let A be the matrix, λ the root, and x its eigenvector of unit length. Their
-/// slopes dλ and dx along a parameter solve the bordered equations (A − λ) dx − x dλ = −dA x, xᴴ dx
-/// = 0.
+/// Root with its slopes. Without parameters its mode is not computed.
 fn root(matrix: &Matrix, value: Complex<f64>, along: &[Matrix]) -> Root {
-    let complex = matrix.map(|v| Complex::new(v, 0.0));
-    let shifted = complex - SMatrix::<Complex<f64>, STATES, STATES>::identity() * value;
-    let vector = null_vector(&shifted, SHIFT * matrix.amax());
-    let mut bordered = SMatrix::<Complex<f64>, 5, 5>::zeros();
-    bordered.fixed_view_mut::<4, 4>(0, 0).copy_from(&shifted);
-    bordered.fixed_view_mut::<4, 1>(0, 4).copy_from(&-vector);
-    bordered
-        .fixed_view_mut::<1, 4>(4, 0)
-        .copy_from(&vector.adjoint());
-    let ratio = vector[STATES - 1] / vector[0];
-    let mut found = Root {
-        value,
-        slopes: Vec::with_capacity(along.len()),
-        last_over_first: ratio,
-        ratio_slopes: Vec::with_capacity(along.len()),
+    let slopes = if along.is_empty() {
+        vec![]
+    } else {
+        let solutions = ModeShape::new(matrix, value).solutions(along);
+        solutions.iter().map(|solution| solution[STATES]).collect()
     };
-    if along.is_empty() {
-        return found;
+    Root { value, slopes }
+}
+
+/// Magnitude of the ratio of the last state to the first in the mode of a root, with its slopes along
+/// parameters.
+#[must_use]
+pub fn magnitude_of_ratio(matrix: &Matrix, root: &Root, along: &[Matrix]) -> Dual {
+    let shape = ModeShape::new(matrix, root.value);
+    let (first, last) = (shape.vector[0], shape.vector[STATES - 1]);
+    let ratio = last / first;
+    let magnitude = ratio.norm();
+    let slope = |solution: &BorderedVector| {
+        let by_parameter = (solution[STATES - 1] - ratio * solution[0]) / first;
+        (ratio.conj() * by_parameter).re / magnitude
+    };
+    let slopes = shape.solutions(along).iter().map(slope).collect();
+    Dual::new(magnitude, slopes)
+}
+
+/// Vector of the bordered equations: slopes of the eigenvector, then of the root.
+type BorderedVector = SVector<Complex<f64>, { STATES + 1 }>;
+
+/// Mode of a root. Let A be the matrix, λ the root, and x its eigenvector of unit length. Their slopes
+/// dλ and dx along a parameter solve the bordered equations (A − λ) dx − x dλ = −dA x, xᴴ dx = 0.
+struct ModeShape {
+    /// Matrix A − λ.
+    shifted: SMatrix<Complex<f64>, STATES, STATES>,
+    vector: ComplexVector,
+}
+
+impl ModeShape {
+    fn new(matrix: &Matrix, value: Complex<f64>) -> ModeShape {
+        let complex = matrix.map(|v| Complex::new(v, 0.0));
+        let shifted = complex - SMatrix::<Complex<f64>, STATES, STATES>::identity() * value;
+        ModeShape {
+            vector: null_vector(&shifted, SHIFT * matrix.amax()),
+            shifted,
+        }
     }
-    let factors = bordered.lu();
-    for slope in along {
-        let change = slope.map(|v| Complex::new(v, 0.0)) * vector;
-        let mut right = SVector::<Complex<f64>, 5>::zeros();
-        right.fixed_rows_mut::<4>(0).copy_from(&-change);
-        let nothing = SVector::from_element(Complex::new(f64::NAN, f64::NAN));
-        let solution = factors.solve(&right).unwrap_or(nothing);
-        found.slopes.push(solution[4]);
-        let (last, first) = (solution[STATES - 1], solution[0]);
-        found.ratio_slopes.push((last - ratio * first) / vector[0]);
+
+    /// Solutions of the bordered equations along parameters; NaN where there is none.
+    fn solutions(&self, along: &[Matrix]) -> Vec<BorderedVector> {
+        if along.is_empty() {
+            return vec![];
+        }
+        let vector = self.vector;
+        let mut bordered = SMatrix::<Complex<f64>, 5, 5>::zeros();
+        bordered
+            .fixed_view_mut::<4, 4>(0, 0)
+            .copy_from(&self.shifted);
+        bordered.fixed_view_mut::<4, 1>(0, 4).copy_from(&-vector);
+        bordered
+            .fixed_view_mut::<1, 4>(4, 0)
+            .copy_from(&vector.adjoint());
+        let factors = bordered.lu();
+        let solution = |slope: &Matrix| {
+            let change = slope.map(|v| Complex::new(v, 0.0)) * vector;
+            let mut right = BorderedVector::zeros();
+            right.fixed_rows_mut::<4>(0).copy_from(&-change);
+            let nothing = SVector::from_element(Complex::new(f64::NAN, f64::NAN));
+            factors.solve(&right).unwrap_or(nothing)
+        };
+        along.iter().map(solution).collect()
     }
-    found
 }
 
 /// Unit vector whose image is zero, by inverse iteration.

@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::linear::{Differentiation, LinearModel, SolvedEquations};
-use super::modes::Modes;
+use super::modes::{Modes, magnitude_of_ratio};
 use crate::aero::Axis;
 use crate::numerics::dual::Dual;
 use crate::tables::FlyingQuality;
@@ -17,6 +17,13 @@ pub struct AxisQuantities {
 }
 
 impl LinearModel {
+    /// Modes at values of the derivatives; `None` if a value is not finite.
+    #[must_use]
+    pub fn modes(&self, axis: Axis, values: &DVector<f64>) -> Option<Modes> {
+        let solved = self.solved(values, Differentiation::ValuesAlone);
+        Modes::of_matrix(axis, &solved.matrix, &[])
+    }
+
     /// Quantities at values of the derivatives; `None` if a value is not finite.
     #[must_use]
     pub fn quantities(
@@ -29,7 +36,7 @@ impl LinearModel {
         let modes = Modes::of_matrix(axis, &solved.matrix, &solved.slopes)?;
         let quantities = match axis {
             Axis::Longitudinal => longitudinal(&modes, &solved, self.velocity / self.gravity),
-            Axis::Lateral => lateral(&modes),
+            Axis::Lateral => lateral(&modes, &solved),
         };
         Some(AxisQuantities { quantities, modes })
     }
@@ -96,10 +103,10 @@ fn longitudinal(
     ]
 }
 
-fn lateral(modes: &Modes) -> Vec<(FlyingQuality, Dual)> {
+fn lateral(modes: &Modes, entries: &SolvedEquations) -> Vec<(FlyingQuality, Dual)> {
     let fast = modes.fast_pair();
     let oscillation = &modes.roots[modes.fast[0]];
-    let phi_beta = oscillation.magnitude_of_ratio();
+    let phi_beta = magnitude_of_ratio(&entries.matrix, oscillation, &entries.slopes);
     let mut quantities = vec![
         (FlyingQuality::DutchRollFrequency, fast.frequency()),
         (FlyingQuality::DutchRollDamping, fast.damping()),
