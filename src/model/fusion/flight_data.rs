@@ -165,12 +165,15 @@ impl FlightData {
         lower.solve_lower_triangular_mut(&mut rows);
         let mut differences = self.differences.clone();
         lower.solve_lower_triangular_mut(&mut differences);
-        let matrix = rows.tr_mul(&rows);
         let vector = rows.tr_mul(&differences);
-        for (i, &row) in active.iter().enumerate() {
-            sums.vector[row] += vector[i];
-            for (j, &column) in active.iter().enumerate() {
-                sums.matrix[(row, column)] += matrix[(i, j)];
+        for (j, &column) in active.iter().enumerate() {
+            sums.vector[column] += vector[j];
+            for (i, &row) in active[..=j].iter().enumerate() {
+                let product = rows.column(i).dot(&rows.column(j));
+                sums.matrix[(row, column)] += product;
+                if row != column {
+                    sums.matrix[(column, row)] += product;
+                }
             }
         }
     }

@@ -41,6 +41,8 @@ pub struct SolvedPosterior<'a> {
     root: &'a BlockRoot,
     /// Cholesky factor L of I + Rᵀ Λ R = L Lᵀ.
     lower: DMatrix<f64>,
+    /// Whitened vector L⁻¹ Rᵀ η.
+    vector: DVector<f64>,
 }
 
 impl<'a> SolvedPosterior<'a> {
@@ -48,7 +50,13 @@ impl<'a> SolvedPosterior<'a> {
     #[must_use]
     pub fn new(root: &'a BlockRoot, information: &Information) -> Option<SolvedPosterior<'a>> {
         let lower = inner_root(root.right(&root.left(&information.matrix)))?;
-        Some(SolvedPosterior { root, lower })
+        let mut vector = root.left_of(&information.vector);
+        lower.solve_lower_triangular_mut(&mut vector);
+        Some(SolvedPosterior {
+            root,
+            lower,
+            vector,
+        })
     }
 
     /// Product L⁻¹ Rᵀ A for some columns A over the unknowns, from which Aᵀ P A follows as its
@@ -65,16 +73,10 @@ impl<'a> SolvedPosterior<'a> {
 
     /// Means and covariance that the posterior gives for a flight's rows.
     #[must_use]
-    pub fn image(
-        &self,
-        flight: &FlightData,
-        information: &Information,
-    ) -> (DVector<f64>, DMatrix<f64>) {
-        let columns = flight.columns(information.vector.len());
+    pub fn image(&self, flight: &FlightData, unknowns: usize) -> (DVector<f64>, DMatrix<f64>) {
+        let columns = flight.columns(unknowns);
         let halves = self.whitened_columns(self.root.left(&columns));
-        let mut seen = self.root.left_of(&information.vector);
-        self.lower.solve_lower_triangular_mut(&mut seen);
-        (halves.tr_mul(&seen), square(&halves))
+        (halves.tr_mul(&self.vector), square(&halves))
     }
 }
 

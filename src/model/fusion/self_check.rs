@@ -77,7 +77,7 @@ pub fn maneuvers(
         if left_out.rows.is_empty() {
             continue;
         }
-        let (predicted, predicted_covariance) = rest.image(&left_out, &sums);
+        let (predicted, predicted_covariance) = rest.image(&left_out, unknowns);
         let differences: DVector<f64> = &left_out.differences - predicted;
         let covariance = predicted_covariance + left_out.covariance(weights);
         let prediction = LeaveOneOutDifference {

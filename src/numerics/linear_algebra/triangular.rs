@@ -42,7 +42,10 @@ fn factorise(mut matrix: DMatrixViewMut<f64>) -> bool {
 pub fn solve_lower(lower: DMatrixView<f64>, mut right: DMatrixViewMut<f64>) {
     let n = lower.nrows();
     if n <= PLAIN {
-        Arch::new().dispatch(|| solve_plain(lower, &mut right));
+        Arch::new().dispatch(
+            #[inline(always)]
+            move || solve_plain(lower, right),
+        );
         return;
     }
     let half = n / 2;
@@ -60,7 +63,7 @@ const SIDE_BY_SIDE: usize = 4;
 
 /// [`solve_lower`] column by column.
 #[inline(always)]
-fn solve_plain(lower: DMatrixView<f64>, right: &mut DMatrixViewMut<f64>) {
+fn solve_plain(lower: DMatrixView<f64>, mut right: DMatrixViewMut<f64>) {
     let mut columns = right.column_iter_mut();
     loop {
         let mut own: [_; SIDE_BY_SIDE] = std::array::from_fn(|_| columns.next());
