@@ -21,6 +21,7 @@
 //! and τ predict, which matters with few data.
 
 use nalgebra::{DMatrix, DVector};
+use pulp::Arch;
 
 use super::scatter::{HUBER, total_variances};
 use crate::numerics::linear_algebra::symmetric;
@@ -152,24 +153,28 @@ fn residual_freedom(
         .collect()
 }
 
-/// Quadratic form x M xᵀ of each row x of the design with the matrix M. For products this small the
-/// linear-algebra library takes several times as long.
+/// Quadratic form x M xᵀ of each row x of the design with the matrix M, for all rows side by side. For
+/// products this small the linear-algebra library takes several times as long.
 fn quadratic_forms(design: &DMatrix<f64>, matrix: &DMatrix<f64>) -> Vec<f64> {
-    let (rows, columns_of_rows) = (design.transpose(), matrix.transpose());
-    let mut image = vec![0.0; matrix.ncols()];
-    let of = |row: &[f64]| {
-        image.fill(0.0);
-        for (value, own) in row.iter().zip(columns_of_rows.column_iter()) {
-            for (sum, element) in image.iter_mut().zip(&own) {
-                *sum += element * value;
+    let mut forms = vec![0.0; design.nrows()];
+    let mut image = forms.clone();
+    Arch::new().dispatch(
+        #[inline(always)]
+        move || {
+            for (own, elements) in design.column_iter().zip(matrix.column_iter()) {
+                image.fill(0.0);
+                for (values, element) in design.column_iter().zip(&elements) {
+                    for (sum, value) in image.iter_mut().zip(values.as_slice()) {
+                        *sum += element * value;
+                    }
+                }
+                for ((form, image), value) in forms.iter_mut().zip(&image).zip(own.as_slice()) {
+                    *form += image * value;
+                }
             }
-        }
-        image.iter().zip(row).map(|(a, b)| a * b).sum()
-    };
-    rows.as_slice()
-        .chunks_exact(design.ncols().max(1))
-        .map(of)
-        .collect()
+            forms
+        },
+    )
 }
 
 /// Coefficients and their covariance for given weights.

@@ -4,7 +4,7 @@
 use nalgebra::DVector;
 
 use super::point::TrendPoint;
-use crate::numerics::bisection::last_that_holds;
+use crate::numerics::bisection::last_above;
 use crate::numerics::statistics::order_statistics::upper_median;
 
 /// Standard deviations beyond which the influence of a residual stays constant: Huber's weights. The
@@ -86,8 +86,7 @@ pub(super) fn scatter_squared(
         return 0.0;
     }
     let square: f64 = stratum.iter().map(|i| residuals[*i].powi(2)).sum();
-    let is_too_small = |scatter2| sum(scatter2) > expected;
-    last_that_holds((0.0, square / expected), HALVINGS, is_too_small).1
+    last_above((0.0, square / expected), HALVINGS, expected, sum).1
 }
 
 #[cfg(test)]
