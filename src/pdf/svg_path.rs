@@ -4,11 +4,41 @@ use std::fmt::Write;
 
 /// A number with at most two decimals, as short as possible.
 pub fn number(value: f32) -> String {
-    let rounded = (100.0 * f64::from(value)).round() / 100.0;
-    if rounded == 0.0 || !rounded.is_finite() {
-        return "0".to_owned();
+    let mut text = String::new();
+    push_number(&mut text, value);
+    text
+}
+
+/// Number of hundredths that a 64-bit integer holds with certainty.
+const MOST_HUNDREDTHS: f64 = 1e15;
+
+/// Appends a [`number`]. Its digits are those of an integer, which are found several times as fast as
+/// those of a fraction.
+fn push_number(text: &mut String, value: f32) {
+    let hundredths = (100.0 * f64::from(value)).round();
+    if hundredths == 0.0 || !hundredths.is_finite() {
+        text.push('0');
+        return;
     }
-    rounded.to_string()
+    // Writing into a String cannot fail.
+    if hundredths.abs() > MOST_HUNDREDTHS {
+        let _ = write!(text, "{}", hundredths / 100.0);
+        return;
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "limited above")]
+    let hundredths = hundredths as i64;
+    if hundredths < 0 {
+        text.push('-');
+    }
+    let (whole, rest) = (
+        hundredths.unsigned_abs() / 100,
+        hundredths.unsigned_abs() % 100,
+    );
+    let _ = match (rest / 10, rest % 10) {
+        (0, 0) => write!(text, "{whole}"),
+        (tenths, 0) => write!(text, "{whole}.{tenths}"),
+        (tenths, last) => write!(text, "{whole}.{tenths}{last}"),
+    };
 }
 
 /// Converts the data of a path. Arcs must be half circles.
@@ -101,12 +131,11 @@ impl Outline {
         if !self.operators.is_empty() {
             self.operators.push(' ');
         }
-        let _ = write!(
-            self.operators,
-            "{} {} {operator}",
-            number(point[0]),
-            number(point[1])
-        );
+        for value in point {
+            push_number(&mut self.operators, value);
+            self.operators.push(' ');
+        }
+        self.operators.push(operator);
         self.point = point;
         if is_move {
             self.start = point;

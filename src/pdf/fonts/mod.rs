@@ -2,7 +2,6 @@
 //! `fonts/OFL.txt`) with Latin, Greek and mathematical signs.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write;
 
 use pdf_writer::types::{CidFontType, FontFlags, SystemInfo, UnicodeCmap};
 use pdf_writer::{Buf, Filter, Finish, Name, Pdf, Rect, Ref, Str};
@@ -79,11 +78,12 @@ impl Fonts {
     /// Numbers of a text's glyphs, hexadecimal.
     pub fn glyph_numbers(&self, weight: Weight, text: &str) -> String {
         let face = self.face(weight);
-        text.chars().fold(String::new(), |mut all, c| {
-            // Writing into a String cannot fail.
-            let _ = write!(all, "{:04x}", face.glyph(c).0);
-            all
-        })
+        let digits = |c: char| {
+            let glyph = u32::from(face.glyph(c).0);
+            let digit = move |shift: u32| char::from_digit((glyph >> shift) & 0xf, 16);
+            [12, 8, 4, 0].into_iter().filter_map(digit)
+        };
+        text.chars().flat_map(digits).collect()
     }
 
     /// Writes a face as five objects from `first` on.
