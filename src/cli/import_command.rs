@@ -54,7 +54,14 @@ pub fn import(options: &ImportOptions) -> anyhow::Result<ExitCode> {
                 "{}: another source has this name too; import it into another folder",
                 source.display()
             );
-            let one = import::import(&source, &options.to, &naming)?;
+            let one = match import::import(&source, &options.to, &naming) {
+                // Folders of recordings have notes and lists of the flights in them.
+                Err(error) if import::is_note_in(place, &error) => {
+                    out!("{}: left out, it has no table of numbers", source.display());
+                    continue;
+                }
+                other => other?,
+            };
             let (columns, rows) = (one.columns.len(), one.rows);
             out!(
                 "{}: {columns} columns, {rows} rows from {}",
@@ -69,6 +76,10 @@ pub fn import(options: &ImportOptions) -> anyhow::Result<ExitCode> {
             imported.push(one);
         }
     }
+    anyhow::ensure!(
+        !imported.is_empty(),
+        "none of the files has a table of numbers"
+    );
     let manifest = import::write_manifest(&options.to, &imported)?;
     out!("manifest: {}", manifest.display());
     Ok(ExitCode::SUCCESS)

@@ -264,6 +264,33 @@ fn a_struct_that_holds_all_columns_is_left_out_of_their_names() {
 }
 
 #[test]
+fn structs_of_an_array_have_the_names_of_their_labels() {
+    let folder = tempfile::tempdir().unwrap();
+    let columns = columns(50);
+    let signals = [
+        element(5, &8_i32.to_le_bytes()),
+        element(1, b"label\0\0\0values\0\0"),
+        characters("", "q"),
+        doubles("", [50, 1], &columns[1].2),
+        characters("", "de"),
+        doubles("", [50, 1], &columns[2].2),
+    ];
+    let fields = [
+        element(5, &8_i32.to_le_bytes()),
+        element(1, b"time\0\0\0\0signals\0"),
+        doubles("", [50, 1], &columns[0].2),
+        matrix(2, [1, 2], "", &signals.concat()),
+    ];
+    matlab(folder.path(), &[matrix(2, [1, 1], "out", &fields.concat())]);
+    let outcome = import(folder.path(), "f.mat");
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let recording = imported(folder.path());
+    for (name, _, values) in &columns {
+        check(&recording, name, None, values);
+    }
+}
+
+#[test]
 fn matlab_vectors_structs_and_matrices_come_back_to_the_bit() {
     let folder = tempfile::tempdir().unwrap();
     let columns = columns(3_000);
@@ -338,6 +365,64 @@ fn columns_without_names_take_those_of_the_analyst_and_a_step_their_clock() {
         "{}",
         refused.stderr
     );
+}
+
+#[test]
+fn utf16_text_with_separators_of_thousands_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let text =
+        "irig,altitude [ft]\r\n214:23:59:59.5,\"24,999.5\"\r\n215:00:00:00.0,\"25,000.25\"\r\n";
+    let mut bytes = vec![0xff, 0xfe];
+    bytes.extend(text.encode_utf16().flat_map(u16::to_le_bytes));
+    fs::write(folder.path().join("f.txt"), bytes).unwrap();
+    let outcome = import(folder.path(), "f.txt");
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let recording = imported(folder.path());
+    check(&recording, "irig", Some("s"), &[18_575_999.5, 18_576_000.0]);
+    check(&recording, "altitude", Some("ft"), &[24_999.5, 25_000.25]);
+}
+
+#[test]
+fn a_note_beside_the_recordings_of_a_folder_is_left_out_and_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let from = folder.path().join("runs");
+    fs::create_dir(&from).unwrap();
+    fs::write(from.join("a.csv"), "time,q\n0,1\n0.1,2\n").unwrap();
+    fs::write(from.join("README.txt"), "Dear reader,\nno numbers here.\n").unwrap();
+    let outcome = import(folder.path(), "runs");
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let note = "README.txt: left out, it has no table of numbers";
+    assert!(outcome.stdout.contains(note), "{}", outcome.stdout);
+    check(&imported(folder.path()), "q", None, &[1.0, 2.0]);
+    fs::remove_file(from.join("a.csv")).unwrap();
+    let outcome = import(folder.path(), "runs");
+    assert_eq!(outcome.code, Some(1), "{}", outcome.stdout);
+}
+
+#[test]
+fn complex_numbers_are_left_out_and_named_unless_they_are_real() {
+    let folder = tempfile::tempdir().unwrap();
+    let complex = |name: &str, imaginary: f64| {
+        let part = |value: f64| element(9, &[value.to_le_bytes(); 3].concat());
+        let mut data = element(6, &[6, 8, 0, 0, 0, 0, 0, 0]);
+        data.extend(element(5, &[3_i32, 1].map(i32::to_le_bytes).concat()));
+        data.extend(element(1, name.as_bytes()));
+        data.extend([part(2.0), part(imaginary)].concat());
+        element(14, &data)
+    };
+    let variables = [
+        doubles("time", [3, 1], &[0.0, 0.1, 0.2]),
+        complex("q", 0.0),
+        complex("p", 0.5),
+    ];
+    matlab(folder.path(), &variables);
+    let outcome = import(folder.path(), "f.mat");
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let note = "`p` is left out: complex numbers; save the real part";
+    assert!(outcome.stdout.contains(note), "{}", outcome.stdout);
+    let recording = imported(folder.path());
+    check(&recording, "q", None, &[2.0; 3]);
+    assert!(recording.column("p").is_none());
 }
 
 #[test]
@@ -513,6 +598,11 @@ fn what_cannot_be_read_is_refused_with_the_way_out() {
             "no table of numbers",
         ),
         ("old.mat", vec![0; 400], "'-v7'"),
+        (
+            "book.xlsx",
+            b"PK\x03\x04 xl/workbook.xml".to_vec(),
+            "as CSV",
+        ),
     ] {
         fs::write(folder.path().join(file), bytes).unwrap();
         let outcome = import(folder.path(), file);

@@ -5,12 +5,17 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::calendar_time::{CalendarTime, is_ambiguous, is_time_of_day};
 use super::csv_header::{HeadLine, names_and_units};
 use super::csv_times::{DateBesideTime, Origin, date_beside_time};
-use super::delimited::{Delimiter, Dialect, Failures, HEAD_ROWS, is_missing, name_and_unit};
+use super::delimited::{
+    Delimiter, Dialect, Failures, HEAD_ROWS, is_clock_time, is_missing, name_and_unit,
+};
 use super::imported_contents::ImportedColumn;
 use super::tall::Role;
 
 /// Bytes at the beginning from which the layout follows.
 pub const HEAD_BYTES: u64 = 1 << 18;
+
+/// Message for a text without numbers.
+pub const NO_TABLE: &str = "no table of numbers: harvest imports text with one row a sample and a header, MATLAB, HDF5 and tall Parquet";
 
 /// Layout of a text.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,8 +63,7 @@ impl Layout {
             if head.trim().is_empty() {
                 return "it is empty".to_owned();
             }
-            "no table of numbers: harvest imports text with one row a sample and a header, MATLAB, HDF5 and tall Parquet"
-                .to_owned()
+            NO_TABLE.to_owned()
         })?;
         match layout.decimal_commas_between_commas(lines) {
             Some(message) => Err(message),
@@ -96,9 +100,10 @@ impl Layout {
         dropped.retain(|at| dated.is_none_or(|dated| dated.date != *at));
         let column = |&at: &usize| {
             let origin = origin_of_times(at, &rows, dated);
+            let is_time = origin.is_some() || fields_of(at).any(|field| is_clock_time(field));
             NumberColumn {
                 at,
-                head: column_head(&names[at], units.get(at), origin),
+                head: column_head(&names[at], units.get(at), is_time),
                 origin,
             }
         };
@@ -274,13 +279,15 @@ fn origin_of_times(
     first.map(Origin::First)
 }
 
-/// Name and unit of a column from its header, and from the row of units if there is one.
-fn column_head(header: &str, unit: Option<&String>, origin: Option<Origin>) -> ImportedColumn {
+/// Name and unit of a column from its header, and from the row of units if there is one. Times of day become
+/// seconds, whatever the header states.
+fn column_head(header: &str, unit: Option<&String>, is_time: bool) -> ImportedColumn {
     let (name, unit_in_header) = name_and_unit(header);
     let stated = unit.filter(|unit| !unit.is_empty()).cloned();
-    let unit = match origin {
-        Some(_) => Some("s".to_owned()),
-        None => stated.or(unit_in_header),
+    let unit = if is_time {
+        Some("s".to_owned())
+    } else {
+        stated.or(unit_in_header)
     };
     ImportedColumn { name, unit }
 }
@@ -371,6 +378,12 @@ mod tests {
         );
         let bare = layout("0 1 2\n1 2 3\n");
         assert_eq!(names(&bare)[2].0, "column_3");
+    }
+
+    #[test]
+    fn times_of_day_are_in_seconds_whatever_the_header_states() {
+        let text = "IRIG,q\nd:h:m:s,deg/s\n214:23:59:59.9,1\n215:00:00:00.0,2\n";
+        assert_eq!(names(&layout(text)), [("IRIG", "s"), ("q", "deg/s")]);
     }
 
     #[test]

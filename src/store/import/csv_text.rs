@@ -36,6 +36,7 @@ pub fn import(source: &Path, file: &Path, naming: &Naming) -> Result<ImportedCon
         ));
     }
     notes.extend(layout.notes_on_times());
+    notes.extend(naming.note_on_time(&columns));
     Ok(ImportedContents {
         rows,
         columns: heads,
@@ -95,9 +96,6 @@ fn write_rows(
 
 /// Kind of a text whose lines cannot be read, in words.
 fn other_text(head: &[u8]) -> Option<&'static str> {
-    if head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff") {
-        return Some("it is UTF-16 text; save it as UTF-8");
-    }
     let has = |byte: u8| head.contains(&byte);
     (has(b'\r') && !has(b'\n'))
         .then_some("its lines end with carriage returns alone; save it with line feeds")
@@ -108,9 +106,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn other_encodings_and_line_ends_are_named() {
+    fn other_line_ends_are_named() {
         let message = |head: &[u8]| other_text(head).unwrap_or_default();
-        assert!(message(b"\xff\xfet\0").contains("UTF-16"));
         assert!(message(b"time,q\r0,1\r1,2\r").contains("carriage returns"));
         assert_eq!(message(b"time,q\r\n0,1\r\n"), "");
     }

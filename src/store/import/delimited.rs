@@ -155,7 +155,7 @@ pub fn is_missing(field: &str) -> bool {
     MISSING.contains(&field.to_lowercase().as_str())
 }
 
-/// A number, or a time of day as seconds: `12:30:05.25`.
+/// A number, or a time as seconds: `12:30:05.25`, `30:05.25` without the hour, or `214:12:30:05.25` with the day of the year.
 pub fn number(field: &str, decimal_comma: bool) -> Option<f64> {
     if is_missing(field) {
         return None;
@@ -165,19 +165,51 @@ pub fn number(field: &str, decimal_comma: bool) -> Option<f64> {
         let is_number = text.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
         match text.split_once(',') {
             _ if !is_number => None,
-            Some((whole, part)) if decimal_comma => format!("{whole}.{part}").parse().ok(),
-            Some(_) => None,
+            Some((whole, part)) if decimal_comma && !whole.contains('.') => {
+                format!("{whole}.{part}").parse().ok()
+            }
+            Some(_) => without_thousands(text, decimal_comma)?.parse().ok(),
             None => text.replace(['D', 'd'], "e").parse().ok(),
         }
     };
     let parts: Vec<&str> = field.split(':').collect();
     match parts.as_slice() {
         [one] => parse(one),
+        // Without a decimal sign they may be hours and minutes.
+        [minutes, seconds] if seconds.contains(['.', ',']) => {
+            Some(parse(minutes)? * 60.0 + parse(seconds)?)
+        }
         [hours, minutes, seconds] => {
             Some(parse(hours)? * 3600.0 + parse(minutes)? * 60.0 + parse(seconds)?)
         }
+        [days, hours, minutes, seconds] => {
+            let hours = parse(days)? * 24.0 + parse(hours)?;
+            Some(hours * 3600.0 + parse(minutes)? * 60.0 + parse(seconds)?)
+        }
         _ => None,
     }
+}
+
+/// `true` for a number that is a time of day, perhaps with the day of the year.
+pub fn is_clock_time(field: &str) -> bool {
+    field.contains(':') && is_number(field)
+}
+
+/// A number without the separators of its thousands: 1234.5 of `1,234.5`, and of `1.234,5` with a decimal comma. A
+/// number without a decimal sign is none, since its separator may be the decimal sign.
+fn without_thousands(text: &str, decimal_comma: bool) -> Option<String> {
+    let (separator, sign) = if decimal_comma {
+        ('.', ',')
+    } else {
+        (',', '.')
+    };
+    let (whole, part) = text.split_once(sign)?;
+    let mut groups = whole.trim_start_matches(['+', '-']).split(separator);
+    let is_digits = |group: &str| !group.is_empty() && group.chars().all(|c| c.is_ascii_digit());
+    let is_first = |group: &str| group.len() <= 3 && is_digits(group);
+    let is_grouped = groups.next().is_some_and(is_first)
+        && groups.all(|group| group.len() == 3 && is_digits(group));
+    is_grouped.then(|| format!("{}.{part}", whole.replace(separator, "")))
 }
 
 #[cfg(test)]
@@ -205,5 +237,28 @@ mod tests {
         }
         assert_eq!(number("1,5", false), None);
         assert_eq!(number("e5", false), None);
+    }
+
+    #[test]
+    fn separators_of_thousands_are_left_out_beside_a_decimal_sign() {
+        assert_eq!(number("-25,300.5", false), Some(-25_300.5));
+        assert_eq!(number("1.025.300,5", true), Some(1_025_300.5));
+        for (text, decimal_comma) in [
+            ("25,300", false),
+            ("25,30.5", false),
+            ("2530,300.5", false),
+            ("1.5,2.5", true),
+        ] {
+            assert_eq!(number(text, decimal_comma), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_time_may_have_the_day_of_the_year() {
+        assert_eq!(number("12:30:05.25", false), Some(45_005.25));
+        assert_eq!(number("214:12:30:05.25", false), Some(18_534_605.25));
+        assert_eq!(number("30:05.25", false), Some(1_805.25));
+        assert_eq!(number("12:30", false), None);
+        assert!(is_clock_time("214:12:30:05.25") && !is_clock_time("12.5"));
     }
 }

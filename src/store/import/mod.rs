@@ -11,6 +11,7 @@ mod csv_text;
 mod csv_times;
 mod delimited;
 mod flight_file;
+mod foreign;
 mod gzip;
 mod imported_contents;
 mod matlab;
@@ -18,6 +19,7 @@ mod naming;
 pub(super) mod tall;
 mod tall_text;
 mod time_order;
+mod utf16;
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -36,8 +38,8 @@ pub use naming::Naming;
 const IMPORT_MANIFEST: &str = "import.json";
 
 /// Extensions of files that may be recordings.
-const EXTENSIONS: [&str; 9] = [
-    "csv", "txt", "tsv", "dat", "asc", "mat", "h5", "hdf5", "parquet",
+const EXTENSIONS: [&str; 12] = [
+    "csv", "txt", "tsv", "tab", "prn", "lvm", "dat", "asc", "mat", "h5", "hdf5", "parquet",
 ];
 
 /// Sources in a file or a folder, sorted.
@@ -130,12 +132,14 @@ fn import_format(
 ) -> Result<ImportedContents> {
     match format {
         Format::Csv => csv_text::import(source, file, naming),
+        Format::Utf16 => {
+            let folder = file.parent().unwrap_or(file);
+            let text = utf16::as_utf8(source, folder)?;
+            csv_text::import(text.path(), file, naming).map_err(|e| of_scratch(e, source))
+        }
         Format::Matlab => matlab::import_level_5(source, file, naming),
         Format::Hdf5 => matlab::import_hdf5(source, file, naming),
-        Format::Parquet => {
-            naming.refuse_tall(source)?;
-            tall::import(source, file)
-        }
+        Format::Parquet => tall::import(source, file, naming),
         Format::Gzip => Err(refused(source, "it is packed twice; unpack it first")),
     }
 }
@@ -165,6 +169,14 @@ fn unknown_units(columns: &[ImportedColumn]) -> Option<String> {
     })
 }
 
+/// `true` for the error of a text without numbers in a folder: a note beside the recordings.
+#[must_use]
+pub fn is_note_in(place: &Path, error: &Error) -> bool {
+    let is_without_table =
+        matches!(error, Error::Archive { what, .. } if what == csv_layout::NO_TABLE);
+    place.is_dir() && is_without_table
+}
+
 /// Writes the manifest of imported files beside them.
 ///
 /// # Errors
@@ -184,6 +196,7 @@ const HDF5_SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Format {
     Csv,
+    Utf16,
     Gzip,
     Matlab,
     Parquet,
@@ -215,6 +228,10 @@ impl Format {
         {
             let what = "neither a MATLAB 5 file nor one of MATLAB 7.3: save it with `save('flight.mat', '-v7')`";
             return Err(refused(source, what));
+        } else if utf16::SIGNATURES.iter().any(|mark| head.starts_with(mark)) {
+            Format::Utf16
+        } else if let Some(what) = foreign::foreign_format(source, &head) {
+            return Err(refused(source, &what));
         } else {
             Format::Csv
         })

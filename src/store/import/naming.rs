@@ -71,7 +71,9 @@ impl Naming {
         columns: &[ImportedColumn],
     ) -> Result<NamedWriter> {
         let heads = self.heads(columns).map_err(|what| refused(source, &what))?;
-        let kept = (0..columns.len()).filter(|n| !matches!(self.names.get(*n), Some(None)));
+        let is_left_out =
+            |n: &usize| matches!(self.names.get(*n), Some(None)) || self.replaces(&columns[*n]);
+        let kept = (0..columns.len()).filter(|n| !is_left_out(n));
         Ok(NamedWriter {
             writer: FlightWriter::of(file, &heads)?,
             heads,
@@ -79,6 +81,17 @@ impl Naming {
             step_s: self.step_s,
             rows: 0,
         })
+    }
+
+    /// `true` for a column of times in whose place a step counts the time.
+    fn replaces(&self, column: &ImportedColumn) -> bool {
+        self.step_s.is_some() && !self.has_names() && column.name == TIME
+    }
+
+    /// Note about a column of times that is left out.
+    pub(super) fn note_on_time(&self, columns: &[ImportedColumn]) -> Option<String> {
+        let replaced = columns.iter().any(|column| self.replaces(column));
+        replaced.then(|| format!("`{TIME}` of the source is left out: --step counts the time"))
     }
 
     /// Names and units of the columns that are written.
@@ -92,9 +105,6 @@ impl Naming {
                 own().collect::<Vec<_>>().join(", ")
             ));
         }
-        if self.step_s.is_some() && !self.has_names() && own().any(|name| name == TIME) {
-            return Err(format!("it has a column `{TIME}`: leave --step out"));
-        }
         let time = self.step_s.map(|_| ImportedColumn {
             name: TIME.to_owned(),
             unit: Some("s".to_owned()),
@@ -102,7 +112,8 @@ impl Naming {
         let named = if self.has_names() {
             self.names.iter().flatten().cloned().collect()
         } else {
-            columns.to_vec()
+            let kept = columns.iter().filter(|column| !self.replaces(column));
+            kept.cloned().collect::<Vec<_>>()
         };
         Ok(time.into_iter().chain(named).collect())
     }
@@ -208,6 +219,10 @@ mod tests {
         assert_eq!(names(&heads), expected);
         let step = Naming::of(None, Some(0.1)).unwrap();
         assert_eq!(names(&step.heads(&of_source(1)).unwrap()).len(), 2);
+        let mut timed = of_source(2);
+        "time".clone_into(&mut timed[0].name);
+        assert_eq!(names(&step.heads(&timed).unwrap()).len(), 2);
+        assert!(step.note_on_time(&timed).is_some() && step.note_on_time(&of_source(2)).is_none());
     }
 
     #[test]
@@ -224,9 +239,5 @@ mod tests {
             message.contains("2 names, and the file 3 columns"),
             "{message}"
         );
-        let step = Naming::of(None, Some(0.1)).unwrap();
-        let mut timed = of_source(2);
-        "time".clone_into(&mut timed[0].name);
-        assert!(step.heads(&timed).unwrap_err().contains("leave --step out"));
     }
 }

@@ -41,6 +41,8 @@ pub struct Table {
     matrices: Vec<(usize, usize)>,
     /// Lists of texts, with their names.
     lists: Vec<(String, Vec<String>)>,
+    /// Texts, with their names.
+    texts: Vec<(String, String)>,
     notes: Vec<String>,
 }
 
@@ -67,6 +69,9 @@ impl Table {
                     self.add(&full, &full, value);
                 }
             }
+            Value::Cells(cells) if cells.iter().any(|cell| matches!(cell, Value::Struct(_))) => {
+                self.add_structs(name, cells);
+            }
             Value::Cells(cells) => {
                 let text = |cell: Value| {
                     if let Value::Text(text) = cell {
@@ -80,7 +85,21 @@ impl Table {
                 }
             }
             Value::Other(what) => self.notes.push(format!("`{name}` is left out: {what}")),
-            Value::Text(_) => {}
+            Value::Text(text) => self.texts.push((name.to_owned(), text)),
+        }
+    }
+
+    /// Adds the structs of an array, each under its label, as Simulink has them, or under its number.
+    fn add_structs(&mut self, name: &str, structs: Vec<Value>) {
+        let container = name.rsplit_once('.').map_or("", |(container, _)| container);
+        for (n, value) in structs.into_iter().enumerate() {
+            let label = label_of(&value);
+            let full = match label {
+                None => format!("{name}_{}", n + 1),
+                Some(label) if container.is_empty() => label,
+                Some(label) => format!("{container}.{label}"),
+            };
+            self.add(&full, &full, value);
         }
     }
 
@@ -135,6 +154,16 @@ impl Table {
         named > 0 || self.columns.is_empty()
     }
 
+    /// Gives a column without a unit the text that states it: `units.q` or `q_unit` for `q` and for `data.q`.
+    pub fn add_stated_units(&mut self) {
+        let texts = &self.texts;
+        let without = |column: &&mut (ImportedColumn, Vec<f64>)| column.0.unit.is_none();
+        for (head, _) in self.columns.iter_mut().filter(without) {
+            let own = texts.iter().find(|(text, _)| states_unit(text, &head.name));
+            head.unit = own.map(|(_, unit)| unit.trim().to_owned());
+        }
+    }
+
     /// Length that most columns have.
     pub fn frequent_length(&self) -> usize {
         let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
@@ -173,6 +202,28 @@ impl Table {
     }
 }
 
+/// `true` if a text of this name states the unit of a column: it has the column's name in a struct `units` beside
+/// that of the column, or with `_unit` at the end.
+fn states_unit(text: &str, column: &str) -> bool {
+    let is_units = |word: &str| ["unit", "units"].contains(&word.to_lowercase().as_str());
+    let of_column: Vec<&str> = column.split('.').collect();
+    let of_text: Vec<&str> = text.split('.').collect();
+    let in_struct = of_text
+        .iter()
+        .position(|word| is_units(word))
+        .is_some_and(|at| {
+            let (before, name) = (&of_text[..at], &of_text[at + 1..]);
+            !name.is_empty() && of_column.starts_with(before) && of_column.ends_with(name)
+        });
+    let at_end = || {
+        let rest = text
+            .strip_prefix(column)
+            .and_then(|rest| rest.strip_prefix('_'));
+        rest.is_some_and(is_units)
+    };
+    in_struct || at_end()
+}
+
 /// Strips the struct that all names begin with, `rec.` of `rec.q` and `rec.de`. Returns a note about it.
 fn strip_common_struct(columns: &mut [(ImportedColumn, Vec<f64>)]) -> Option<String> {
     let (first, _) = columns.first()?;
@@ -191,6 +242,20 @@ fn strip_common_struct(columns: &mut [(ImportedColumn, Vec<f64>)]) -> Option<Str
         head.name.drain(..end);
     }
     Some(format!("all names begin with `{start}`, which is left out"))
+}
+
+/// Name that a struct gives the signal that it holds.
+fn label_of(value: &Value) -> Option<String> {
+    let Value::Struct(fields) = value else {
+        return None;
+    };
+    let is_label = |name: &str| ["label", "name"].contains(&name.to_lowercase().as_str());
+    fields.iter().find_map(|(name, value)| match value {
+        Value::Text(text) if is_label(name) && !text.trim().is_empty() => {
+            Some(text.trim().to_owned())
+        }
+        _ => None,
+    })
 }
 
 /// Unit and values of a struct that holds one signal: `data` or `values`, and perhaps `unit`.
@@ -230,6 +295,26 @@ mod tests {
             columns.into_iter().map(|(head, _)| head.name).collect(),
             note,
         )
+    }
+
+    #[test]
+    fn a_struct_of_units_states_those_of_the_columns_beside_it() {
+        for (text, column) in [
+            ("units.q", "data.q"),
+            ("tp.Units.fast.q", "tp.data.fast.q"),
+            ("q_unit", "q"),
+            ("rec.q_Units", "rec.q"),
+        ] {
+            assert!(states_unit(text, column), "{text} {column}");
+        }
+        for (text, column) in [
+            ("units.q", "data.p"),
+            ("a.units.q", "b.data.q"),
+            ("units", "q"),
+            ("name.q", "data.q"),
+        ] {
+            assert!(!states_unit(text, column), "{text} {column}");
+        }
     }
 
     #[test]

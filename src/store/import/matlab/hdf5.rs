@@ -141,6 +141,9 @@ impl Reader {
                 let texts = dataset.read_strings().map_err(|e| damaged(&e))?;
                 Ok(Value::Cells(texts.into_iter().map(Value::Text).collect()))
             }
+            (_, Datatype::Compound { .. }) => Ok(Value::Other(
+                "records or complex numbers; save each field, or the real part, as a vector",
+            )),
             _ => Ok(Value::Other("neither numbers nor text")),
         }
     }

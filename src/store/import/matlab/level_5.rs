@@ -24,6 +24,8 @@ struct Element<'a> {
     data: &'a [u8],
 }
 
+/// Flag of a matrix with an imaginary part.
+const COMPLEX: u32 = 0x0800;
 const MATRIX: u32 = 14;
 const COMPRESSED: u32 = 15;
 const TRUNCATED: &str = "the file ends within a variable: it was cut off";
@@ -133,7 +135,7 @@ fn matrix(
                 .map(|_| Ok(matrix(reader.next()?.data, is_little, depth + 1)?.1));
             Value::Cells(cells.collect::<std::result::Result<_, String>>()?)
         }
-        2 if count == 1 => structure(&mut reader, depth)?,
+        2 => structures(&mut reader, count, depth)?,
         4 => characters(&reader.next()?, is_little)?,
         6..=15 => {
             let values = numbers(&reader.next()?, is_little)?;
@@ -143,9 +145,17 @@ fn matrix(
                     values.len()
                 ));
             }
-            Value::Numbers(rows, count / rows.max(1), values)
+            let imaginary = if flags & COMPLEX == 0 {
+                Vec::new()
+            } else {
+                numbers(&reader.next()?, is_little)?
+            };
+            if imaginary.iter().all(|part| *part == 0.0) {
+                Value::Numbers(rows, count / rows.max(1), values)
+            } else {
+                Value::Other("complex numbers; save the real part")
+            }
         }
-        2 => Value::Other("an array of structs"),
         5 => Value::Other("a sparse matrix"),
         _ => Value::Other("an object; save its numbers as plain vectors"),
     };
@@ -164,8 +174,12 @@ fn sizes(dimensions: &Element, is_little: bool) -> std::result::Result<Vec<usize
     Ok(sizes)
 }
 
-/// Fields of a struct of one element.
-fn structure(reader: &mut Reader, depth: usize) -> std::result::Result<Value, String> {
+/// Structs of an array, each with its fields; a single one as itself.
+fn structures(
+    reader: &mut Reader,
+    count: usize,
+    depth: usize,
+) -> std::result::Result<Value, String> {
     let length = reader.next()?;
     let length = Reader {
         bytes: length.data,
@@ -174,15 +188,27 @@ fn structure(reader: &mut Reader, depth: usize) -> std::result::Result<Value, St
     .word(0)? as usize;
     let names = reader.next()?.data;
     let names: Vec<String> = names.chunks(length.max(1)).map(text).collect();
-    let field = |name: String| {
-        let element = reader.next()?;
-        Ok((name, matrix(element.data, reader.is_little, depth + 1)?.1))
-    };
-    let fields = names
-        .into_iter()
-        .map(field)
-        .collect::<std::result::Result<_, String>>()?;
-    Ok(Value::Struct(fields))
+    let mut structs = Vec::new();
+    // A struct without fields has no bytes, and any count of them would be stated.
+    for _ in 0..if names.is_empty() { 0 } else { count } {
+        let field = |name: &String| {
+            let element = reader.next()?;
+            let value = matrix(element.data, reader.is_little, depth + 1)?.1;
+            Ok((name.clone(), value))
+        };
+        let fields = names.iter().map(field);
+        structs.push(Value::Struct(
+            fields.collect::<std::result::Result<_, String>>()?,
+        ));
+    }
+    Ok(match structs.pop() {
+        Some(single) if structs.is_empty() => single,
+        Some(last) => {
+            structs.push(last);
+            Value::Cells(structs)
+        }
+        None => Value::Other("an empty struct"),
+    })
 }
 
 /// Text up to its first zero.

@@ -53,6 +53,7 @@ fn write_columns(
         table.add(if single { "" } else { &name }, &name, value);
     }
     let is_named = table.name_matrix_columns();
+    table.add_stated_units();
     let rows = table.frequent_length();
     let (columns, mut notes) = table.of_length(rows);
     if columns.len() < 2 || rows < 2 {
@@ -63,6 +64,7 @@ fn write_columns(
     if !is_named && !naming.has_names() {
         notes.push(note_on_nameless(&heads));
     }
+    notes.extend(naming.note_on_time(&heads));
     let mut writer = naming.writer(source, file, &heads)?;
     let heads = writer.heads.clone();
     let at_once = batch_rows(columns.len());

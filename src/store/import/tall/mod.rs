@@ -14,18 +14,21 @@ mod wide_table;
 use std::path::{Path, PathBuf};
 
 use super::imported_contents::{ImportedContents, refused};
+use super::naming::Naming;
 use crate::error::Result;
 use crate::store::atomic::Draft;
 
 pub use source::{Role, Tall};
 
 /// Imports a Parquet file of three or four columns. One of several parts becomes a folder of files.
-pub fn import(source: &Path, file: &Path) -> Result<ImportedContents> {
+pub fn import(source: &Path, file: &Path, naming: &Naming) -> Result<ImportedContents> {
     let Some(tall) = Tall::open(source)? else {
         let what = "Parquet with one column a channel is read as it is: name it as the archive, or give it to `harvest \
-                    init --from`; import takes tall files with the columns time, name, value and perhaps unit";
+                    init --from`; the channel map (aircraft.yaml) has the meaning of its columns, whatever their names. \
+                    Import takes tall files with the columns time, name, value and perhaps unit";
         return Err(refused(source, what));
     };
+    naming.refuse_tall(source)?;
     import_opened(&tall, file)
 }
 
