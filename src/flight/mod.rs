@@ -3,6 +3,7 @@
 pub mod absence;
 pub mod channel;
 pub mod correction;
+pub mod fill_value;
 pub mod formula;
 pub mod interpolation_kernel;
 pub mod linear_table;

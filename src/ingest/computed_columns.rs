@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::column_source::ColumnSource;
+use crate::flight::fill_value::is_fill_value_in;
 use crate::flight::{Channel, Formula};
 
 /// Rows of the columns of a formula that are in memory at once.
@@ -101,8 +102,12 @@ impl<S: ColumnSource + ?Sized> ColumnSource for ComputedColumns<'_, S> {
             let operands = self.operands(file, formula, &part)?;
             let mut at_row = vec![f64::NAN; operands.len()];
             let value = |row: usize| {
-                for (own, operand) in at_row.iter_mut().zip(&operands) {
-                    *own = operand.get(row).copied().unwrap_or(f64::NAN);
+                for ((own, values), operand) in
+                    at_row.iter_mut().zip(&operands).zip(formula.operands())
+                {
+                    let recorded = values.get(row).copied();
+                    let measured = recorded.filter(|v| !is_fill_value_in(*v, &operand.unit));
+                    *own = measured.unwrap_or(f64::NAN);
                 }
                 formula.value(&at_row)
             };

@@ -5,14 +5,14 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::channel::{
     ChannelStatistics, ConditionedChannel, Signature, channel_with_gaps, empty_channel,
-    sparse_channel, stuck_channel, values_beyond,
+    fill_values, sparse_channel, stuck_channel, values_beyond,
 };
 use super::checks::BlockAverager;
 use super::clock::{Clock, Stretch};
 use super::context::Context;
 use super::examination::{PART_SAMPLES, RecordReader};
 use super::refusal::{Refusal, UnreadChannel};
-use crate::error::Problem;
+use crate::error::{Problem, ProblemStage};
 use crate::flight::stand_in::gap_stand_ins;
 use crate::flight::{Channel, Completion, Mark, StandIn, signal};
 
@@ -112,6 +112,8 @@ impl<'a> SortedChannels<'a, 'a> {
             } else {
                 let repairs = reported_repairs(name, channel, &statistics, clock);
                 problems.extend(repairs.map(|refusal| refusal.into_problem(flight_id)));
+                let fills = fill_values(name, &statistics, clock);
+                problems.extend(fills.map(|r| r.of_stage(ProblemStage::Recording, flight_id)));
                 let means = conditioned_channel.block_means;
                 block_means.extend(means.map(|means| (channel.signal.clone(), means)));
                 // The turns of an unwrapped angle depend on where the record begins.

@@ -254,6 +254,35 @@ fn unit_sign_and_scale_are_those_of_the_channel_map() {
 }
 
 #[test]
+fn a_unit_in_the_file_that_harvest_does_not_have_says_nothing_and_a_load_factor_is_in_g() {
+    let mut flight = Flight::steady();
+    let unit = |flight: &mut Flight, column: &str, unit: &str| {
+        flight.raw.columns.get_mut(column).unwrap().unit = Some(unit.to_owned());
+    };
+    unit(&mut flight, "theta", "Altgrad");
+    unit(&mut flight, "an", "-");
+    assert_eq!(flight.ingest().unwrap().problems, []);
+    // A calibrated airspeed is none.
+    unit(&mut flight, "V", "KCAS");
+    assert!(flight.refused().reason.contains("the file states `KCAS`"));
+}
+
+#[test]
+fn fill_values_count_as_missing_and_are_named() {
+    let mut flight = Flight::steady();
+    flight.values("theta")[40..43].fill(-9_999.0);
+    let ingested = flight.ingest().unwrap();
+    let [problem] = &ingested.problems[..] else {
+        panic!("{:?}", ingested.problems)
+    };
+    assert_eq!(problem.stage, ProblemStage::Recording);
+    let words = "3 samples are fill values such as -9999";
+    assert!(problem.reason.contains(words), "{}", problem.reason);
+    let theta = ingested.record.values(signal::THETA).unwrap();
+    assert!(theta.iter().all(|value| value.abs() < 90.0));
+}
+
+#[test]
 fn a_unit_in_the_file_that_is_not_the_channel_map_s_is_refused_naming_both() {
     let mut flight = Flight::steady();
     flight.raw.columns.get_mut("theta").unwrap().unit = Some("rad".to_owned());
@@ -276,7 +305,7 @@ fn a_unit_in_the_file_that_is_not_the_channel_map_s_is_refused_naming_both() {
 fn a_channel_that_nothing_requires_is_left_out_by_name() {
     let mut flight = Flight::steady();
     for name in ["psi", "mach"] {
-        flight.raw.columns.get_mut(name).unwrap().unit = Some("furlong".to_owned());
+        flight.raw.columns.get_mut(name).unwrap().unit = Some("kg".to_owned());
     }
     let ingested = flight.ingest().unwrap();
     let reasons: Vec<&str> = ingested
@@ -298,7 +327,7 @@ fn a_channel_that_nothing_requires_is_left_out_by_name() {
 fn a_stated_unit_that_contradicts_the_map_costs_no_flight_where_nothing_requires_the_signal() {
     let mut flight = Flight::steady();
     for name in ["altitude", "de"] {
-        flight.raw.columns.get_mut(name).unwrap().unit = Some("furlong".to_owned());
+        flight.raw.columns.get_mut(name).unwrap().unit = Some("kg".to_owned());
     }
     let ingested = flight.ingest().unwrap();
     let places: Vec<&str> = ingested.problems.iter().map(|p| p.place.as_str()).collect();
@@ -310,7 +339,7 @@ fn a_stated_unit_that_contradicts_the_map_costs_no_flight_where_nothing_requires
     flight.raw.columns.remove("qbar");
     let refused = flight.refused();
     assert_eq!(refused.place, "channel `altitude`, channel `qbar`");
-    assert!(refused.reason.contains("`furlong`"), "{refused:?}");
+    assert!(refused.reason.contains("`kg`"), "{refused:?}");
 }
 
 #[test]

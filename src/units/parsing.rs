@@ -3,6 +3,9 @@
 use super::product::UnitProduct;
 use super::unit::{SPELLINGS, UNITS, Unit, plain, unit};
 
+/// Largest relative difference of two factors of one unit: rounding.
+const SAME: f64 = 1e-12;
+
 impl Unit {
     /// Parses a unit, another spelling of one, or a product of units of a quantity that harvest
     /// has: `N m-1 s`. Spaces, `^`, `*` and a middle dot are ignored.
@@ -49,7 +52,20 @@ impl Unit {
             .iter()
             .find(|u| u.dimensions() == product.dimensions)?;
         let factor = product.factor / kept.quantity.dimensions().1;
-        Some(unit("a product of units", None, kept.quantity, factor))
+        // `slug-ft2` is `slug ft2`.
+        let is_same = |u: &&Unit| {
+            u.quantity == kept.quantity && u.offset == 0.0 && (u.factor / factor - 1.0).abs() < SAME
+        };
+        let same = UNITS.iter().find(is_same).copied();
+        Some(same.unwrap_or_else(|| unit("a product of units", None, kept.quantity, factor)))
+    }
+}
+
+impl Unit {
+    /// `true` for a text that no unit of harvest has, and that is not refused for a reason.
+    #[must_use]
+    pub fn is_unknown(text: &str) -> bool {
+        Unit::known(text).is_none() && reason(text).is_empty()
     }
 }
 

@@ -12,10 +12,11 @@ pub struct UnitProduct {
 
 impl UnitProduct {
     /// Parses a product of units, also one of a quantity that no signal has. Units after a slash
-    /// divide.
+    /// divide; a hyphen before a letter multiplies, as in `slug-ft2`.
     #[must_use]
     pub fn parse(text: &str) -> Option<UnitProduct> {
         let (mut dimensions, mut factor) = ([0; 6], 1.0);
+        let text = &without_hyphens(text);
         for (n, part) in text.split('/').enumerate() {
             let side = if n == 0 { 1 } else { -1 };
             let is_between =
@@ -49,6 +50,20 @@ pub fn name_of(dimensions: Dimensions) -> String {
         _ => format!("{name}{exponent}"),
     });
     factors.collect::<Vec<String>>().join(" ")
+}
+
+/// A text with a space for each hyphen between a unit and a letter.
+fn without_hyphens(text: &str) -> String {
+    let mut before = None;
+    let mut rest = text.chars().peekable();
+    let mut plain = String::with_capacity(text.len());
+    while let Some(c) = rest.next() {
+        let is_between = before.is_some_and(char::is_alphanumeric)
+            && rest.peek().is_some_and(|c| c.is_alphabetic());
+        plain.push(if c == '-' && is_between { ' ' } else { c });
+        before = Some(c);
+    }
+    plain
 }
 
 /// A unit and its exponent: `s2`, `s^-2`.

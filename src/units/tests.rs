@@ -169,3 +169,22 @@ fn a_product_of_no_quantity_has_its_dimensions() {
     assert_eq!(name_of([0, -1, 1, -2, 0, 0]), "lbf/ft2");
     assert!(UnitProduct::parse("m2/degC").is_none());
 }
+
+#[test]
+fn a_product_that_is_a_unit_has_its_name_and_hyphens_multiply() {
+    for (text, name) in [
+        ("SLUG-FT2", "slug ft2"),
+        ("slug-ft^2", "slug ft2"),
+        ("C", "degC"),
+        ("DEG F", "degF"),
+        ("IN HG", "inHg"),
+        ("lb/sqft", "lbf/ft2"),
+    ] {
+        assert_eq!(
+            Unit::parse(text).map(|u| u.name).as_deref(),
+            Ok(name),
+            "{text}"
+        );
+    }
+    assert!(Unit::is_unknown("Altgrad") && !Unit::is_unknown("KCAS") && !Unit::is_unknown("deg"));
+}

@@ -172,6 +172,8 @@ const CASED_SPELLINGS: &[(&str, &str)] = &[
     ("°R", "degR"),
     ("Kt", "kt"),
     ("KT", "kt"),
+    ("C", "degC"),
+    ("F", "degF"),
 ];
 
 /// Units that are other units in another case: `Ns` is an impulse, `Ms` a million seconds.
@@ -220,6 +222,9 @@ pub(super) const SPELLINGS: &[(&str, &str)] = &[
     ("metres", "m"),
     ("lb/ft2", "lbf/ft2"),
     ("lbs/ft2", "lbf/ft2"),
+    ("lb/sqft", "lbf/ft2"),
+    ("lbs/sqft", "lbf/ft2"),
+    ("lbf/sqft", "lbf/ft2"),
     ("lbf/in2", "psi"),
     ("psia", "psi"),
     ("psid", "psi"),
@@ -240,9 +245,12 @@ pub(super) const SPELLINGS: &[(&str, &str)] = &[
     ("tonnes", "t"),
     ("kelvin", "K"),
     ("rankine", "degR"),
+    ("inhg", "inHg"),
     ("celsius", "degC"),
+    ("degc", "degC"),
     ("°c", "degC"),
     ("fahrenheit", "degF"),
+    ("degf", "degF"),
     ("°f", "degF"),
     ("rev/min", "rpm"),
     ("1/min", "rpm"),
@@ -333,6 +341,12 @@ impl Unit {
     #[must_use]
     pub fn is_radian(self) -> bool {
         self.name == "rad"
+    }
+
+    /// `true` for a pure number where the other unit is g: a load factor.
+    #[must_use]
+    pub fn is_load_factor_of(self, other: Unit) -> bool {
+        self.name == "-" && other.name == "g"
     }
 
     /// `true` for the inch.

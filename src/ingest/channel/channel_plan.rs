@@ -121,8 +121,14 @@ fn stated_unit(
     }
 }
 
+/// `true` if a stated unit does not contradict the channel map. A unit that harvest does not have says nothing,
+/// and a load factor is a pure number.
 fn same_unit(stated: &str, mapped: &str) -> bool {
+    if Unit::is_unknown(stated) {
+        return true;
+    }
     match (Unit::parse(stated), Unit::parse(mapped)) {
+        (Ok(a), Ok(b)) if a.is_load_factor_of(b) => true,
         // A pound becomes a pound-force, not the reverse.
         (Ok(a), Ok(b)) => a
             .factor_to(b)
@@ -218,6 +224,7 @@ mod tests {
         assert!(same_unit("slug ft^2", "slug ft2"));
         assert!(!same_unit("rad", "deg"));
         assert!(!same_unit("deg", "deg/s"));
-        assert!(!same_unit("furlong", "ft"));
+        assert!(!same_unit("kcas", "kt"));
+        assert!(same_unit("furlong", "ft") && same_unit("-", "g") && !same_unit("g", "-"));
     }
 }

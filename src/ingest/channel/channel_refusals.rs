@@ -91,6 +91,18 @@ pub fn values_beyond(
     Some(Refusal::of_channel(name, reason))
 }
 
+/// Fill values of a channel, which count as missing; `None` without any.
+#[must_use]
+pub fn fill_values(name: &str, statistics: &ChannelStatistics, clock: &Clock) -> Option<Refusal> {
+    let (sample, value) = statistics.first_fill?;
+    let reason = format!(
+        "{} samples are fill values such as {value}, the first at {:.3} s; they count as missing",
+        statistics.fills,
+        clock.time_s(sample)
+    );
+    Some(Refusal::of_channel(name, reason))
+}
+
 /// Refusal of a second channel of a signal.
 pub fn duplicate_signal(name: &str, channel: &Channel) -> Refusal {
     let reason = format!(

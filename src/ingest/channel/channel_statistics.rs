@@ -30,6 +30,9 @@ pub struct ChannelStatistics {
     /// samples.
     pub beyond: usize,
     pub first_beyond: Option<usize>,
+    /// Number of fill values such as -9999, which count as missing, and the first of these samples with its value.
+    pub fills: usize,
+    pub first_fill: Option<(usize, f64)>,
 }
 
 impl ChannelStatistics {

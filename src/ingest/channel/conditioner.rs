@@ -16,6 +16,7 @@ use super::spell_characters::Characters;
 use super::spikes;
 use super::unwrap::Unwrapper;
 use super::update_rate::{LONGEST_PERIOD, UpdateRate};
+use crate::flight::fill_value::is_fill_value;
 use crate::flight::record::Series;
 use crate::flight::{Channel, Mark};
 use crate::ingest::settings::Settings;
@@ -43,6 +44,7 @@ pub struct Conditioner {
     samples: usize,
     /// Conversion of the recorder's numbers to the signal's unit.
     conversion: Conversion,
+    signal: String,
     is_flag: bool,
     reach: BridgedGaps,
     unwrapper: Option<Unwrapper>,
@@ -74,6 +76,7 @@ impl Conditioner {
                 factor: conversion.factor * channel.sign * channel.scale,
                 ..conversion
             },
+            signal: channel.signal.clone(),
             is_flag: channel.unit == FLAG_UNIT,
             reach: BridgedGaps::of(&channel.signal, settings.longest_bridge_s, step_s),
             unwrapper: Unwrapper::of(channel, step_s, LONGEST_PERIOD, settings),
@@ -115,7 +118,7 @@ impl Conditioner {
 
     /// Takes the next samples as recorded; a missing sample is NaN.
     pub fn push(&mut self, recorded: &[f64]) {
-        match self.without_beyond(recorded) {
+        match self.without_impossible(recorded) {
             Some(recorded) => self.convert(&recorded),
             None => self.convert(recorded),
         }
@@ -129,16 +132,24 @@ impl Conditioner {
         }
     }
 
-    /// Recorded values with those beyond any measurement set to NaN; `None` if no value is.
-    fn without_beyond(&mut self, recorded: &[f64]) -> Option<Vec<f64>> {
-        let conversion = self.conversion;
+    /// Recorded values with fill values and those beyond any measurement set to NaN; `None` if no value is.
+    fn without_impossible(&mut self, recorded: &[f64]) -> Option<Vec<f64>> {
+        let (conversion, signal) = (self.conversion, &self.signal);
         let is_beyond = |value: f64| value.is_finite() && conversion.of(value).abs() > LARGEST;
-        let first = recorded.iter().position(|value| is_beyond(*value))?;
-        let first = self.pushed() + first;
-        self.statistics.first_beyond.get_or_insert(first);
-        let cleaned = recorded.iter().map(|value| {
+        let is_fill = |value: f64| is_fill_value(value, signal, conversion.of(value));
+        recorded
+            .iter()
+            .position(|value| is_beyond(*value) || is_fill(*value))?;
+        let pushed = self.first + self.values.len();
+        let statistics = &mut self.statistics;
+        let cleaned = recorded.iter().enumerate().map(|(k, value)| {
             if is_beyond(*value) {
-                self.statistics.beyond += 1;
+                statistics.beyond += 1;
+                statistics.first_beyond.get_or_insert(pushed + k);
+                f64::NAN
+            } else if is_fill(*value) {
+                statistics.fills += 1;
+                statistics.first_fill.get_or_insert((pushed + k, *value));
                 f64::NAN
             } else {
                 *value

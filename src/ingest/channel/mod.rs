@@ -19,7 +19,7 @@ mod update_rate;
 pub use channel_plan::{ChannelPlan, plan_channels};
 pub use channel_reader::{ChannelReader, ConditionedChannel};
 pub(in crate::ingest) use channel_refusals::{
-    channel_with_gaps, empty_channel, sparse_channel, stuck_channel, values_beyond,
+    channel_with_gaps, empty_channel, fill_values, sparse_channel, stuck_channel, values_beyond,
 };
 pub(in crate::ingest) use channel_statistics::ChannelStatistics;
 pub use signature::{Overlap, Signature};
