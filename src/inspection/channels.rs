@@ -139,9 +139,9 @@ pub fn unless_unknown_unit(facts: &ColumnFacts, is_sure: bool, evidence: String)
 /// Range above which an angle is in degrees: no surface turns by as many radians.
 const LARGEST_RAD: f64 = 1.6;
 
-/// Unit of an input, and `true` if the file or the name states it clearly. The unit of other angles follows
-/// from their range; controls are numbers.
-pub fn input_unit(facts: &ColumnFacts, input: &InputColumn) -> (Unit, bool) {
+/// Unit of an input, and `true` if the file or the name states it clearly. The unit of other angles follows from their
+/// range: in that of radians, it is the one (`usual`) that the recorder's other angles have. Controls are numbers.
+pub fn input_unit(facts: &ColumnFacts, input: &InputColumn, usual: Option<Unit>) -> (Unit, bool) {
     let number = Unit::of_signal("");
     if let Some(unit) = facts.unit {
         return (unit, !facts.has_ambiguous_unit);
@@ -158,7 +158,7 @@ pub fn input_unit(facts: &ColumnFacts, input: &InputColumn) -> (Unit, bool) {
     ) {
         (false, _) => (number, false),
         (true, true) => (degrees, false),
-        (true, false) => (radians, false),
+        (true, false) => (usual.unwrap_or(radians), false),
     }
 }
 

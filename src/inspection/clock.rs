@@ -56,6 +56,9 @@ pub fn uneven_clock(recordings: &[Recording]) -> Option<String> {
     }
     names.first().map(|name| {
         let columns = recordings.iter().filter_map(|r| Some((r, r.column(name)?)));
+        if let Some(reason) = columns.clone().find_map(|(r, column)| coarse_clock(r, column)) {
+            return reason;
+        }
         let backwards = |(recording, column): (&Recording, &Column)| {
             let steps = column.values.windows(2).map(|pair| pair[1] - pair[0]);
             let is_back = |step: &f64| step.is_nan() || *step <= 0.0;
@@ -70,6 +73,26 @@ pub fn uneven_clock(recordings: &[Recording]) -> Option<String> {
             ),
             None => format!("`{name}` does not count time: its steps are uneven"),
         }
+    })
+}
+
+/// Message for a column of times that never go backwards and often repeat: they are written with too few digits.
+fn coarse_clock(recording: &Recording, column: &Column) -> Option<String> {
+    let values = &column.values;
+    let steps = || values.windows(2).map(|pair| pair[1] - pair[0]);
+    let repeated = steps().filter(|step| *step == 0.0).count();
+    let is_coarse =
+        steps().all(|step| step >= 0.0) && repeated as f64 > (1.0 - FORWARDS) * values.len() as f64;
+    let mean_step = (values.last()? - values.first()?) / (values.len() - 1) as f64;
+    (is_coarse && mean_step > 0.0).then(|| {
+        format!(
+            "`{name}` has too few digits in {file}: {repeated} of {all} rows repeat the time before. Export it with more \
+             digits, or import the text with `--step`, which counts the time from row to row in place of a column `time`: \
+             {mean_step:.4} in its unit",
+            name = column.name,
+            file = recording.name,
+            all = values.len()
+        )
     })
 }
 
@@ -182,6 +205,22 @@ mod tests {
         );
         recording.columns.push(column("clock", &f64::from));
         assert_eq!(uneven_clock(&[recording]), None);
+    }
+
+    #[test]
+    fn a_clock_with_too_few_digits_is_named_with_what_to_do() {
+        let column = Column {
+            name: "time".to_owned(),
+            stated: None,
+            values: (0..1000).map(|k| f64::from(k / 4) * 0.1).collect(),
+        };
+        let recording = Recording {
+            name: "f".to_owned(),
+            columns: vec![column],
+        };
+        let reason = uneven_clock(&[recording]).unwrap();
+        let words = ["750 of 1000 rows", "`--step`", "0.0249 in its unit"];
+        assert!(words.iter().all(|w| reason.contains(w)), "{reason}");
     }
 
     #[test]

@@ -11,10 +11,11 @@ use super::controls::inputs::{InputColumn, inputs, kind_of, rate};
 use super::controls::steps::{Excursions, InputActivity, steps};
 use super::findings::{Channel, Inspection, Role, Unused};
 use super::grid::Grid;
+use super::mach_airspeed::{with_airspeed, without_airspeed};
 use super::names::mirror_images::MirrorImages;
 use super::names::vocabulary::meanings;
 use super::quantity::Quantity;
-use super::recording::Recording;
+use super::recording::{Recording, without_fill_values};
 use super::search::assignment::{Assignment, Candidates, Search};
 use super::search::certainty::verdicts;
 use super::search::descent::SearchResult;
@@ -32,6 +33,16 @@ const JUDGED_SAMPLES: usize = 6_000;
 /// # Errors
 /// A message where no column counts time.
 pub fn inspect(recordings: &[Recording]) -> Result<Inspection, String> {
+    let cleaned = without_fill_values(recordings);
+    let recordings = cleaned.as_deref().unwrap_or(recordings);
+    match with_airspeed(recordings) {
+        Some(extended) => inspect_pairs(&extended).map(without_airspeed),
+        None => inspect_pairs(recordings),
+    }
+}
+
+/// Inspects recordings with the half differences of mirror images in their place.
+fn inspect_pairs(recordings: &[Recording]) -> Result<Inspection, String> {
     let pairs = MirrorImages::of(recordings);
     if pairs.is_empty() {
         return inspect_columns(recordings);
@@ -140,16 +151,38 @@ impl FoundChannels<'_> {
             Some((input, own.filter(|c| self.is_free(c))?))
         });
         let free: Vec<(&InputColumn, &ColumnFacts)> = free.collect();
+        let usual = self.unit_of_angles(&free);
         let excursions = free.iter().map(|(input, facts)| {
-            let (unit, _) = input_unit(facts, input);
+            let (unit, _) = input_unit(facts, input, usual);
             Excursions::of(grid, &input.column, input.kind, unit)
         });
         let excursions: Vec<Excursions> = excursions.collect();
         let steps = steps(&excursions);
         for (((input, facts), excursions), step) in free.into_iter().zip(&excursions).zip(&steps) {
-            let channel = self.input_channel(input, facts, (excursions.moves(), step));
+            let channel = self.input_channel(input, facts, (excursions.moves(), step), usual);
             self.channels.push(channel);
         }
+    }
+
+    /// Degrees, if the recorder surely writes angles without a stated unit in them: its other angles then have them too.
+    fn unit_of_angles(&self, inputs: &[(&InputColumn, &ColumnFacts)]) -> Option<Unit> {
+        let degrees = Unit::of_signal(signal::THETA);
+        let is_stated = |name: &str| {
+            self.facts
+                .iter()
+                .any(|c| c.name == name && c.unit.is_some())
+        };
+        let is_angle = |c: &&Channel| {
+            Unit::of_signal(&c.signal).quantity == degrees.quantity
+                && c.is_sure
+                && !is_stated(&c.column)
+        };
+        let angles = || self.channels.iter().filter(is_angle);
+        let are_of_motion = angles().next().is_some() && angles().all(|c| c.unit == degrees.name);
+        let is_of_surface = |(input, facts): &(&InputColumn, &ColumnFacts)| {
+            facts.unit.is_none() && input_unit(facts, input, None).0.name == degrees.name
+        };
+        (are_of_motion || inputs.iter().any(is_of_surface)).then_some(degrees)
     }
 
     /// Channel of an input, which moves or not and has a step or not.
@@ -158,8 +191,9 @@ impl FoundChannels<'_> {
         input: &InputColumn,
         facts: &ColumnFacts,
         (moves, step): (bool, &InputActivity),
+        usual: Option<Unit>,
     ) -> Channel {
-        let (unit, stated) = input_unit(facts, input);
+        let (unit, stated) = input_unit(facts, input, usual);
         let kept = if unit.quantity == units::Quantity::Number {
             ""
         } else {
@@ -342,6 +376,28 @@ fn reason(facts: &ColumnFacts, candidates: &Candidates, assignment: &Assignment)
 mod tests {
     use super::*;
     use crate::inspection::test_flight::{TestFlight, test_column, times};
+
+    #[test]
+    fn a_surface_that_hardly_moves_has_the_unit_of_the_other_angles() {
+        use crate::inspection::quantity::Quantity::{P, Phi, Q, Theta};
+        let unit_of_aileron = |units: [&'static str; 2]| {
+            let [angle, rate] = units;
+            let columns = [
+                ("theta", Theta, angle),
+                ("q", Q, rate),
+                ("phi", Phi, angle),
+                ("p", P, rate),
+            ];
+            let mut recording = TestFlight::default().recording(&columns);
+            let values = times().iter().map(|t| (0.7 * t).sin()).collect();
+            recording.columns.push(test_column("da", values));
+            let found = inspect(&[recording]).expect("a clock");
+            let own = found.channels.into_iter().find(|c| c.column == "da");
+            own.map(|channel| channel.unit)
+        };
+        assert_eq!(unit_of_aileron(["deg", "deg/s"]).as_deref(), Some("deg"));
+        assert_eq!(unit_of_aileron(["rad", "rad/s"]).as_deref(), Some("rad"));
+    }
 
     #[test]
     fn a_signal_that_two_names_mean_equally_is_not_sure() {

@@ -9,7 +9,7 @@
 //!
 //! In the order of use:
 //!
-//! - `recording` (the input), `names`, `quantity`, `clock`, `grid` (one step for all columns);
+//! - `recording` (the input), `mach_airspeed` (what stands for an airspeed), `names`, `quantity`, `clock`, `grid` (one step for all columns);
 //! - `search`: candidates (`plausible`), `equations`, `signs`, `assignment` (and its cost), `rotation`
 //!   and `descent`, `rescaling`, `certainty`;
 //! - `controls`: `effects` and `inputs` (surfaces and controls), `steps` (which of them step);
@@ -24,6 +24,7 @@ pub mod draft;
 mod findings;
 mod grid;
 mod inspect;
+mod mach_airspeed;
 mod quantity;
 mod recording;
 #[cfg(test)]

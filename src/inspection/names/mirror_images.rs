@@ -117,13 +117,16 @@ fn operand(name: &str) -> String {
 fn common_name(left: &str, right: &str) -> Option<String> {
     let spellings = [Spelling::of(left), Spelling::of(right)];
     let [l, r] = [&spellings[0].words, &spellings[1].words];
+    let has_quotes = [left, right].iter().any(|name| name.contains('`'));
+    if let ([l], [r]) = (&l[..], &r[..]) {
+        return attached_sides(l, r).filter(|_| !has_quotes);
+    }
     let mut differing = l.iter().zip(r).enumerate().filter(|(_, (l, r))| l != r);
     let (at, (of_left, of_right)) = differing.next()?;
     let is_pair = SIDES
         .iter()
         .any(|(left, right)| of_left == left && of_right == right);
     let is_surface = input(&spellings[0]).is_some_and(Input::is_surface);
-    let has_quotes = [left, right].iter().any(|name| name.contains('`'));
     let is_one = l.len() == r.len() && l.len() > 1 && differing.next().is_none();
     if !(is_pair && is_surface && is_one) || has_quotes {
         return None;
@@ -132,6 +135,14 @@ fn common_name(left: &str, right: &str) -> Option<String> {
     // The words of the whole name begin with those before the unit.
     common.remove(at);
     Some(common.join("_"))
+}
+
+/// Name of a surface whose halves have the letter of their side at the end of a word: `da` of `dal` and `dar`.
+fn attached_sides(left: &str, right: &str) -> Option<String> {
+    let name = left.strip_suffix('l')?;
+    let is_pair = right.strip_suffix('r') == Some(name);
+    let is_surface = input(&Spelling::of(name)).is_some_and(Input::is_surface);
+    (is_pair && is_surface).then(|| name.to_owned())
 }
 
 /// Correlation of two columns where both have values; `None` where one of them rests.
@@ -195,6 +206,17 @@ mod tests {
             (value - (0.1 * 1.0_f64.sin() - 0.01)).abs() < 1e-12,
             "{value}"
         );
+    }
+
+    #[test]
+    fn sides_may_be_the_last_letter_of_a_word() {
+        let flight = |left, right| recording(&[(left, f64::sin), (right, |t| -t.sin())]);
+        let name = |left, right| {
+            let found = MirrorImages::of(&[flight(left, right)]);
+            found.first().map(|pair| pair.name.clone())
+        };
+        assert_eq!(name("DAL", "DAR").as_deref(), Some("da"));
+        assert_eq!(name("fuel", "fuer"), None);
     }
 
     #[test]

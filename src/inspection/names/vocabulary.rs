@@ -158,12 +158,13 @@ const ENTRIES: &[Entry] = &[
         names: &["ax", "nx", "accx", "longacc", "axialacc", "accelx", "nxcg", "long", "longg"],
         words: &[&["longitudinal", "acceleration"], &["axial", "acceleration"], &["long", "acc"], &["axial", "acc"],
             &["nx"], &["ax"], &["accel", "x"], &["acc", "x"], &["acceleration", "x"], &["longitudinal", "accel"],
+            &["long", "accel"], &["longitudinal", "acc"], &["axial", "accel"],
             &["laengsbeschl"], &["laengsbeschleunigung"], &["längsbeschleunigung"]],
     },
     Entry {
         signal: signal::AY,
         names: &["ay", "ny", "accy", "latacc", "accely", "nycg", "latg"],
-        words: &[&["lateral", "acceleration"], &["lateral", "accel"], &["lat", "acc"], &["ny"], &["ay"], &["accel", "y"],
+        words: &[&["lateral", "acceleration"], &["lateral", "accel"], &["lat", "acc"], &["lat", "accel"], &["lateral", "acc"], &["ny"], &["ay"], &["accel", "y"],
             &["acc", "y"], &["side", "acceleration"], &["acceleration", "y"], &["querbeschl"], &["querbeschleunigung"]],
     },
     Entry {
@@ -301,6 +302,11 @@ const INPUTS: &[InputWords] = &[
             &["manche", "roulis"], &["barra", "lat"], &["cloche", "lat"], &["palanca", "balanceo"]]),
     (Input::Pedals, &["pedal", "pedals", "ped", "dpp", "rped", "rudped", "ruddpedal"],
         &[&["pedal"], &["pedals"], &["pilot", "yaw"], &["pedale"], &["palonnier"], &["pedaliera"], &["pedales"]]),
+    // The symmetric part of a pair in pitch and the antisymmetric part of one in roll are the surfaces of the axis.
+    (Input::Elevator, &[], &[&["stab", "sym"], &["stab", "symmetric"], &["stabilator", "sym"], &["stabilator", "symmetric"],
+        &["elevator", "sym"], &["elevator", "symmetric"], &["elev", "sym"]]),
+    (Input::Aileron, &["ailrn"], &[&["ail", "diff"], &["ail", "differential"], &["aileron", "diff"],
+        &["aileron", "differential"], &["ailrn"]]),
     (Input::OtherSurface, &["df", "dlef", "dtef", "lef", "tef", "dsp", "dspoil", "dsb", "dc", "dcan", "slat"],
         &[&["flap"], &["flaps"], &["slat"], &["slats"], &["lef"], &["tef"], &["spoiler"], &["speedbrake"], &["canard"], &["vane"],
             &["airbrake"], &["tab"], &["symmetric"], &["sym"], &["simm"], &["differential"], &["diff"], &["leading", "edge"],

@@ -398,6 +398,28 @@ mod tests {
     }
 
     #[test]
+    fn a_pitch_attitude_alone_is_proposed_where_gravity_confirms_it() {
+        use Quantity::{Alpha, An, Ax, Q, Theta, Velocity};
+        let level = TestFlight {
+            bank: 0.0,
+            ..TestFlight::default()
+        };
+        let columns = [
+            ("x1", Theta, "rad"),
+            ("x2", Q, "rad/s"),
+            ("x3", Velocity, "m/s"),
+            ("x4", Ax, "m/s2"),
+            ("x5", Alpha, "rad"),
+            ("x6", An, "m/s2"),
+        ];
+        let found = search(&level.recording(&columns));
+        assert_eq!(found.proposed, BTreeSet::from([Theta, Q]));
+        for (name, quantity, _) in columns.into_iter().take(2) {
+            assert_eq!(found.assignment[&quantity].column, name, "{found:?}");
+        }
+    }
+
+    #[test]
     fn without_a_heading_pitch_is_not_confused_with_bank() {
         use Quantity::{P, Phi, Q, R, Theta};
         let columns = [

@@ -156,7 +156,7 @@ fn candidate(quantity: Quantity, facts: &ColumnFacts, weight: f64) -> Option<Can
             !plausible_signs(quantity, low * factor, high * factor).is_empty()
         })
     };
-    let stated = facts.unit.map(|unit| unit.name);
+    let stated = facts.unit.map(|unit| stated_unit(quantity, unit));
     let usual = quantity.units().iter().copied();
     let usual = usual.filter(|unit| match stated {
         Some(stated) => facts.has_ambiguous_unit && *unit != stated,
@@ -173,6 +173,16 @@ fn candidate(quantity: Quantity, facts: &ColumnFacts, weight: f64) -> Option<Can
         units,
         signs,
     })
+}
+
+/// Unit that a file states for a quantity. A load factor is a pure number in multiples of g.
+fn stated_unit(quantity: Quantity, unit: Unit) -> &'static str {
+    let kept = Unit::of_signal(quantity.signal());
+    if unit.is_load_factor_of(kept) {
+        kept.name
+    } else {
+        unit.name
+    }
 }
 
 /// Signs for which an aircraft's quantity can have this range, in rad, ft, s and slug; the usual
@@ -222,6 +232,16 @@ mod tests {
         let (_, candidates) = searched(&recording);
         let of_an = candidates[&Quantity::An].iter().map(|c| c.column.as_str());
         assert_eq!(of_an.collect::<Vec<_>>(), ["x1"]);
+    }
+
+    #[test]
+    fn a_load_factor_without_a_unit_is_in_g() {
+        let mut recording = TestFlight::default().recording(&[("nz", Quantity::An, "g")]);
+        for column in &mut recording.columns {
+            column.stated = (column.name == "nz").then(|| "-".to_owned());
+        }
+        let (_, candidates) = searched(&recording);
+        assert_eq!(candidates[&Quantity::An][0].units, ["g"]);
     }
 
     #[test]

@@ -59,10 +59,38 @@ impl Search<'_> {
             return proposed;
         }
         let Some((best, _)) = best.filter(|(best, _)| self.all_hold(best)) else {
-            return BTreeSet::new();
+            return self.seed_pitch(&integrals, assignment);
         };
         *assignment = best;
         rotation.into_iter().collect()
+    }
+
+    /// Adds a pitch attitude and its rate, with names outside the vocabulary, where no other axis is found. Gravity in the
+    /// axial acceleration distinguishes them from a bank and its rate. Returns both.
+    fn seed_pitch(
+        &self,
+        integrals: &[(Choice, Choice)],
+        assignment: &mut Assignment,
+    ) -> BTreeSet<Quantity> {
+        let pitch = [Quantity::Theta, Quantity::Q];
+        let mut ranked: Vec<(f64, Assignment)> = Vec::new();
+        for (angle, rate) in integrals {
+            for sign in [1.0, -1.0] {
+                let both = [
+                    (Quantity::Theta, with_sign(angle, sign)),
+                    (Quantity::Q, with_sign(rate, sign)),
+                ];
+                let trial = with(assignment, both);
+                ranked.push((self.physical_cost(&trial, &[Quantity::Theta]), trial));
+            }
+        }
+        match best_of(self.with_gravity(ranked), &pitch) {
+            Some((best, true)) => {
+                *assignment = best;
+                pitch.into()
+            }
+            _ => BTreeSet::new(),
+        }
     }
 
     /// Adds pitch and bank with all rates, with names outside the vocabulary, where no heading is recorded. Pitch and
