@@ -335,6 +335,10 @@ impl Examination<'_> {
                 return (again, findings);
             }
         }
+        // A vane at another place may be why the relation fails.
+        if findings.has_moved_vane() {
+            return (relations, findings.without_corrections());
+        }
         (relations, Findings::default())
     }
 

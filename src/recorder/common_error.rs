@@ -12,6 +12,12 @@ const FEWEST_FLIGHTS: usize = 4;
 /// as far from the others. It is low because some fifty series are examined.
 const FAR_PROBABILITY: f64 = 1e-4;
 
+/// Least share of a flight's stated variance that its estimate really has. The bounds of the reconstruction contain
+/// systematic parts that one recorder has alike: over 108 simulated flights the errors of attitudes were 0.56 to 0.65
+/// of the bounds. A larger share: a scatter between flights hides behind the bounds, and completed errors get too
+/// small a bound.
+const TRUE_SHARE: f64 = 0.35;
+
 /// Mean and scatter of an error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CommonError {
@@ -47,7 +53,7 @@ impl CommonError {
             mean: pooled.mean(),
             bound: (widening * pooled.variance().sqrt()).hypot(systematic(&near, &pooled)),
             scatter: pooled.scatter_variance.sqrt(),
-            scatter_limit: pooled.scatter_limit(&observations)?.sqrt(),
+            scatter_limit: scatter_limit(&observations)?.sqrt(),
             far,
         })
     }
@@ -63,6 +69,16 @@ impl CommonError {
         let total = prior + information;
         ((prior * self.mean + moment) / total, total.recip().sqrt())
     }
+}
+
+/// Upper 90 % limit of τ² if the flights state variances that are too large.
+fn scatter_limit(observations: &[Observation]) -> Option<f64> {
+    let with_true = |y: &Observation| Observation {
+        variance: TRUE_SHARE * y.variance,
+        ..*y
+    };
+    let observations: Vec<Observation> = observations.iter().map(with_true).collect();
+    RandomEffects::mean_of(&observations)?.scatter_limit(&observations)
 }
 
 /// Standard deviation of the mean from the parts that all flights share: the mean of the flights'
@@ -177,6 +193,24 @@ mod tests {
         let bound = CommonError::of(&series).unwrap().bound;
         let of_chance = 0.0005 * student::widening_95(15.0);
         assert_abs_diff_eq!(bound, of_chance.hypot(0.001), epsilon = 1e-9);
+    }
+
+    #[test]
+    fn bounds_of_completed_flights_hold_where_the_flights_state_too_large_ones() {
+        const TIMES: u32 = 300;
+        let mut random = RandomStream::new(5, "stated");
+        let mut inside = 0;
+        for _ in 0..TIMES {
+            // Attitudes of the light aircraft: errors of 0.07 with bounds of 0.13, and a scatter of 0.12.
+            let truth: Vec<f64> = (0..18).map(|_| 0.12 * random.normal()).collect();
+            let draw = |truth: &f64| (truth + 0.075 * random.normal(), 0.13);
+            let values: Vec<(f64, f64)> = truth[..17].iter().map(draw).collect();
+            let common = CommonError::of(&scales(&values)).unwrap();
+            let (value, bound) = common.of_flight(None);
+            inside += u32::from((value - truth[17]).abs() < 1.96 * bound);
+        }
+        let share = f64::from(inside) / f64::from(TIMES);
+        assert!(share > 0.92, "{share}");
     }
 
     #[test]

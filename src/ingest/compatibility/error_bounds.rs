@@ -4,13 +4,15 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::joint_state::JointState;
+use super::measured_terms::EARTH_RATE;
 use super::parameters::{
-    INPUTS, Kind, OUTPUTS, PARAMETERS, Parameters, SIGNALS, input, input_factor, place,
+    INPUTS, Kind, OUTPUTS, PARAMETERS, Parameters, SIGNALS, input, input_factor, output, place,
 };
 use super::window::Window;
 use super::window_fit::{Squares, squares_about_mean};
 use crate::flight::signal;
 use crate::numerics::statistics::student;
+use crate::units::DEG;
 
 /// Relative error of the equations themselves. Gravity and positions are right to some 10⁻⁴. An arm
 /// that is half an inch wrong adds 0.001 g at an angular acceleration of 1 rad/s², where the maneuvers
@@ -51,7 +53,9 @@ impl JointState<'_> {
             let j = place(input::FORWARD + i, Kind::Scale);
             systematic[j] += (MODEL_SCALE * ratio).powi(2);
         }
-        self.add_gust_errors(&self.moves_by_errors(&inverse), &mut systematic);
+        let moves = self.moves_by_errors(&inverse);
+        self.add_errors(&self.gust_errors(), &moves, &mut systematic);
+        self.add_errors(&self.heading_errors(windows), &moves, &mut systematic);
         // The variance of few windows is itself uncertain, so it is enlarged as Student's intervals are.
         let windows = self.windows.len() as f64;
         let widening = student::widening_95(windows - 1.0).powi(2);
@@ -74,9 +78,9 @@ impl JointState<'_> {
         inverse * self.evidence_information()
     }
 
-    /// Adds the variances that [`Self::gust_errors`] cause.
-    fn add_gust_errors(&self, moves: &DMatrix<f64>, variances: &mut Parameters) {
-        let errors = self.gust_errors().into_iter().enumerate();
+    /// Adds the variances that errors of the parameters cause.
+    fn add_errors(&self, errors: &Parameters, moves: &DMatrix<f64>, variances: &mut Parameters) {
+        let errors = errors.iter().enumerate();
         for (source, error) in errors.filter(|(source, _)| self.estimated[*source]) {
             for (j, variance) in variances.iter_mut().enumerate() {
                 *variance += (error * moves[(j, source)]).powi(2);
@@ -107,6 +111,27 @@ impl JointState<'_> {
             if VANES.contains(&SIGNALS[INPUTS + output]) {
                 set(Kind::Delay, all.rate);
             }
+        }
+        errors
+    }
+
+    /// Errors of the rate gyros' biases without a recorded heading: the part of the earth's rotation along the unknown
+    /// north, which the equations leave out. Zero for the other parameters.
+    fn heading_errors(&self, windows: &[Window]) -> Parameters {
+        let mut errors = [0.0; PARAMETERS];
+        let has_heading = self.estimated[place(INPUTS + output::PSI, Kind::Delay)];
+        if has_heading {
+            return errors;
+        }
+        let latitude = self.context.aircraft.latitude_deg / DEG;
+        let terms = || windows.iter().flat_map(|window| &window.terms);
+        let count = terms().count().max(1) as f64;
+        for axis in [input::P, input::Q, input::R] {
+            // Mean square along the axis of a horizontal unit vector in any direction.
+            let down = terms().map(|terms| terms.to_body[(axis, 2)].powi(2));
+            let horizontal = down.map(|down| 0.5 * (1.0 - down)).sum::<f64>() / count;
+            let rate = EARTH_RATE * latitude.cos() * horizontal.sqrt();
+            errors[place(axis, Kind::Bias)] = rate * DEG;
         }
         errors
     }

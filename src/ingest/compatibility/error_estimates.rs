@@ -192,6 +192,7 @@ pub mod tests {
             data_shares: [1.0; PARAMETERS],
             prior: [1.0; PARAMETERS],
             speed_ft_s: Some(170.0),
+            misfit: 0.0,
         };
         errors.values[parameter] = value;
         errors

@@ -68,6 +68,8 @@ pub struct FittedErrors {
     pub prior: Parameters,
     /// Mean airspeed of the windows.
     pub speed_ft_s: Option<f64>,
+    /// Negative logarithm of the likelihood of the outputs' residuals, up to a constant.
+    pub misfit: f64,
 }
 
 /// Fits the windows; `None` if too few of them can be integrated.
@@ -119,6 +121,7 @@ pub fn fit(
         data_shares: bounds.data_shares,
         prior: state.prior,
         speed_ft_s: mean_speed_ft_s(windows),
+        misfit: state.windows.iter().map(WindowFit::misfit).sum(),
     })
 }
 

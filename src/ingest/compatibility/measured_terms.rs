@@ -9,7 +9,7 @@ use crate::flight::{Record, signal as s};
 use crate::units::DEG;
 
 /// The earth's rotation, rad/s (WGS 84).
-const EARTH_RATE: f64 = 7.292_115e-5;
+pub const EARTH_RATE: f64 = 7.292_115e-5;
 
 /// The earth's mean radius, ft (6,371 km).
 const EARTH_RADIUS_FT: f64 = 2.090_2e7;
@@ -86,14 +86,11 @@ pub fn rotation_terms(
 ) -> MeasuredTerms {
     let to_body = to_body(phi, theta, psi);
     let latitude = aircraft.latitude_deg / DEG;
-    let pole = Vector3::new(latitude.cos(), 0.0, -latitude.sin()) * EARTH_RATE;
+    let north = if has_heading { latitude.cos() } else { 0.0 };
+    let pole = Vector3::new(north, 0.0, -latitude.sin()) * EARTH_RATE;
     let ground = to_body.transpose() * velocity;
     let round = Vector3::new(ground.y, -ground.x, -ground.y * latitude.tan()) / EARTH_RADIUS_FT;
-    let earth = if has_heading {
-        to_body * pole
-    } else {
-        Vector3::zeros()
-    };
+    let earth = to_body * pole;
     MeasuredTerms {
         gravity: 0.0,
         arms: [[0.0; 3]; 3],

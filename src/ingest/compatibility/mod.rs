@@ -12,9 +12,8 @@ mod equations;
 mod error_bounds;
 mod error_estimates;
 mod error_sizes;
-mod flight_findings;
+mod findings;
 mod parameter_noise;
-mod instrument_finding;
 mod joint_fit;
 mod joint_state;
 mod measured_terms;
@@ -22,6 +21,7 @@ mod parameters;
 mod reconstruction;
 mod row_correction;
 mod settings;
+mod vane_positions;
 mod window;
 mod window_choice;
 mod window_fit;
@@ -34,8 +34,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 pub use error_estimates::{ErrorEstimate, ErrorEvidence};
 pub use error_sizes::{ErrorSize, ErrorSizes};
-pub use flight_findings::Findings;
-pub use instrument_finding::InstrumentFinding;
+pub use findings::{Findings, InstrumentFinding};
 pub use row_correction::correction;
 pub use settings::{Action, Compatibility, OnFault};
 
@@ -94,10 +93,14 @@ pub fn examine(
         windows.extend(ranges.map(|range| Window::of(&record, range, aircraft, settings)));
     }
     let errors = joint_fit::fit(&windows, aircraft, settings);
-    let findings = Findings::of(errors.as_ref(), channels, recorded, settings);
     if windows.len() < FEWEST_TO_NAME {
-        findings.without_faults()
-    } else {
-        findings
+        return Findings::of(errors.as_ref(), channels, recorded, settings).without_faults();
     }
+    let explained = errors
+        .as_ref()
+        .and_then(|e| vane_positions::explained(e, &windows, aircraft, settings));
+    let Some((errors, positions)) = explained else {
+        return Findings::of(errors.as_ref(), channels, recorded, settings);
+    };
+    Findings::of(Some(&errors), channels, recorded, settings).with_positions(&positions)
 }

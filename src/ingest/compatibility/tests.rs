@@ -705,6 +705,49 @@ fn a_delay_of_a_channel_is_named_and_no_other() {
     }
 }
 
+#[test]
+fn a_vane_at_another_place_is_named_and_not_the_instruments_that_it_contradicts() {
+    let record = recorded(&flight(65.0), &ordinary(3), 7);
+    let (channels, names) = channels();
+    for (signal, blamed, ahead_ft) in [(s::ALPHA_VANE, s::Q, 30.0), (s::BETA_VANE, s::R, -25.0)] {
+        let mut stated = aircraft();
+        let vane = if signal == s::ALPHA_VANE {
+            &mut stated.sensors.alpha_vane
+        } else {
+            &mut stated.sensors.beta_vane
+        };
+        vane.x_ft += ahead_ft;
+        let windows: Vec<Window> = choose_windows(&record, 20, &settings())
+            .into_iter()
+            .map(|range| Window::of(&record, range, &stated, &settings()))
+            .collect();
+        let mut found = joint_fit::fit(&windows, &stated, &settings()).unwrap();
+        let late = place(
+            SIGNALS.iter().position(|s| *s == blamed).unwrap(),
+            Kind::Delay,
+        );
+        (found.values[late], found.bounds[late]) = (0.1, 0.001);
+        let explained = vane_positions::explained(&found, &windows, &stated, &settings());
+        let (errors, positions) = explained.unwrap();
+        assert!(
+            positions.len() == 1 && positions[0].signal == signal,
+            "{positions:?}"
+        );
+        assert_abs_diff_eq!(positions[0].ahead_ft, ahead_ft, epsilon = 5.0);
+        let findings = Findings::of(Some(&errors), &channels, &names, &settings());
+        let found = faults(&findings.with_positions(&positions));
+        assert!(found.len() == 1 && found[0].0 == signal, "{found:?}");
+    }
+}
+
+#[test]
+fn a_late_instrument_is_explained_by_no_position_of_a_vane() {
+    let mut errors = ordinary(4);
+    errors[place(1, Kind::Delay)] = 0.1;
+    let record = recorded(&flight(65.0), &errors, 7);
+    assert_eq!(faults(&examined(&record, &settings()))[0].0, s::Q);
+}
+
 /// Record in gusts at the sideslip vane. The aircraft turns into them after a while, so half of them goes with
 /// the rate of its own sideslip.
 fn in_side_gusts(exact: &Record, seed: u64) -> Record {
@@ -918,6 +961,28 @@ fn without_one_redundant_channel_the_others_are_found_with_bounds_that_hold() {
 }
 
 #[test]
+fn without_a_heading_the_gyros_have_the_earth_s_rotation_in_their_bounds() {
+    let exact = flight(65.0);
+    let bias_bounds = |lacking: &[&str]| {
+        let mut record = recorded(&exact, &[0.0; PARAMETERS], 1);
+        for name in lacking {
+            assume(&mut record, name);
+        }
+        let findings = examined(&record, &settings());
+        [s::P, s::Q].map(|signal| {
+            let finding = findings.0.iter().find(|f| f.signal == signal).unwrap();
+            finding.estimates[Kind::Bias as usize].unwrap().bound
+        })
+    };
+    // cos 35° of 15 degrees an hour, in any direction.
+    let horizontal = 15.0 / 3600.0 * (35.0 / DEG).cos() * 0.5_f64.sqrt();
+    for (with, without) in bias_bounds(&[]).into_iter().zip(bias_bounds(&[s::PSI])) {
+        let grown = (without * without - with * with).sqrt();
+        assert!(grown > 0.8 * horizontal, "{with} and {without}");
+    }
+}
+
+#[test]
 fn one_window_has_bounds_that_hold() {
     for seconds in [8.0, 15.0] {
         let (within, count) = coverage(&flight(seconds), 12, &[]);
@@ -972,6 +1037,7 @@ fn marks_move_with_an_applied_correction() {
         })
     };
     let findings = Findings(vec![InstrumentFinding {
+        ahead_ft: None,
         signal: s::THETA,
         channel: "theta".into(),
         examined: true,

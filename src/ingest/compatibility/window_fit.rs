@@ -261,6 +261,16 @@ impl<'a> WindowFit<'a> {
         }));
     }
 
+    /// Negative logarithm of the likelihood of the residuals of all outputs, up to a constant.
+    pub fn misfit(&self) -> f64 {
+        let outputs = self.window.outputs.iter().zip(self.variances);
+        let of_output = |(values, variance): (&Vec<f64>, f64)| {
+            let samples = values.iter().filter(|value| value.is_finite()).count();
+            0.5 * samples as f64 * variance.ln()
+        };
+        outputs.map(of_output).sum()
+    }
+
     /// Sums of squares of an output's slow residuals, of its reconstructed motion and of the motion's rate.
     pub fn residuals_and_motion(&self, context: &FitContext, output: usize) -> Squares {
         let measured = &self.window.outputs[output];

@@ -49,7 +49,7 @@ impl<'a> Step for IngestStep<'a> {
     type Artefact = IngestedFlight;
 
     const KIND: Kind = Kind::Ingest;
-    const VERSION: u32 = 38;
+    const VERSION: u32 = 39;
 
     fn item(&self) -> &str {
         &self.files.flight_id

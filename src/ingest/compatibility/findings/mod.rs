@@ -1,14 +1,18 @@
 //! Findings on all instruments of a flight: rows of the table `instruments`, problems, and the
 //! corrections of the record.
 
+mod instrument_finding;
+
 use std::collections::BTreeMap;
 
+pub use instrument_finding::InstrumentFinding;
+
 use super::error_estimates::{ErrorEvidence, has_estimate_at_limit, withdraw_corrections};
-use super::instrument_finding::InstrumentFinding;
 use super::joint_fit::FittedErrors;
 use super::parameters::{INSTRUMENTS, Kind};
 use super::row_correction::correction;
 use super::settings::Compatibility;
+use super::vane_positions::VanePosition;
 use crate::error::{Problem, ProblemStage};
 use crate::flight::{Channel, Correction, signal};
 use crate::tables::InstrumentRow;
@@ -80,6 +84,22 @@ impl Findings {
         let is_air = is_sure(by_pressure, pressure.bound) && is_sure(by_mach, 2.0 * mach.bound);
         let is_possible = by_pressure.abs() < LARGEST_AIR_DIFFERENCE;
         (is_air && agree && is_possible).then(|| by_pressure.exp())
+    }
+
+    /// These findings with vanes at other positions than the stated ones.
+    #[must_use]
+    pub fn with_positions(mut self, positions: &[VanePosition]) -> Findings {
+        for finding in &mut self.0 {
+            let own = positions.iter().find(|p| p.signal == finding.signal);
+            finding.ahead_ft = own.map(|position| position.ahead_ft);
+        }
+        self
+    }
+
+    /// `true` if a vane is at another position than the stated one.
+    #[must_use]
+    pub fn has_moved_vane(&self) -> bool {
+        self.0.iter().any(|finding| finding.ahead_ft.is_some())
     }
 
     /// `true` if an instrument has a fault.

@@ -3,13 +3,13 @@
 
 use std::collections::BTreeMap;
 
-use super::error_estimates::{
+use super::super::error_estimates::{
     ErrorEstimate, ErrorEvidence, correct_together, estimate, evidence, has_estimate_at_limit,
     instrument_error, withdraw_corrections,
 };
-use super::joint_fit::FittedErrors;
-use super::parameters::{ALL_KINDS, KINDS, Kind, SIGNALS};
-use super::settings::Compatibility;
+use super::super::joint_fit::FittedErrors;
+use super::super::parameters::{ALL_KINDS, KINDS, Kind, SIGNALS};
+use super::super::settings::Compatibility;
 use crate::flight::{Channel, signal};
 use crate::tables::{InstrumentRow, InstrumentVerdict};
 use crate::units::Unit;
@@ -31,6 +31,8 @@ pub struct InstrumentFinding {
     pub evidence: Vec<ErrorEvidence>,
     /// Temperature of the air over that of the standard atmosphere, if it explains the scale error.
     pub air_temperature: Option<f64>,
+    /// Distance of a vane ahead of its stated position, if that explains the readings of all instruments.
+    pub ahead_ft: Option<f64>,
 }
 
 impl InstrumentFinding {
@@ -63,12 +65,13 @@ impl InstrumentFinding {
             speed_ft_s: errors.and_then(|errors| errors.speed_ft_s),
             evidence: evidence.collect(),
             air_temperature: None,
+            ahead_ft: None,
         })
     }
 
     /// `true` if an error of the instrument is a fault.
     pub(super) fn has_fault(&self) -> bool {
-        self.estimates.iter().flatten().any(|e| e.fault)
+        self.ahead_ft.is_some() || self.estimates.iter().flatten().any(|e| e.fault)
     }
 
     /// Each fault in words.
@@ -87,7 +90,17 @@ impl InstrumentFinding {
                 words
             })
         };
-        ALL_KINDS.into_iter().filter_map(fault).collect()
+        let faults = ALL_KINDS.into_iter().filter_map(fault);
+        faults.chain(self.position_in_words()).collect()
+    }
+
+    /// Position of a vane against the stated one, in words.
+    fn position_in_words(&self) -> Option<String> {
+        self.ahead_ft.map(|ahead_ft| {
+            let direction = if ahead_ft > 0.0 { "ahead" } else { "aft" };
+            let distance_ft = ahead_ft.abs();
+            format!("about {distance_ft:.0} ft {direction} of its position in aircraft.yaml")
+        })
     }
 
     fn unit(&self) -> &'static str {
@@ -113,11 +126,20 @@ impl InstrumentFinding {
             }
         };
         let faults: Vec<String> = self.faults().into_iter().map(predicate).collect();
+        let bounds = if bounds.is_empty() {
+            String::new()
+        } else {
+            format!(" ({})", bounds.join(", "))
+        };
+        let against = if self.ahead_ft.is_some() {
+            "as the other channels show"
+        } else {
+            "against the other channels"
+        };
         format!(
-            "`{}` {} against the other channels ({}){}",
+            "`{}` {} {against}{bounds}{}",
             self.channel,
             faults.join(", "),
-            bounds.join(", "),
             self.vane_position().unwrap_or_default()
         )
     }
@@ -153,6 +175,9 @@ impl InstrumentFinding {
 
     /// Treatment of the channel with a fault, in words.
     pub(super) fn consequence(&self) -> &'static str {
+        if self.ahead_ft.is_some() {
+            return "the estimates have the stated position: correct it (aircraft.yaml, aircraft: sensors)";
+        }
         if self
             .estimates
             .iter()
@@ -207,7 +232,7 @@ impl InstrumentFinding {
 
 #[cfg(test)]
 mod tests {
-    use super::super::error_estimates::tests::estimated;
+    use super::super::super::error_estimates::tests::estimated;
     use super::*;
 
     #[test]
@@ -220,6 +245,7 @@ mod tests {
             speed_ft_s: Some(170.0),
             evidence: vec![],
             air_temperature: None,
+            ahead_ft: None,
         };
         let ahead = finding(signal::ALPHA_VANE, 0.088).fault_sentence();
         assert!(ahead.contains("15.0 ft ahead of its position"), "{ahead}");
