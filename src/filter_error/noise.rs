@@ -2,9 +2,13 @@
 //!
 //! The angle of the air is a random walk, whose steps from sample to sample are white noise. A
 //! rotary gust is noise of first order: white noise low-passed at a corner frequency that all
-//! rotary gusts share. Angle and rotary gusts correlate, because a rotary gust is the angle's
-//! change along the body (MIL-F-8785C). The parameters are logarithms of sizes and inverse
-//! hyperbolic tangents of correlations, so that the iteration may give them any value.
+//! rotary gusts share. Angle and rotary gusts correlate, because a rotary gust in the plane of the
+//! angle is the angle's change along the body (MIL-F-8785C).
+//!
+//! The parameters are such that the iteration may give them any value: logarithms of sizes, and
+//! u = asinh(c / √(1 − Σ c²)) for a correlation c, with the sum over the rotary gusts. Rotary gusts
+//! are independent of each other, so their covariance with the angle is positive definite as long as
+//! Σ c² < 1. For a single gust u = artanh c.
 
 use nalgebra::SMatrix;
 use serde::{Deserialize, Serialize};
@@ -50,7 +54,8 @@ pub struct Noise {
     pub gusts: [f64; MOST_GUSTS],
     /// Corner frequency of the rotary gusts, rad/s.
     pub corner: f64,
-    /// Correlation of each rotary gust's changes with the angle's, −1 to 1.
+    /// Correlation of each rotary gust's changes with the angle's; the sum of their squares is below
+    /// one.
     pub correlations: [f64; MOST_GUSTS],
     /// Standard deviation of each output's noise, in the output's unit.
     pub outputs: [f64; OUTPUTS],
@@ -183,10 +188,12 @@ impl Noise {
                 NoiseParameter::Angle => noise.angle = value.exp(),
                 NoiseParameter::Gust(g) => noise.gusts[g] = value.exp(),
                 NoiseParameter::Corner => noise.corner = value.exp(),
-                NoiseParameter::Correlation(g) => noise.correlations[g] = value.tanh(),
+                NoiseParameter::Correlation(g) => noise.correlations[g] = value.sinh(),
                 NoiseParameter::Output(o) => noise.outputs[o] = value.exp(),
             }
         }
+        let squares = noise.correlations.iter().map(|s| s * s).sum::<f64>();
+        noise.correlations = noise.correlations.map(|s| s / (1.0 + squares).sqrt());
         noise
     }
 
@@ -197,10 +204,26 @@ impl Noise {
             NoiseParameter::Angle => self.angle.ln(),
             NoiseParameter::Gust(g) => self.gusts[g].ln(),
             NoiseParameter::Corner => self.corner.ln(),
-            NoiseParameter::Correlation(g) => self.correlations[g].atanh(),
+            NoiseParameter::Correlation(g) => {
+                (self.correlations[g] / self.own_share(gusts)).asinh()
+            }
             NoiseParameter::Output(o) => self.outputs[o].ln(),
         };
         NoiseParameter::all(gusts).into_iter().map(value).collect()
+    }
+
+    /// Share √(1 − Σ c²) of the angle's changes that none of an axis's rotary gusts has.
+    fn own_share(&self, gusts: usize) -> f64 {
+        let squares = self.correlations[..gusts].iter().map(|c| c * c);
+        (1.0 - squares.sum::<f64>()).sqrt()
+    }
+
+    /// Slope of a gust's correlation along the parameter u of one of the correlations. With
+    /// s = sinh u it is c = s/√(1 + Σ s²).
+    fn correlation_slope(&self, gust: usize, along: usize, gusts: usize) -> f64 {
+        let (own, c) = (self.own_share(gusts), &self.correlations);
+        let direct = if gust == along { 1.0 } else { 0.0 };
+        own * (c[along] / own).hypot(1.0) * (direct - c[gust] * c[along])
     }
 
     /// `true` if all noise of the process is at its floor.
@@ -292,9 +315,7 @@ impl Noise {
         q[(E::ANGLE, E::ANGLE)] = self.angle.powi(2);
         for (g, &(_, relative)) in E::AIR_RELATIVE_RATES.iter().enumerate() {
             let variance = self.gust_variance(g, step_s);
-            // With a share for each gust the matrix stays positive for any correlations.
-            let share = self.correlations[g] / (E::AIR_RELATIVE_RATES.len() as f64).sqrt();
-            let cross = share * self.angle * variance.sqrt();
+            let cross = self.correlations[g] * self.angle * variance.sqrt();
             q[(relative, relative)] = variance;
             q[(E::ANGLE, relative)] = cross;
             q[(relative, E::ANGLE)] = cross;
@@ -327,10 +348,9 @@ impl Noise {
                 _ => (0.0, 0.0),
             };
             let mut cross = (of_gust + of_angle) * q[(E::ANGLE, relative)];
-            if parameter == NoiseParameter::Correlation(g) {
+            if let NoiseParameter::Correlation(along) = parameter {
                 let unit = self.angle * self.gust_variance(g, step_s).sqrt();
-                let share = 1.0 / (E::AIR_RELATIVE_RATES.len() as f64).sqrt();
-                cross = (1.0 - self.correlations[g].powi(2)) * share * unit;
+                cross = self.correlation_slope(g, along, E::AIR_RELATIVE_RATES.len()) * unit;
             }
             slope[(relative, relative)] = 2.0 * of_gust * q[(relative, relative)];
             slope[(E::ANGLE, relative)] = cross;
