@@ -1,6 +1,6 @@
 //! Filter error on one maneuver, and the choice between it and output error.
 
-use nalgebra::{DMatrix, DVector, SVector};
+use nalgebra::DMatrix;
 
 use super::filter_group::{FilterStart, Group, SlopeFit};
 use super::filter_minimum::{Minimum, NoMinimum};
@@ -17,10 +17,6 @@ use crate::filter_error::noise::Noise;
 use crate::output_error::equation_error::Regression;
 use crate::output_error::{Case, Fit, Measurements, Response};
 use crate::tables::{EstimationMethod, FitRow};
-
-/// Ratio of a rotary gust to the standard deviation of its rate, above which the gust may have
-/// taken the place of the rate.
-const MOSTLY: f64 = 0.5;
 
 /// Filter error's result on a maneuver.
 pub(in crate::estimate) struct Filtered {
@@ -178,30 +174,11 @@ fn minimise_from_two_starts<const NX: usize, E: Equations<NX>, const NG: usize, 
             Ok(minimum) => least = least.into_iter().chain([minimum]).min_by(Minimum::by_cost),
             Err(why) => failures.push(why),
         }
-        let is_plausible =
-            |minimum: &Minimum| !is_mostly_air(filters, minimum, &case.motion.states);
+        let is_plausible = |minimum: &Minimum| !group.is_mostly_air(filters, minimum);
         if least.as_ref().is_some_and(is_plausible) {
             break;
         }
     }
     let why = || failures.into_iter().min_by(NoMinimum::by_cost);
     least.ok_or_else(|| why().unwrap_or(NoMinimum::Diverges))
-}
-
-/// `true` if, in the filter of one maneuver, a rotary gust exceeds the share [`MOSTLY`] of the rate
-/// to which it adds.
-fn is_mostly_air<const NX: usize, const NG: usize, G: InGusts<NG>>(
-    filters: &[Filter<NG, G>],
-    minimum: &Minimum,
-    states: &[SVector<f64, NX>],
-) -> bool {
-    filters.iter().any(|filter| {
-        let gusts = filter.noise(&minimum.scored.parameters).gusts;
-        let mut rates = G::AIR_RELATIVE_RATES.iter().zip(gusts);
-        rates.any(|((rate, _), gust)| {
-            let values = states.iter().map(|x| x[*rate]);
-            let values = DVector::from_iterator(states.len(), values);
-            gust > MOSTLY * values.variance().sqrt()
-        })
-    })
 }
