@@ -6,10 +6,12 @@ use crate::units::{Quantity, Unit};
 /// Numbers of nines that recorders write for a missing value.
 const FILL_VALUES: [f64; 4] = [999.0, 9_999.0, 99_999.0, 999_999.0];
 
-/// `true` for a number that is usual as a fill value.
+/// `true` for a number that is usual as a fill value. Every recorded sample is asked, so most are decided by one comparison.
+#[inline]
 #[must_use]
 pub fn is_usual(recorded: f64) -> bool {
-    FILL_VALUES.contains(&recorded.abs())
+    let size = recorded.abs();
+    size >= FILL_VALUES[0] && FILL_VALUES.contains(&size)
 }
 
 /// `true` for a fill value that is no measurement of a signal either: `converted` is the number in the signal's unit.
