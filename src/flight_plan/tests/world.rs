@@ -15,7 +15,7 @@ use crate::flight_plan::goals::Goal;
 use crate::flight_plan::plan::{CampaignState, Plan, Rehearsal, plan};
 use crate::flight_plan::rehearsal::{RehearsalBasis, derivatives, instruments};
 use crate::lab::campaign::{FlightLimits, SimulatedCampaign, TestPoint, tunnel_rows};
-use crate::lab::simulator::{Card, DerivativeLookup, FlightCondition, Instruments, Simulator};
+use crate::lab::simulator::{Instruments, Simulator};
 use crate::maneuver::Maneuver;
 use crate::model::{ManeuverResults, Model, model};
 use crate::numerics::statistics::random::derived_seed;
@@ -73,19 +73,10 @@ impl World {
         Budget::of(&self.shipped.cards.next, minutes)
     }
 
-    /// Flies cards of one flight with the truth, and estimates them. As in flight, the derivatives vary
-    /// with the angle of attack during a maneuver.
+    /// Flies cards of one flight with the truth, and estimates them.
     pub fn fly(&self, flight: &str, cards: &[CandidateCard]) -> Vec<FlownCard> {
         let fly = |(i, candidate): (usize, &CandidateCard)| {
-            let condition = FlightCondition {
-                derivatives: DerivativeLookup::Varying,
-                ..candidate.card.condition
-            };
-            let card = Card {
-                condition,
-                ..candidate.card.clone()
-            };
-            let flown = self.shipped.simulator.fly(&card).unwrap();
+            let flown = self.shipped.simulator.fly(&candidate.card).unwrap();
             let seed = derived_seed(self.seed, &format!("{flight} {i}"));
             let record = flown.recorded(&self.instruments, seed);
             let maneuver = Maneuver {
