@@ -6,7 +6,7 @@ use crate::units::{Quantity, Unit};
 /// Numbers of nines that recorders write for a missing value.
 const FILL_VALUES: [f64; 4] = [999.0, 9_999.0, 99_999.0, 999_999.0];
 
-/// `true` for a number that is usual as a fill value. Every recorded sample is asked, so most are decided by one comparison.
+/// `true` for a number that is usual as a fill value. Most samples are decided by one comparison.
 #[inline]
 #[must_use]
 pub fn is_usual(recorded: f64) -> bool {
@@ -14,13 +14,15 @@ pub fn is_usual(recorded: f64) -> bool {
     size >= FILL_VALUES[0] && FILL_VALUES.contains(&size)
 }
 
-/// `true` for a fill value that is no measurement of a signal either: `converted` is the number in the signal's unit.
+/// `true` for a fill value that is no measurement of a signal either. `convert` returns the number in the signal's
+/// unit.
+#[inline]
 #[must_use]
-pub fn is_fill_value(recorded: f64, signal: &str, converted: f64) -> bool {
-    let is_of_any_sign = signal == signal::IXZ;
+pub fn is_fill_value(recorded: f64, signal: &str, convert: impl Fn(f64) -> f64) -> bool {
+    let is_of_any_sign = || signal == signal::IXZ;
     is_usual(recorded)
-        && is_impossible(Unit::of_signal(signal).quantity, converted)
-        && !is_of_any_sign
+        && !is_of_any_sign()
+        && is_impossible(Unit::of_signal(signal).quantity, convert(recorded))
 }
 
 /// `true` for a fill value in a column of a formula, which has this unit.
@@ -68,7 +70,7 @@ mod tests {
             (-9_999.0, signal::ALTITUDE, -9_999.0),
             (-9_999.0, signal::IX, -9_999.0),
         ] {
-            assert!(is_fill_value(recorded, signal, converted), "{signal}");
+            assert!(is_fill_value(recorded, signal, |_| converted), "{signal}");
         }
         for (recorded, signal, converted) in [
             (-9_998.0, signal::ALPHA_VANE, -9_998.0),
@@ -76,7 +78,7 @@ mod tests {
             (9_999.0, signal::ALTITUDE, 9_999.0),
             (-9_999.0, signal::IXZ, -9_999.0),
         ] {
-            assert!(!is_fill_value(recorded, signal, converted), "{signal}");
+            assert!(!is_fill_value(recorded, signal, |_| converted), "{signal}");
         }
         assert!(is_fill_value_in(-9_999.0, "hPa") && !is_fill_value_in(-9_999.0, "N"));
     }

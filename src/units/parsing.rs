@@ -59,9 +59,7 @@ impl Unit {
         let same = UNITS.iter().find(is_same).copied();
         Some(same.unwrap_or_else(|| unit("a product of units", None, kept.quantity, factor)))
     }
-}
 
-impl Unit {
     /// `true` for a text that no unit of harvest has, and that is not refused for a reason.
     #[must_use]
     pub fn is_unknown(text: &str) -> bool {

@@ -16,7 +16,7 @@ use super::spell_characters::Characters;
 use super::spikes;
 use super::unwrap::Unwrapper;
 use super::update_rate::{LONGEST_PERIOD, UpdateRate};
-use crate::flight::fill_value::{is_fill_value, is_usual};
+use crate::flight::fill_value::is_fill_value;
 use crate::flight::record::Series;
 use crate::flight::{Channel, Mark};
 use crate::ingest::settings::Settings;
@@ -136,11 +136,10 @@ impl Conditioner {
     fn without_impossible(&mut self, recorded: &[f64]) -> Option<Vec<f64>> {
         let (conversion, signal) = (self.conversion, &self.signal);
         let is_beyond = |value: f64| value.is_finite() && conversion.of(value).abs() > LARGEST;
-        let is_fill =
-            |value: f64| is_usual(value) && is_fill_value(value, signal, conversion.of(value));
-        recorded
-            .iter()
-            .position(|value| is_beyond(*value) || is_fill(*value))?;
+        let is_fill = |value: f64| is_fill_value(value, signal, |value| conversion.of(value));
+        if !recorded.iter().any(|v| is_beyond(*v) || is_fill(*v)) {
+            return None;
+        }
         let pushed = self.first + self.values.len();
         let statistics = &mut self.statistics;
         let cleaned = recorded.iter().enumerate().map(|(k, value)| {
