@@ -15,10 +15,10 @@ fn cards(campaign: &Campaign) -> std::path::PathBuf {
 next:
   settle_s: 20
   repeats: 1
-  limits: { an_g: [-2, 4], alpha_deg: [0, 52] }
+  limits: { an_g: [-2, 4], alpha_deg: [0, 42] }
   candidates:
     - { class: OLAT, alpha_deg: [15, 25] }
-    - { class: \"3211\", alpha_deg: [15, 60] }
+    - { class: \"3211\", alpha_deg: [15, 40] }
 ";
     let file = campaign.path("cards.yaml");
     fs::write(&file, format!("{head}{next}\nstudy:{tail}")).unwrap();
@@ -59,9 +59,9 @@ fn the_cards_of_the_next_flight_are_chosen_priced_and_limited() {
         .filter(|row| !row["refused"].is_empty())
         .collect();
     assert_eq!(refused.len(), 1, "{planned:?}");
-    assert_eq!(refused[0]["alpha_deg"], "60.0");
+    assert_eq!(refused[0]["alpha_deg"], "40.0");
     assert!(
-        refused[0]["refused"].contains("the limit is 52 deg"),
+        refused[0]["refused"].contains("the limit is 42 deg"),
         "{refused:?}"
     );
     let goals = rows(&campaign, "next_goals");
@@ -276,7 +276,7 @@ fn conditions_and_limits_that_no_card_can_have_are_named_with_their_line() {
     let campaign = Campaign::of_pitch_steps();
     let file = cards(&campaign);
     let text = fs::read_to_string(&file).unwrap();
-    let limits = "limits: { an_g: [-2, 4], alpha_deg: [0, 52] }";
+    let limits = "limits: { an_g: [-2, 4], alpha_deg: [0, 42] }";
     for (right, wrong, said) in [
         (
             limits,
@@ -339,8 +339,8 @@ fn conditions_and_limits_that_no_card_can_have_are_named_with_their_line() {
             "OLAT: `alpha_deg` lists no angle of attack",
         ),
         (
-            "\"3211\", alpha_deg: [15, 60]",
-            "\"3211\", scale: 1000, alpha_deg: [15, 60]",
+            "\"3211\", alpha_deg: [15, 40]",
+            "\"3211\", scale: 1000, alpha_deg: [15, 40]",
             "3211: `scale` must lie between 0.01 and 10, or with the other sign, not 1000",
         ),
     ] {

@@ -44,17 +44,6 @@ fn sums_are_constant_plus_slope_times_alpha() {
 }
 
 #[test]
-fn outliers_are_estimates_more_than_three_standard_deviations_from_their_trend() {
-    for outlier in rows("outliers") {
-        let z = number(outlier, "z");
-        let off = number(outlier, "value") - number(outlier, "trend");
-        assert!(z.abs() > 3.0 && z.signum() == off.signum(), "{outlier:?}");
-        let share = number(outlier, "weight_share");
-        assert!((0.0..1.0).contains(&share), "{outlier:?}");
-    }
-}
-
-#[test]
 fn each_maneuver_is_compared_with_the_tunnel_at_its_own_angle_of_attack() {
     let estimates = estimates();
     for row in rows("maneuver_comparison") {

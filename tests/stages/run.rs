@@ -203,11 +203,12 @@ const PUBLISHED: &[(&str, &str, &str)] = &[
 /// Tables without rows in the demonstration: it has one maneuver of each class at an angle of attack,
 /// no list of events, and nothing fails. Their rows are tested in `rows`, `joint_estimation`, `segment` and
 /// `ingest`.
-const WITHOUT_ROWS: [&str; 7] = [
+const WITHOUT_ROWS: [&str; 8] = [
     "beyond_tunnel",
     "changes",
     "events",
     "joint",
+    "outliers",
     "predictions",
     "problems",
     "unknown",

@@ -17,7 +17,7 @@ use crate::flight::record::Series;
 use crate::flight::{Mark, Record, signal};
 use crate::maneuver::{Maneuver, ManeuverOrigin, Quality, Recognised};
 use crate::numerics::series::sample_count::nearest;
-use crate::numerics::statistics::mean::mean;
+use crate::numerics::statistics::mean::{mean, root_mean_square};
 use crate::rigid_body::{BodyState, DEPARTURE_DEG};
 use crate::units::DEG;
 
@@ -375,6 +375,8 @@ impl<'a> CardFlight<'a> {
         };
         let start_s = record.time_s(first);
         let alphas_deg = alphas_deg.get(first..=last).unwrap_or_default();
+        let alpha_deg = mean(alphas_deg.iter().copied());
+        let about_mean = alphas_deg.iter().map(|alpha| alpha - alpha_deg);
         Maneuver {
             maneuver_id: format!("{}_t{:05}", record.flight_id, start_s.floor()),
             flight_id: record.flight_id.clone(),
@@ -382,7 +384,7 @@ impl<'a> CardFlight<'a> {
             axis: self.card.axis,
             start_s,
             end_s: record.time_s(last),
-            alpha_deg: mean(alphas_deg.iter().copied()),
+            alpha_deg,
             mach: mean_of(signal::MACH),
             qbar_psf: mean_of(signal::QBAR),
             velocity_ft_s: mean_of(signal::VELOCITY),
@@ -392,7 +394,10 @@ impl<'a> CardFlight<'a> {
             samples: last - first + 1,
             origin: ManeuverOrigin::Flown,
             recognised: Recognised::default(),
-            quality: Quality::default(),
+            quality: Quality {
+                alpha_rms_deg: Some(root_mean_square(about_mean)),
+                ..Quality::default()
+            },
         }
     }
 }

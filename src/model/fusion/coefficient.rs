@@ -30,8 +30,7 @@ pub struct CoefficientPosterior {
     pub terms: Vec<PosteriorTerm>,
     pub unknowns: Unknowns,
     pub scales: Vec<Scale>,
-    /// Scales before the last step, with which the noise between the points of the grids was
-    /// computed.
+    /// Scales before the last step, with which the noise of the maneuvers was computed.
     pub noise_scales: Vec<Scale>,
     /// Posterior, including the spread over the scales that the data leave open.
     pub gaussian: Gaussian,
@@ -152,23 +151,22 @@ impl Data {
         (data, planned)
     }
 
-    /// Adds the noise between the points of the grids to each maneuver's own noise, for these
-    /// scales.
-    pub fn add_grid_noise(&mut self, terms: &[PosteriorTerm], scales: &[Scale]) {
+    /// Sets each maneuver's whole noise, for these scales.
+    pub fn set_noise(&mut self, terms: &[PosteriorTerm], scales: &[Scale]) {
         for (flight, places) in self.flights.iter_mut().zip(&self.places) {
-            flight.add_grid_noise(&observed(places, &self.observations), terms, scales);
+            flight.set_noise(&observed(places, &self.observations), terms, scales);
         }
     }
 
     /// Finds the most probable scales from a start. Returns the observed differences, these scales
-    /// and the Gaussian; the noise between the points of the grids has the scales of the start.
+    /// and the Gaussian; the noise of the maneuvers has the scales of the start.
     fn fit(
         &mut self,
         terms: &[PosteriorTerm],
         weights: &[f64],
         start: &[Scale],
     ) -> Option<(ObservedDifferences, Vec<Scale>, Gaussian)> {
-        self.add_grid_noise(terms, start);
+        self.set_noise(terms, start);
         let sums = information(&self.flights, weights, self.unknowns.count);
         let information_on_differences = of_differences(&sums, &self.unknowns)?;
         let observed = ObservedDifferences::new(terms, &self.unknowns, &information_on_differences);

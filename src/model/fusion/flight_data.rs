@@ -8,7 +8,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use super::observation::Observation;
 use super::unknowns::{SparseRow, Unknowns, is_of_campaign};
 use crate::model::prior::scale_prior::Scale;
-use crate::model::prior::term::{PosteriorTerm, between_points};
+use crate::model::prior::term::PosteriorTerm;
 use crate::output_error::error_effect::SharedError;
 
 /// Evidence of a flight, y = A z + K u + e.
@@ -28,8 +28,7 @@ pub struct FlightData {
     pub differences: DVector<f64>,
     /// Rows A, one per estimate.
     pub rows: Vec<SparseRow>,
-    /// Covariance of e, maneuver by maneuver. Once set, it includes the noise between the points of
-    /// the grids.
+    /// Covariance of e, maneuver by maneuver. It is the whole noise once that is set.
     noise: Vec<DMatrix<f64>>,
     /// Covariance K Kᵀ from the calibration errors.
     calibration: DMatrix<f64>,
@@ -91,18 +90,10 @@ impl FlightData {
         data
     }
 
-    /// Sets each maneuver's noise to its own noise plus the noise between the points of the grids.
-    pub fn add_grid_noise(
-        &mut self,
-        observed: &[Observed],
-        terms: &[PosteriorTerm],
-        scales: &[Scale],
-    ) {
+    /// Sets each maneuver's noise to the whole noise of its observation.
+    pub fn set_noise(&mut self, observed: &[Observed], terms: &[PosteriorTerm], scales: &[Scale]) {
         for (noise, (_, _, observation)) in self.noise.iter_mut().zip(observed) {
-            let Observation {
-                design, condition, ..
-            } = observation;
-            *noise = &observation.noise + between_points(terms, scales, design, condition);
+            *noise = observation.whole_noise(terms, scales);
         }
     }
 

@@ -17,7 +17,9 @@ use nalgebra::{DMatrix, DVector};
 use crate::aero::{Condition, WindTunnel};
 use crate::maneuver::Status;
 use crate::model::evidence::ManeuverResults;
-use crate::model::prior::term::PosteriorTerm;
+use crate::model::prior::angle_noise::{ANGLE_SHARE, angle_noise};
+use crate::model::prior::scale_prior::Scale;
+use crate::model::prior::term::{PosteriorTerm, between_points};
 use crate::numerics::linear_algebra::symmetric::{scale, scaled};
 use crate::output_error::error_effect::{ErrorEffect, SharedError};
 
@@ -28,6 +30,8 @@ const LEAST_EIGENVALUE: f64 = 1e-6;
 #[derive(Clone, Debug)]
 pub struct Observation {
     pub condition: Condition,
+    /// Standard deviation of the angle of attack to which an estimate belongs, deg.
+    pub angle_deviation_deg: f64,
     /// Index of each row's term.
     pub terms: Vec<usize>,
     /// Estimates less the tunnel's values.
@@ -47,6 +51,18 @@ struct ObservationRow {
     of_parameters: Vec<(usize, f64)>,
     /// Estimate less the tunnel's value.
     difference: f64,
+}
+
+impl Observation {
+    /// Covariance of the errors that no other maneuver shares, with the variation between the points
+    /// of the grids and the uncertainty of the angle of attack.
+    #[must_use]
+    pub fn whole_noise(&self, terms: &[PosteriorTerm], scales: &[Scale]) -> DMatrix<f64> {
+        let (design, at) = (&self.design, &self.condition);
+        &self.noise
+            + between_points(terms, scales, design, at)
+            + angle_noise(terms, scales, design, at, self.angle_deviation_deg)
+    }
 }
 
 impl ManeuverResults<'_> {
@@ -72,6 +88,7 @@ impl ManeuverResults<'_> {
         let noise = self.noise(&of_rows, shared)?;
         Some(Observation {
             condition,
+            angle_deviation_deg: self.angle_deviation_deg(),
             terms: rows.iter().map(|r| r.term).collect(),
             differences: DVector::from_iterator(rows.len(), rows.iter().map(|r| r.difference)),
             design,
@@ -86,6 +103,13 @@ impl ManeuverResults<'_> {
                 .filter(|(_, change)| change.iter().any(|c| *c != 0.0))
                 .collect(),
         })
+    }
+
+    /// Standard deviation of the angle of attack to which an estimate belongs, deg; zero where the
+    /// sweep of the maneuver was not measured.
+    fn angle_deviation_deg(&self) -> f64 {
+        let sweep = self.maneuver.quality.alpha_rms_deg;
+        ANGLE_SHARE * sweep.filter(|rms| rms.is_finite()).unwrap_or(0.0)
     }
 
     fn row(

@@ -18,7 +18,7 @@
 //! all angles of attack. Where the table states its uncertainty u, u u′ stands for ρ² (½ + ½ t t′).
 //! Across Mach number and third variable M falls over the range of the table.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::grid::{Grid, Node};
 use super::prior_covariance::{PriorCovariance, matern_3_2, variance_factor};
@@ -51,6 +51,15 @@ pub struct TableOnGrid {
     pub size: f64,
 }
 
+/// Change of a derivative over a step of the angle of attack.
+#[derive(Clone, Copy, Debug)]
+pub struct Change {
+    /// Change of the tunnel's value.
+    pub of_tunnel: f64,
+    /// Prior variance of the change of the difference from the tunnel.
+    pub variance: f64,
+}
+
 impl DerivativePrior {
     #[must_use]
     pub fn new(name: String, grid: Grid, table: TableOnGrid, centre: Scale) -> DerivativePrior {
@@ -81,6 +90,32 @@ impl DerivativePrior {
             source: table.source,
             mean: table.mean,
             grid,
+        }
+    }
+
+    /// Tunnel's value at a condition; linear between the points of the grid.
+    #[must_use]
+    pub fn tunnel_value(&self, at: &Condition) -> f64 {
+        let shares = self.grid.shares(at).into_iter();
+        shares.map(|(i, share)| share * self.mean[i]).sum()
+    }
+
+    /// Half of the change from `step_deg` below a condition's angle of attack to `step_deg` above it.
+    #[must_use]
+    pub fn change_over(&self, scale: &Scale, at: &Condition, step_deg: f64) -> Change {
+        let half_at = |step_deg: f64, half: f64| {
+            let alpha_deg = at.alpha_deg + step_deg;
+            let shares = self.grid.shares(&Condition { alpha_deg, ..*at });
+            shares.into_iter().map(move |(i, share)| (i, half * share))
+        };
+        let both = half_at(step_deg, 0.5).chain(half_at(-step_deg, -0.5));
+        let (places, weights): (Vec<usize>, Vec<f64>) = both.unzip();
+        let weights = DVector::from_vec(weights);
+        let covariance = self.covariance.select(&places, &places).for_scale(scale);
+        let of_tunnel = places.iter().map(|&i| self.mean[i]);
+        Change {
+            of_tunnel: of_tunnel.zip(&weights).map(|(t, weight)| weight * t).sum(),
+            variance: weights.dot(&(covariance * &weights)).max(0.0),
         }
     }
 

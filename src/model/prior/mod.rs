@@ -5,3 +5,4 @@ pub mod scale_prior;
 pub mod prior_covariance;
 pub mod derivative_prior;
 pub mod term;
+pub mod angle_noise;

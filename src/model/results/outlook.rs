@@ -23,7 +23,7 @@ use crate::model::fusion::coefficient::{CoefficientPosterior, Data};
 use crate::model::fusion::observation::Observation;
 use crate::model::fusion::posterior::{gaussian, information};
 use crate::model::fusion::unknowns::{SparseRow, Unknowns, covariance_between, is_of_campaign};
-use crate::model::prior::term::{PosteriorTerm, TermSources, between_points};
+use crate::model::prior::term::{PosteriorTerm, TermSources};
 use crate::model::settings::Settings;
 use crate::numerics::linear_algebra::root::EXACT;
 use crate::output_error::error_effect::SharedError;
@@ -118,7 +118,7 @@ impl CoefficientPosterior {
         basis: &TermSources,
     ) -> Option<Outlook> {
         let (mut data, observed) = Data::with_planned(&self.terms, evidence, planned, basis);
-        data.add_grid_noise(&self.terms, &self.noise_scales);
+        data.set_noise(&self.terms, &self.noise_scales);
         let covariance = self.covariance(&data, evidence.len())?;
         let unknowns = &data.unknowns;
         let mut rows: Vec<SparseRow> = vec![];
@@ -129,7 +129,7 @@ impl CoefficientPosterior {
                 rows.extend(unknowns.rows(&self.terms, *class, observation));
                 PlannedRows {
                     rows: first..rows.len(),
-                    noise: self.noise(observation),
+                    noise: observation.whole_noise(&self.terms, &self.noise_scales),
                 }
             });
             planned_rows.push(placed);
@@ -173,13 +173,6 @@ impl CoefficientPosterior {
         let mut of_differences = covariance.view_mut((0, 0), differences);
         of_differences += positive(&(published - &of_differences));
         Some(covariance)
-    }
-
-    /// Covariance of the errors that no other maneuver shares, with the noise between the points of
-    /// the grids.
-    fn noise(&self, observation: &Observation) -> DMatrix<f64> {
-        let (design, at) = (&observation.design, &observation.condition);
-        &observation.noise + between_points(&self.terms, &self.noise_scales, design, at)
     }
 
     /// Row of a point over the unknowns; `None` for a point that does not depend on the

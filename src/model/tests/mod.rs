@@ -1,5 +1,6 @@
 //! Tests of the posterior: its exact limits, its derivatives, and simulated campaigns.
 
+mod angle;
 mod fixture;
 mod held;
 mod lift_and_drag;

@@ -95,7 +95,7 @@ fn dense(data: &Data, weights: &[f64]) -> (DMatrix<f64>, DVector<f64>, DMatrix<f
 fn the_normal_equations_give_generalised_least_squares() {
     let flown = campaign();
     let (terms, mut data) = data(&flown, &Settings::default());
-    data.add_grid_noise(&terms, &scales());
+    data.set_noise(&terms, &scales());
     let weights = vec![1.0, 0.4, 1.0, 1.0, 1.0, 0.7, 1.0, 1.0, 1.0, 1.0];
     let root = data.unknowns.root(&terms, &scales(), EXACT);
     let found = gaussian(
