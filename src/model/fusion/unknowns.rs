@@ -11,10 +11,10 @@ use nalgebra::{DMatrix, DVector};
 use super::observation::Observation;
 use crate::aero::Condition;
 use crate::model::prior::grid::Grid;
-use crate::model::prior::prior_covariance::matern_3_2;
 use crate::model::prior::scale_prior::Scale;
 use crate::model::prior::term::PosteriorTerm;
 use crate::numerics::linear_algebra::root::{BlockRoot, root};
+use crate::numerics::statistics::matern::matern_3_2;
 use crate::output_error::error_effect::SharedError;
 
 /// Distance over which a class's errors fade, deg; also the spacing of their grid.

@@ -21,9 +21,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::grid::{Grid, Node};
-use super::prior_covariance::{PriorCovariance, matern_3_2, variance_factor};
+use super::prior_covariance::{PriorCovariance, variance_factor};
 use super::scale_prior::{Scale, ScalePrior};
 use crate::aero::Condition;
+use crate::numerics::statistics::matern::matern_3_2;
 use crate::tables::PriorSource;
 
 /// Prior of one derivative, or sum of derivatives.

@@ -4,6 +4,7 @@
 use nalgebra::DMatrix;
 
 use super::scale_prior::Scale;
+use crate::numerics::statistics::matern::matern_3_2;
 
 /// Variance of the offset over the variance of the part that fades over α.
 const OFFSET: f64 = 0.25;
@@ -82,11 +83,4 @@ impl PriorCovariance {
 #[must_use]
 pub fn variance_factor(scale: &Scale) -> f64 {
     scale.size * scale.size / (1.0 + OFFSET)
-}
-
-/// Matérn correlation of order 3/2 at a distance over its length.
-#[must_use]
-pub fn matern_3_2(distance: f64) -> f64 {
-    let r = 3f64.sqrt() * distance;
-    (1.0 + r) * (-r).exp()
 }

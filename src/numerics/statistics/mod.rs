@@ -3,6 +3,7 @@
 pub mod chi_squared;
 #[cfg(test)]
 pub mod forecasts;
+pub mod matern;
 pub mod mean;
 pub mod normal;
 pub mod order_statistics;
