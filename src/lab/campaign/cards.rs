@@ -104,16 +104,30 @@ impl Default for StudySettings {
 }
 
 /// Errors of the simulated wind-tunnel database.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TunnelErrors {
-    /// Standard deviation of the error common to a derivative's table, percent of the table's root
-    /// mean square.
+    /// Standard deviation of the error common to a table, percent of the table's root mean square.
+    /// The tables are those of the derivatives and of the combined sums; constants follow.
     pub error_pct: f64,
     /// Standard deviation of the further error of each point, in the same unit.
     pub scatter_pct: f64,
+    /// Angle of attack over which a point's further error fades, deg: balances, mounts and fairing
+    /// make errors alike at neighbouring angles. Zero: each point has an error of its own.
+    pub scatter_length_deg: f64,
     /// Derivatives and combined sums left out of the database.
     pub leave_out: Vec<String>,
+}
+
+impl Default for TunnelErrors {
+    fn default() -> Self {
+        TunnelErrors {
+            error_pct: 0.0,
+            scatter_pct: 0.0,
+            scatter_length_deg: 15.0,
+            leave_out: Vec::new(),
+        }
+    }
 }
 
 /// Test points and conditions of one flight.
