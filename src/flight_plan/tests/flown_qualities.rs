@@ -104,7 +104,7 @@ fn sum<'a>(counts: impl Iterator<Item = &'a Held>) -> Held {
 }
 
 /// `make next-study`: the list flown, estimated, fused and judged, over 22 campaigns. Between the list's
-/// angles the prior alone decides, and the simulated tunnel has an error of its own at each point there.
+/// angles the prior decides.
 #[test]
 #[ignore = "a study of minutes: 1,012 maneuvers"]
 #[expect(clippy::print_stdout, reason = "the figures are the study's result")]

@@ -36,8 +36,8 @@ pub struct World {
 pub type FlownCard = (Maneuver, Estimated);
 
 impl World {
-    /// World whose tunnel errs as the cards say: by 8 % of a derivative, and by 3 % further at each
-    /// point.
+    /// World whose tunnel errs as the cards say: by 8 % of a derivative, and by 3 % further that
+    /// change over α.
     pub fn new(seed: u64, points: &[(&str, &[f64])]) -> World {
         let mut world = World::with_shipped_candidates(seed);
         let point = |(class, alphas): &(&str, &[f64])| TestPoint {
