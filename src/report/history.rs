@@ -3,6 +3,7 @@
 use super::contents::{Contents, group_by};
 use super::figure::scale::{Scale, extent};
 use super::page_selection;
+use crate::numerics::digits::with_six_digits;
 use crate::tables::{History, HistoryOutput};
 
 /// Largest number of samples of one signal: more cannot be distinguished in a column of the page.
@@ -45,12 +46,8 @@ pub fn is_marked(output: &HistoryOutput, sample: usize) -> bool {
 fn rounded_at(samples: &[usize], values: &[f64]) -> Vec<f64> {
     samples
         .iter()
-        .map(|i| values.get(*i).map_or(f64::NAN, |v| six_digits(*v)))
+        .map(|i| values.get(*i).map_or(f64::NAN, |v| with_six_digits(*v)))
         .collect()
-}
-
-fn six_digits(value: f64) -> f64 {
-    format!("{value:.5e}").parse().unwrap_or(value)
 }
 
 /// The history of each class's representative maneuver, in the order of the configuration.
