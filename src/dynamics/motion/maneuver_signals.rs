@@ -124,6 +124,12 @@ impl ManeuverSignals {
         point.is_multiple_of(self.points_per_sample)
     }
 
+    /// `true` unless the points between samples are left out.
+    #[must_use]
+    pub fn has_points_between_samples(&self) -> bool {
+        self.points_per_sample > 1
+    }
+
     /// Signals with the samples of a signal from other signals of the maneuver.
     #[must_use]
     pub fn with_samples_of(&self, name: &str, other: &ManeuverSignals) -> ManeuverSignals {

@@ -146,12 +146,18 @@ impl<'a, const NX: usize, E: Equations<NX>> RegressorColumns<'a, NX, E> {
         }
     }
 
-    /// Values of every column at every point, followed by zero points.
+    /// Values of every column at every point. Zero points follow for the passes, which take the
+    /// points between samples too.
     pub fn values(&self, motion: &PreparedMotion<NX, E>) -> Vec<Vec<f64>> {
+        let zero_points = if self.signals.has_points_between_samples() {
+            ZERO_POINTS
+        } else {
+            0
+        };
         let mut columns = Vec::with_capacity(self.derivatives.len());
         for derivative in &self.derivatives {
             let mut column = self.column(derivative, motion);
-            column.extend([0.0; ZERO_POINTS]);
+            column.resize(column.len() + zero_points, 0.0);
             columns.push(column);
         }
         columns
