@@ -38,6 +38,9 @@ pub trait Equations<const NX: usize> {
     /// Names of the states; they are reported in deg and deg/s.
     const STATES: [&'static str; NX];
 
+    /// Signals of the measured motion on which neither rates nor outputs depend.
+    const SIGNALS_NOT_READ: &'static [&'static str];
+
     /// States that regressors can be proportional to.
     const REGRESSOR_STATES: &'static [usize];
     /// Entries (rate, state) of the slopes that can differ from zero, also through coefficients.

@@ -140,6 +140,8 @@ macro_rules! in_gusts {
 
             const AXIS: Axis = <$axis as Equations<$axis_states>>::AXIS;
             const STATES: [&'static str; $states] = $names;
+            const SIGNALS_NOT_READ: &'static [&'static str] =
+                <$axis as Equations<$axis_states>>::SIGNALS_NOT_READ;
             const REGRESSOR_STATES: &'static [usize] = $regressors;
             const RATES_BY_STATE: &'static [(usize, usize)] = $by_state;
             const RATES_BY_COEFFICIENT: &'static [(usize, usize)] = $by_coefficient;

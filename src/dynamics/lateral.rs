@@ -26,6 +26,7 @@ use super::lever::lever;
 use super::motion::Motion;
 use crate::aero::{Axis, Regressor};
 use crate::aircraft::{Aircraft, Position, Vane, VaneFlow, VaneModel};
+use crate::flight::signal;
 use crate::numerics::trig::sin_cos;
 use crate::units::{DEG, G0_FT_S2};
 
@@ -114,6 +115,8 @@ impl Equations<4> for Lateral {
 
     const AXIS: Axis = Axis::Lateral;
     const STATES: [&'static str; 4] = ["beta", "p", "r", "phi"];
+
+    const SIGNALS_NOT_READ: &'static [&'static str] = &[signal::AY, signal::PHI];
 
     const REGRESSOR_STATES: &'static [usize] = &[BETA, P, R];
     const RATES_BY_STATE: &'static [(usize, usize)] = &[

@@ -32,6 +32,7 @@ use super::lever::lever;
 use super::motion::Motion;
 use crate::aero::{Axis, Regressor};
 use crate::aircraft::{Aircraft, Position, Vane, VaneFlow, VaneModel};
+use crate::flight::signal;
 use crate::numerics::trig::sin_cos;
 use crate::units::{DEG, G0_FT_S2};
 
@@ -113,6 +114,9 @@ impl Equations<3> for Longitudinal {
 
     const AXIS: Axis = Axis::Longitudinal;
     const STATES: [&'static str; 3] = ["alpha", "q", "theta"];
+
+    const SIGNALS_NOT_READ: &'static [&'static str] =
+        &[signal::AN, signal::AX, signal::AY, signal::THETA];
 
     const REGRESSOR_STATES: &'static [usize] = &[ALPHA, Q];
     const RATES_BY_STATE: &'static [(usize, usize)] = &[

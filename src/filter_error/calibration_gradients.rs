@@ -27,6 +27,7 @@ use super::filter::Filter;
 use super::gains::{Pattern, PatternGain};
 use super::pass::{RecordedPass, RecordedStep};
 use super::response::FilterResponse;
+use crate::aero::Derivative;
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
@@ -64,14 +65,15 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         let exact = evaluate(&samples.exact, &pass.steps);
         let mut changes = AlignedMatrix::zeros(errors.len(), OUTPUTS * self.samples());
         for (error, changes) in errors.iter().zip(changes.rows_mut()) {
-            let inputs = evaluate(&samples.case_with_error(recorded, error), &pass.steps);
+            let in_error = samples.case_with_error(recorded, error);
+            let in_error = in_error.map(|case| evaluate(&case, &pass.steps));
             Arch::new().dispatch(ErrorPropagation::<NX, E, _> {
                 steps: &pass.steps,
                 gains: &gains,
                 patterns: self.patterns(),
                 decay: self.noise(parameters).decay(self.case.step_s),
                 half_step_s: 0.5 * self.case.step_s,
-                inputs: [&exact, &inputs],
+                inputs: [&exact, in_error.as_ref().unwrap_or(&exact)],
                 measured: output_errors::<NX, E>(&self.case.measurements, error),
                 changes,
                 equations: std::marker::PhantomData,
@@ -145,8 +147,12 @@ impl<'a, const NX: usize, E: Equations<NX>> SampleEquations<'a, NX, E> {
         }
     }
 
-    /// Maneuver as an instrument in error would have recorded it.
-    fn case_with_error(&self, recorded: &Recorded, error: &SignalError) -> Case<NX, E> {
+    /// Maneuver as an instrument in error would have recorded it; `None` if the equations do not
+    /// read the instrument.
+    fn case_with_error(&self, recorded: &Recorded, error: &SignalError) -> Option<Case<NX, E>> {
+        if !self.reads(error.signal) {
+            return None;
+        }
         let signals = if error.delay_s == 0.0 {
             error.apply_to(&self.signals)
         } else {
@@ -156,8 +162,19 @@ impl<'a, const NX: usize, E: Equations<NX>> SampleEquations<'a, NX, E> {
         };
         let windows = [&self.signals, &signals];
         let nothing = Measurements::default();
-        self.exact
-            .as_recorded(recorded.aircraft, windows, nothing, &self.model)
+        let case = self
+            .exact
+            .as_recorded(recorded.aircraft, windows, nothing, &self.model);
+        Some(case)
+    }
+
+    /// `true` if rates, outputs or regressors depend on a signal. The rate of the angle of attack as
+    /// a regressor follows from the whole motion.
+    fn reads(&self, signal: &str) -> bool {
+        let has_signal = |(d, _): &(&Derivative, f64)| {
+            d.regressor.has_alpha_rate() || d.regressor.signals().any(|own| own == signal)
+        };
+        !E::SIGNALS_NOT_READ.contains(&signal) || self.model.held.iter().any(has_signal)
     }
 }
 
