@@ -184,38 +184,6 @@ impl AlignedMatrix {
         self.product(&inner.product(self))
     }
 
-    /// Inverse of a symmetric matrix by Gauss-Jordan elimination; `None` unless positive definite.
-    pub fn inverse(mut self) -> Option<AlignedMatrix> {
-        let (width, size) = (self.width(), self.rows);
-        let values = self.values_mut();
-        let regular = Arch::new().dispatch(|| {
-            for p in 0..size {
-                let pivot = values[p * width + p];
-                if pivot.is_nan() || pivot <= 0.0 {
-                    return false;
-                }
-                values[p * width + p] = 1.0;
-                values[p * width..(p + 1) * width]
-                    .iter_mut()
-                    .for_each(|v| *v /= pivot);
-                let (before, from) = values.split_at_mut(p * width);
-                let (row, after) = from.split_at_mut(width);
-                for other in before
-                    .chunks_exact_mut(width)
-                    .chain(after.chunks_exact_mut(width))
-                {
-                    let factor = std::mem::replace(&mut other[p], 0.0);
-                    other
-                        .iter_mut()
-                        .zip(&*row)
-                        .for_each(|(v, r)| *v -= factor * r);
-                }
-            }
-            true
-        });
-        regular.then_some(self)
-    }
-
     /// Gram matrix Σ s sᵀ of the rows s.
     pub fn gram(&self) -> AlignedMatrix {
         let mut gram = AlignedMatrix::zeros(self.columns, self.columns);
@@ -529,22 +497,5 @@ mod tests {
                 "eight lanes"
             );
         }
-    }
-
-    #[test]
-    fn only_positive_definite_matrices_have_an_inverse() {
-        let matrix = sample_matrix(29, 11).gram();
-        let unit = matrix.to_dense() * matrix.clone().inverse().unwrap().to_dense();
-        assert_relative_eq!(unit, DMatrix::identity(11, 11), epsilon = 1e-9);
-        assert!(
-            AlignedMatrix::from_symmetric(&DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 1.0]))
-                .inverse()
-                .is_none()
-        );
-        assert!(
-            AlignedMatrix::from_symmetric(&DMatrix::from_element(2, 2, f64::NAN))
-                .inverse()
-                .is_none()
-        );
     }
 }

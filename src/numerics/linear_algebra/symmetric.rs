@@ -1,8 +1,7 @@
 //! Symmetric positive definite matrices: scaling to unit diagonal, and the inverse.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
-
-use super::matrix::AlignedMatrix;
+use pulp::Arch;
 
 /// 1/√H_jj of each parameter; one where the diagonal is not positive.
 #[must_use]
@@ -24,12 +23,41 @@ pub fn scaled(information: &DMatrix<f64>, scale: &DVector<f64>) -> DMatrix<f64> 
 #[must_use]
 pub fn inverse(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale = scale(information);
-    Some(scaled(
-        &AlignedMatrix::from_symmetric(&scaled(information, &scale))
-            .inverse()?
-            .to_dense(),
-        &scale,
-    ))
+    let mut unit = scaled(information, &scale);
+    // The columns of a symmetric matrix are its rows.
+    let size = unit.nrows();
+    invert_rows(unit.as_mut_slice(), size)?;
+    Some(scaled(&unit.transpose(), &scale))
+}
+
+/// Inverts a symmetric matrix, row by row in `values`, by Gauss-Jordan elimination; `None` unless
+/// positive definite.
+fn invert_rows(values: &mut [f64], size: usize) -> Option<()> {
+    Arch::new().dispatch(|| {
+        for p in 0..size {
+            let pivot = values[p * size + p];
+            if pivot.is_nan() || pivot <= 0.0 {
+                return None;
+            }
+            values[p * size + p] = 1.0;
+            values[p * size..(p + 1) * size]
+                .iter_mut()
+                .for_each(|v| *v /= pivot);
+            let (before, from) = values.split_at_mut(p * size);
+            let (row, after) = from.split_at_mut(size);
+            for other in before
+                .chunks_exact_mut(size)
+                .chain(after.chunks_exact_mut(size))
+            {
+                let factor = std::mem::replace(&mut other[p], 0.0);
+                other
+                    .iter_mut()
+                    .zip(&*row)
+                    .for_each(|(v, r)| *v -= factor * r);
+            }
+        }
+        Some(())
+    })
 }
 
 /// Solution d of (H + damping · diag H) d = g, computed at unit diagonal; `None` unless positive definite.
@@ -92,6 +120,18 @@ mod tests {
     use approx::assert_relative_eq;
 
     use super::*;
+
+    #[test]
+    fn only_positive_definite_matrices_have_an_inverse() {
+        let root = DMatrix::from_fn(29, 11, |i, j| (1.3 * (i + i * i * j) as f64).sin());
+        let matrix = root.tr_mul(&root) + DMatrix::identity(11, 11);
+        let unit = &matrix * inverse(&matrix).unwrap();
+        assert_relative_eq!(unit, DMatrix::identity(11, 11), epsilon = 1e-9);
+        let indefinite = DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 2.0, 1.0]);
+        assert!(inverse(&indefinite).is_none());
+        assert!(inverse(&DMatrix::from_element(2, 2, f64::NAN)).is_none());
+        assert!(inverse(&DMatrix::zeros(0, 0)).is_some());
+    }
 
     #[test]
     fn the_square_is_the_product_with_the_transpose() {
