@@ -17,6 +17,9 @@ use crate::numerics::vectors::simd::{AlignedBuffer, VECTOR, load, store};
 /// Rows and lags that a loop computes side by side: enough independent sums to hide the latency of
 /// one.
 const ROWS_AT_ONCE: usize = 8;
+/// Vectors and rows of a tile of a product: one load of a factor serves several vectors.
+const WIDE_TILE: usize = 3;
+const ROWS_OF_WIDE_TILE: usize = 4;
 const LAGGED_ROWS_AT_ONCE: usize = 4;
 const LAGS_AT_ONCE: usize = 7;
 const ROWS_REACHED: usize = LAGGED_ROWS_AT_ONCE + LAGS_AT_ONCE - 1;
@@ -279,28 +282,56 @@ impl WithSimd for Product<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let (rows, width) = (self.from.rows, self.matrix.width());
+        let mut lane = 0;
+        while lane + WIDE_TILE * S::F64_LANES <= width {
+            for row in (0..rows).step_by(ROWS_OF_WIDE_TILE) {
+                self.add_tile::<S, ROWS_OF_WIDE_TILE, WIDE_TILE>(simd, row, lane);
+            }
+            lane += WIDE_TILE * S::F64_LANES;
+        }
+        for lane in (lane..width).step_by(S::F64_LANES) {
+            for row in (0..rows).step_by(ROWS_AT_ONCE) {
+                self.add_tile::<S, ROWS_AT_ONCE, 1>(simd, row, lane);
+            }
+        }
+    }
+}
+
+impl Product<'_> {
+    /// Adds to a tile of `T` rows and `C` vectors.
+    #[inline(always)]
+    fn add_tile<S: Simd, const T: usize, const C: usize>(
+        &mut self,
+        simd: S,
+        row: usize,
+        lane: usize,
+    ) {
         let (from, width) = (self.from.width(), self.matrix.width());
-        for row in (0..self.from.rows).step_by(ROWS_AT_ONCE) {
-            let rows = &self.from.values.slice()[row * from..(row + ROWS_AT_ONCE) * from];
-            for lane in (0..width).step_by(S::F64_LANES) {
-                let mut sums = [simd.splat_f64s(0.0); ROWS_AT_ONCE];
-                for n in 0..ROWS_AT_ONCE {
-                    sums[n] = load::<S>(self.to, (row + n) * width + lane);
+        let rows = &self.from.values.slice()[row * from..(row + T) * from];
+        let mut sums = [[simd.splat_f64s(0.0); C]; T];
+        for t in 0..T {
+            for c in 0..C {
+                sums[t][c] = load::<S>(self.to, (row + t) * width + lane + c * S::F64_LANES);
+            }
+        }
+        for (i, entries) in self.matrix.rows().enumerate() {
+            let entries = S::as_simd_f64s(&entries[lane..lane + C * S::F64_LANES]).0;
+            for t in 0..T {
+                let factor = simd.splat_f64s(rows[t * from + i]);
+                for c in 0..C {
+                    sums[t][c] = simd.mul_add_f64s(factor, entries[c], sums[t][c]);
                 }
-                for (i, matrix) in self.matrix.rows().enumerate() {
-                    let entries = load::<S>(matrix, lane);
-                    for n in 0..ROWS_AT_ONCE {
-                        sums[n] = simd.mul_add_f64s(
-                            simd.splat_f64s(rows[n * from + i]),
-                            entries,
-                            sums[n],
-                        );
-                    }
-                }
-                for n in 0..ROWS_AT_ONCE {
-                    store::<S>(self.to, (row + n) * width + lane, sums[n]);
-                }
+            }
+        }
+        for t in 0..T {
+            for c in 0..C {
+                store::<S>(
+                    self.to,
+                    (row + t) * width + lane + c * S::F64_LANES,
+                    sums[t][c],
+                );
             }
         }
     }
