@@ -180,8 +180,8 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
             &[],
             self.samples(),
             samples_per_block(self.case.step_s),
-        );
-        sums.clear(1);
+        )
+        .with_blocks();
         self.run(parameters, &gains, &mut response, Some(&mut sums))?;
         response.sums = sums;
         self.add_covariance_part(parameters, &gains, &mut response);

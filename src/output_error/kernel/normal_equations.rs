@@ -82,6 +82,12 @@ impl NormalSums {
         }
     }
 
+    /// Prepares sums just made for a whole pass.
+    pub fn with_blocks(mut self) -> NormalSums {
+        self.blocks = AlignedBuffer::zeros(self.length_of_blocks());
+        self
+    }
+
     /// Clears the sums for a pass of this stride.
     pub fn clear(&mut self, stride: usize) {
         for sums in self.gram.iter_mut().chain(&mut self.moments) {
@@ -91,13 +97,16 @@ impl NormalSums {
         if stride != 1 {
             return;
         }
-        let blocks = self.samples.div_ceil(self.samples_per_block);
-        let length = blocks * OUTPUTS * self.layout.width();
+        let length = self.length_of_blocks();
         if self.blocks.slice().len() == length {
             self.blocks.slice_mut().fill(0.0);
         } else {
             self.blocks = AlignedBuffer::zeros(length);
         }
+    }
+
+    fn length_of_blocks(&self) -> usize {
+        self.samples.div_ceil(self.samples_per_block) * OUTPUTS * self.layout.width()
     }
 
     /// Number of samples in a block; the last one may have fewer.
