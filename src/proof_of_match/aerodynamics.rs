@@ -225,8 +225,10 @@ pub struct TrimmedAerodynamics<'a> {
     factors: Vec<&'a Factor>,
     /// Values of the factors at the present instant.
     values: Vec<f64>,
-    /// Slopes of the factors along the flow at the present instant.
-    slopes: Vec<FlowSlopes>,
+    /// Slopes of the factors along the flow at the present instant; `None` for recorded signals.
+    slopes: Vec<Option<FlowSlopes>>,
+    /// Every derivative at the present angle of attack.
+    derivatives: Vec<f64>,
     /// Slope of each derivative's coefficient along the derivative at the present instant.
     by_derivative: Vec<f64>,
     has_alpha_rate: bool,
@@ -276,7 +278,11 @@ impl<'a> TrimmedAerodynamics<'a> {
             table,
             terms,
             values: vec![0.0; factors.len()],
-            slopes: vec![[0.0; FLOW]; factors.len()],
+            slopes: factors
+                .iter()
+                .map(|factor| factor.follows_flow().then_some([0.0; FLOW]))
+                .collect(),
+            derivatives: vec![0.0; table.derivatives()],
             by_derivative: vec![0.0; table.derivatives()],
             has_alpha_rate: aerodynamics.has_alpha_rate,
             factors,
@@ -293,17 +299,18 @@ impl<'a> TrimmedAerodynamics<'a> {
     /// Change of the coefficients from the trim.
     #[must_use]
     pub fn change(&mut self, flow: &AeroInputs, recorded: &[f64]) -> [f64; COEFFICIENTS] {
-        for (place, factor) in self.factors.iter().enumerate() {
-            self.values[place] = factor.value(flow, recorded);
+        for (value, factor) in self.values.iter_mut().zip(&self.factors) {
+            *value = factor.value(flow, recorded);
         }
         let entries = self.table.entries(self.table.position_of(flow.alpha_deg));
+        entries.read_into(&mut self.derivatives);
         let mut change = [0.0; COEFFICIENTS];
-        for (coefficient, terms) in self.terms.iter().enumerate() {
+        for (sum, terms) in change.iter_mut().zip(&self.terms) {
             for term in terms {
-                change[coefficient] += if term.is_along_alpha {
+                *sum += if term.is_along_alpha {
                     entries.integral(term.derivative) - term.at_trim
                 } else {
-                    entries.value(term.derivative) * (self.values[term.factor] - term.at_trim)
+                    self.derivatives[term.derivative] * (self.values[term.factor] - term.at_trim)
                 };
             }
         }
@@ -321,7 +328,9 @@ impl<'a> TrimmedAerodynamics<'a> {
         let change = self.change(flow, recorded);
         let entries = self.table.entries(self.table.position_of(flow.alpha_deg));
         for (slopes, factor) in self.slopes.iter_mut().zip(&self.factors) {
-            *slopes = factor.slopes(flow, recorded);
+            if let Some(slopes) = slopes {
+                *slopes = factor.slopes(flow, recorded);
+            }
         }
         let mut by_flow = [[0.0; FLOW]; COEFFICIENTS];
         for (sums, terms) in by_flow.iter_mut().zip(&self.terms) {
@@ -333,9 +342,11 @@ impl<'a> TrimmedAerodynamics<'a> {
                 }
                 let moved = self.values[term.factor] - term.at_trim;
                 sums[AeroInputs::ALPHA] += entries.value_slope(term.derivative) * moved;
-                let value = entries.value(term.derivative);
-                for (sum, slope) in sums.iter_mut().zip(&self.slopes[term.factor]) {
-                    *sum += value * slope;
+                if let Some(slopes) = &self.slopes[term.factor] {
+                    let value = self.derivatives[term.derivative];
+                    for (sum, slope) in sums.iter_mut().zip(slopes) {
+                        *sum += value * slope;
+                    }
                 }
                 self.by_derivative[term.derivative] = moved;
             }
@@ -427,6 +438,16 @@ impl Factor {
             Factor::Vane { place, size } => at(place) / (flow.qbar * size),
             Factor::Magnitude(of) => of.value(flow, recorded).abs(),
             Factor::Product(both) => both[0].value(flow, recorded) * both[1].value(flow, recorded),
+        }
+    }
+
+    /// `false` if the factor has only recorded signals, and thus no slope along the flow.
+    fn follows_flow(&self) -> bool {
+        match self {
+            Factor::Constant | Factor::Recorded(_) => false,
+            Factor::Magnitude(of) => of.follows_flow(),
+            Factor::Product(both) => both.iter().any(Factor::follows_flow),
+            _ => true,
         }
     }
 

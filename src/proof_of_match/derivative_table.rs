@@ -146,6 +146,15 @@ impl Entries<'_> {
         self.between(self.fraction_inside, derivative)
     }
 
+    /// Reads all derivatives as [`Entries::value`] does.
+    #[inline]
+    pub fn read_into(&self, values: &mut [f64]) {
+        let both = self.low.iter().zip(self.high);
+        for (value, (low, high)) in values.iter_mut().zip(both) {
+            *value = low + self.fraction_inside * (high - low);
+        }
+    }
+
     /// Integral of a derivative along α; beyond the table the derivative is constant.
     #[inline]
     #[must_use]
