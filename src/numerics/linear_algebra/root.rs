@@ -116,8 +116,8 @@ impl BlockRoot {
     pub fn left(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
         let mut product = DMatrix::zeros(self.rank(), matrix.ncols());
         for (block, rows, columns) in self.places() {
-            let own = block.transpose() * matrix.rows_range(rows);
-            product.rows_range_mut(columns).copy_from(&own);
+            let mut own = product.rows_range_mut(columns);
+            own.gemm(1.0, &block.transpose(), &matrix.rows_range(rows), 0.0);
         }
         product
     }
@@ -150,8 +150,8 @@ impl BlockRoot {
     pub fn right(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
         let mut product = DMatrix::zeros(matrix.nrows(), self.rank());
         for (block, rows, columns) in self.places() {
-            let own = matrix.columns_range(rows) * block;
-            product.columns_range_mut(columns).copy_from(&own);
+            let mut own = product.columns_range_mut(columns);
+            own.gemm(1.0, &matrix.columns_range(rows), block, 0.0);
         }
         product
     }
