@@ -201,8 +201,8 @@ const PUBLISHED: &[(&str, &str, &str)] = &[
 ];
 
 /// Tables without rows in the demonstration: it has one maneuver of each class at an angle of attack,
-/// no list of events, and nothing fails. Their rows are tested in `rows`, `joint_estimation`, `segment` and
-/// `ingest`.
+/// no list of events, no outlier, and nothing fails. Their rows are tested in `rows`, `joint_estimation`, `segment`
+/// and `ingest`, those of `outliers` in the unit tests of trends.
 const WITHOUT_ROWS: [&str; 8] = [
     "beyond_tunnel",
     "changes",
