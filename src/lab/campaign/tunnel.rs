@@ -172,7 +172,8 @@ mod tests {
         let campaign = SimulatedCampaign::load(Path::new("pipelines/harv/cards.yaml")).unwrap();
         let rows = rows(&campaign);
         let row = |name: &str, alpha_deg: f64| {
-            let is_it = |r: &&TunnelRow| r.derivative == name && r.alpha_deg == alpha_deg;
+            let is_it =
+                |r: &&TunnelRow| r.derivative == name && r.alpha_deg.total_cmp(&alpha_deg).is_eq();
             rows.iter().find(is_it).unwrap()
         };
         let [constant, slope, sum] = ["CN_0", "CN_alpha", "CN_ba"].map(|name| row(name, 60.0));
