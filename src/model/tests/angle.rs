@@ -3,11 +3,9 @@
 use approx::assert_relative_eq;
 use nalgebra::DMatrix;
 
-use super::fixture::{Flown, aero_model, at, diagonal, exact, posterior, tunnel};
-use super::parts::scales;
-use crate::aero::Coefficient;
+use super::fixture::{Flown, at, diagonal, exact, posterior, tunnel};
+use super::parts::{data, scales};
 use crate::model::prior::angle_noise::{ANGLE_SHARE, angle_noise};
-use crate::model::prior::term::TermSources;
 use crate::output_error::error_effect::SharedError;
 
 /// Sweep of a maneuver whose estimates belong to an angle of attack known to 2 deg.
@@ -23,14 +21,8 @@ fn flown(alpha_deg: f64, estimates: &[(&str, f64)], sweep_deg: Option<f64>) -> F
 #[test]
 fn the_angle_s_noise_is_the_change_of_tunnel_and_difference_over_its_deviation() {
     let flown = flown(20.0, &[("CN_alpha", 0.04), ("CN_q", 5.0)], None);
-    let evidence = [flown.evidence()];
-    let (tunnel, settings, aero_model) = (tunnel(None), exact(), aero_model());
-    let basis = TermSources {
-        aero_model: &aero_model,
-        tunnel: &tunnel,
-        settings: &settings,
-    };
-    let terms = basis.terms(Coefficient::CN, &evidence);
+    let (terms, _) = data(std::slice::from_ref(&flown), &exact());
+    let tunnel = tunnel(None);
     let condition = flown.maneuver.condition(&tunnel);
     let noise = angle_noise(&terms, &scales(), &DMatrix::identity(3, 3), &condition, 2.5);
     for (i, (term, scale)) in terms.iter().zip(scales()).enumerate() {
@@ -83,15 +75,8 @@ fn a_held_derivative_acts_at_an_uncertain_angle_of_its_own() {
         &[gain * deviation],
     );
     flown.maneuver.quality.alpha_rms_deg = Some(SWEEP_DEG);
-    let evidence = [flown.evidence()];
-    let (tunnel, settings, aero_model) = (tunnel(None), exact(), aero_model());
-    let basis = TermSources {
-        aero_model: &aero_model,
-        tunnel: &tunnel,
-        settings: &settings,
-    };
-    let terms = basis.terms(Coefficient::CN, &evidence);
-    let observation = evidence[0].about(&terms, &tunnel).unwrap();
+    let (terms, _) = data(std::slice::from_ref(&flown), &exact());
+    let observation = flown.evidence().about(&terms, &tunnel(None)).unwrap();
     let at = observation.condition;
     let each = angle_noise(&terms, &scales(), &DMatrix::identity(3, 3), &at, 2.0);
     let whole = observation.whole_noise(&terms, &scales()) - &observation.noise;
