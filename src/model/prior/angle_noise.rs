@@ -13,10 +13,10 @@
 //! A sum of constant and slope holds at the mean α whatever the angle of its slope is: its change by
 //! δ is that of the table less δ times the slope.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use super::scale_prior::Scale;
-use super::term::PosteriorTerm;
+use super::term::{PosteriorTerm, of_independent};
 use crate::aero::Condition;
 
 /// Standard deviation of the angle of attack to which an estimate belongs, over the root mean square
@@ -41,8 +41,7 @@ pub fn angle_noise(
         let of_slope = deviation_deg * tunnel_slope(term, terms, condition);
         (change.of_tunnel - of_slope).powi(2) + change.variance
     });
-    let variances = DVector::from_iterator(terms.len(), variances);
-    design * DMatrix::from_diagonal(&variances) * design.transpose()
+    of_independent(design, variances)
 }
 
 /// Tunnel's slope of a sum of constant and slope; zero for a derivative itself.

@@ -40,7 +40,17 @@ pub fn between_points(
 ) -> DMatrix<f64> {
     let pairs = terms.iter().zip(scales);
     let variances = pairs.map(|(t, s)| t.prior.variance_between_points(s, condition));
-    let variances = DVector::from_iterator(terms.len(), variances);
+    of_independent(design, variances)
+}
+
+/// Covariance of weighted sums of independent quantities with these variances; one sum per row of
+/// `design`.
+#[must_use]
+pub fn of_independent(
+    design: &DMatrix<f64>,
+    variances: impl ExactSizeIterator<Item = f64>,
+) -> DMatrix<f64> {
+    let variances = DVector::from_iterator(variances.len(), variances);
     design * DMatrix::from_diagonal(&variances) * design.transpose()
 }
 
