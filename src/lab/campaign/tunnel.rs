@@ -29,6 +29,9 @@ pub fn rows(campaign: &SimulatedCampaign) -> Vec<TunnelRow> {
         let constants = true_rows(campaign, &combined.constant);
         let slopes = true_rows(campaign, &combined.slope);
         let sums = measured(&sums(&constants, &slopes, &combined.name));
+        if sums.is_empty() {
+            continue;
+        }
         let constants = constants_of(&sums, &rows, combined);
         rows.retain(|row| row.derivative != combined.constant);
         rows.extend(constants);
