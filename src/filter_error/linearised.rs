@@ -4,6 +4,7 @@
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use nalgebra::{SMatrix, SVector};
+use pulp::{Arch, Simd, WithSimd};
 
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
 use crate::numerics::linear_algebra::small::product;
@@ -43,6 +44,7 @@ impl<const NX: usize> StateSlopes<NX> {
         }
     }
 
+    #[inline(always)]
     fn add(&mut self, other: &StateSlopes<NX>, factor: f64) {
         self.rates += other.rates * factor;
         self.outputs += other.outputs * factor;
@@ -56,11 +58,10 @@ impl<const NX: usize> Linearised<NX> {
             held: StateSlopes::zeros(),
             free: vec![StateSlopes::zeros(); case.derivatives()],
         };
-        let samples = (0..case.samples()).step_by(SLOPE_STRIDE);
-        let share = 1.0 / samples.len().max(1) as f64;
-        for sample in samples {
-            linearised.add_sample(case, sample, share);
-        }
+        Arch::new().dispatch(SlopeSums {
+            case,
+            sums: &mut linearised,
+        });
         for output in (0..OUTPUTS).filter(|&o| !case.measurements.have(o)) {
             linearised.clear_output(output);
         }
@@ -74,6 +75,7 @@ impl<const NX: usize> Linearised<NX> {
         }
     }
 
+    #[inline(always)]
     fn add_sample<E: Equations<NX>>(&mut self, case: &Case<NX, E>, sample: usize, share: f64) {
         let x = &case.motion.states[sample];
         let unit = UnitSlopes::at(case, sample, x);
@@ -115,6 +117,25 @@ impl<const NX: usize> Linearised<NX> {
     }
 }
 
+/// Sums of the slopes over the samples, compiled for the processor at hand.
+struct SlopeSums<'a, const NX: usize, E: Equations<NX>> {
+    case: &'a Case<NX, E>,
+    sums: &'a mut Linearised<NX>,
+}
+
+impl<const NX: usize, E: Equations<NX>> WithSimd for SlopeSums<'_, NX, E> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let samples = (0..self.case.samples()).step_by(SLOPE_STRIDE);
+        let share = 1.0 / samples.len().max(1) as f64;
+        for sample in samples {
+            self.sums.add_sample(self.case, sample, share);
+        }
+    }
+}
+
 /// System of one step for given derivatives.
 pub(super) struct DiscreteSystem<'a, const NX: usize> {
     linearised: &'a Linearised<NX>,
@@ -149,6 +170,7 @@ struct UnitSlopes<const NX: usize> {
 }
 
 impl<const NX: usize> UnitSlopes<NX> {
+    #[inline(always)]
     fn at<E: Equations<NX>>(case: &Case<NX, E>, sample: usize, x: &SVector<f64, NX>) -> Self {
         let (inputs, sensors) = (
             &case.motion.rate_inputs[2 * sample],
@@ -175,6 +197,7 @@ impl<const NX: usize> UnitSlopes<NX> {
     }
 
     /// Adds the slopes by a coefficient's slope along a state: one column.
+    #[inline(always)]
     fn add_through_coefficient(
         &self,
         k: usize,

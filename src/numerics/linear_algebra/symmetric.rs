@@ -1,7 +1,8 @@
 //! Symmetric positive definite matrices: scaling to unit diagonal, and the inverse.
+#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use nalgebra::{Cholesky, DMatrix, DVector};
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 
 /// 1/√H_jj of each parameter; one where the diagonal is not positive.
 #[must_use]
@@ -26,14 +27,24 @@ pub fn inverse(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let mut unit = scaled(information, &scale);
     // The columns of a symmetric matrix are its rows.
     let size = unit.nrows();
-    invert_rows(unit.as_mut_slice(), size)?;
+    let values = unit.as_mut_slice();
+    Arch::new().dispatch(GaussJordan { values, size })?;
     Some(scaled(&unit.transpose(), &scale))
 }
 
-/// Inverts a symmetric matrix, row by row in `values`, by Gauss-Jordan elimination; `None` unless
-/// positive definite.
-fn invert_rows(values: &mut [f64], size: usize) -> Option<()> {
-    Arch::new().dispatch(|| {
+/// Gauss-Jordan elimination of a symmetric matrix, row by row in `values`, which leaves its inverse;
+/// `None` unless positive definite.
+struct GaussJordan<'a> {
+    values: &'a mut [f64],
+    size: usize,
+}
+
+impl WithSimd for GaussJordan<'_> {
+    type Output = Option<()>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Option<()> {
+        let GaussJordan { values, size } = self;
         for p in 0..size {
             let pivot = values[p * size + p];
             if pivot.is_nan() || pivot <= 0.0 {
@@ -57,7 +68,7 @@ fn invert_rows(values: &mut [f64], size: usize) -> Option<()> {
             }
         }
         Some(())
-    })
+    }
 }
 
 /// Solution d of (H + damping · diag H) d = g, computed at unit diagonal; `None` unless positive definite.

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 
 use nalgebra::DMatrix;
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 
 /// Series that are summed side by side, so that their sums fill the vector registers.
 const SIDE_BY_SIDE: usize = 8;
@@ -52,7 +52,11 @@ impl Harmonics {
                 .map(|n| std::array::from_fn(|i| series.get(i).map_or(0.0, |x| x[n])))
                 .collect();
             for (row, number) in self.numbers.clone().enumerate() {
-                let [real, imaginary] = Arch::new().dispatch(|| self.sum(&rows, number));
+                let [real, imaginary] = Arch::new().dispatch(HarmonicSum {
+                    turn: &self.turn,
+                    rows: &rows,
+                    number,
+                });
                 for i in 0..series.len() {
                     let column = block * SIDE_BY_SIDE + i;
                     sums[(row, column)] = real[i];
@@ -62,21 +66,32 @@ impl Harmonics {
         }
         sums
     }
+}
 
-    /// Real and imaginary parts of one harmonic of series side by side.
+/// Real and imaginary parts of one harmonic of series side by side, compiled for the processor at
+/// hand.
+struct HarmonicSum<'a> {
+    turn: &'a [[f64; 2]],
+    rows: &'a [[f64; SIDE_BY_SIDE]],
+    number: usize,
+}
+
+impl WithSimd for HarmonicSum<'_> {
+    type Output = [[f64; SIDE_BY_SIDE]; 2];
+
     #[inline(always)]
-    fn sum(&self, rows: &[[f64; SIDE_BY_SIDE]], number: usize) -> [[f64; SIDE_BY_SIDE]; 2] {
+    fn with_simd<S: Simd>(self, _: S) -> [[f64; SIDE_BY_SIDE]; 2] {
         let (mut real, mut imaginary) = ([0.0; SIDE_BY_SIDE], [0.0; SIDE_BY_SIDE]);
         let mut place = 0;
-        for row in rows {
+        for row in self.rows {
             let [cosine, sine] = self.turn[place];
             for i in 0..SIDE_BY_SIDE {
                 real[i] += cosine * row[i];
                 imaginary[i] -= sine * row[i];
             }
-            place += number;
-            if place >= rows.len() {
-                place -= rows.len();
+            place += self.number;
+            if place >= self.rows.len() {
+                place -= self.rows.len();
             }
         }
         [real, imaginary]
