@@ -123,13 +123,13 @@ pub(super) struct MeasurementUpdates<'a, const NX: usize> {
     pub decay_row: AlignedBuffer,
 }
 
-/// Results of a pass besides the sums.
+/// Results of a pass besides the sums, to which it appends sample by sample.
 pub(super) struct PassOutputs<'a> {
     /// Predicted outputs.
-    pub predicted: &'a mut [[f64; OUTPUTS]],
-    pub innovations: &'a mut [[f64; OUTPUTS]],
+    pub predicted: &'a mut Vec<[f64; OUTPUTS]>,
+    pub innovations: &'a mut Vec<[f64; OUTPUTS]>,
     /// Innovations made white with unit variance.
-    pub whitened: &'a mut [[f64; OUTPUTS]],
+    pub whitened: &'a mut Vec<[f64; OUTPUTS]>,
 }
 
 /// Consumer of the steps and of the rows of whitened sensitivities.
@@ -421,9 +421,9 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink<NX>> WithSimd for FilterPass<'_
                 }
                 let (corrected, white) =
                     chunk.correct_state(sample, k, &x, &y, &case.measurements.values[sample]);
-                self.outputs.predicted[sample] = y;
-                self.outputs.innovations[sample] = chunk.innovations[k];
-                self.outputs.whitened[sample] = white;
+                self.outputs.predicted.push(y);
+                self.outputs.innovations.push(chunk.innovations[k]);
+                self.outputs.whitened.push(white);
                 x = if self.sink.is_some() {
                     trajectory.step_from(corrected)
                 } else {

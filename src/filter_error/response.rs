@@ -45,12 +45,12 @@ impl FilterResponse {
         &self.other_information
     }
 
-    /// Response before a pass.
+    /// Response before a pass, which appends its samples.
     pub(super) fn empty(samples: usize, parameters: usize) -> FilterResponse {
         FilterResponse {
-            predicted: vec![[0.0; OUTPUTS]; samples],
-            innovations: vec![[0.0; OUTPUTS]; samples],
-            whitened: vec![[0.0; OUTPUTS]; samples],
+            predicted: Vec::with_capacity(samples),
+            innovations: Vec::with_capacity(samples),
+            whitened: Vec::with_capacity(samples),
             cost: 0.0,
             sums: NormalSums::default(),
             other_gradient: DVector::zeros(parameters),

@@ -7,25 +7,21 @@ use pulp::Arch;
 /// step)²/12, and with it the effect of a surface. At 10 samples per second and 1 Hz that is 3 %.
 /// At the ends, and beside a gap, the value is the mean of its neighbours.
 pub fn with_half_samples(values: &[f64]) -> Vec<f64> {
-    let mut points = vec![0.0; (2 * values.len()).saturating_sub(1)];
+    let Some(last) = values.last() else {
+        return vec![];
+    };
+    let mut pairs = Vec::with_capacity(values.len());
     Arch::new().dispatch(|| {
-        for (points, pair) in points.chunks_exact_mut(2).zip(values.windows(2)) {
-            points[0] = pair[0];
-            points[1] = 0.5 * (pair[0] + pair[1]);
-        }
-        let inner = points.get_mut(2..).unwrap_or_default();
-        for (points, four) in inner.chunks_exact_mut(2).zip(values.windows(4)) {
-            let middle = points[1] + ((four[1] - four[0]) - (four[3] - four[2])) / 16.0;
-            points[1] = if middle.is_finite() {
-                middle
-            } else {
-                points[1]
-            };
+        let pair = |pair: &[f64]| [pair[0], 0.5 * (pair[0] + pair[1])];
+        pairs.extend(values.windows(2).map(pair));
+        let inner = pairs.get_mut(1..).unwrap_or_default();
+        for ([_, point], four) in inner.iter_mut().zip(values.windows(4)) {
+            let middle = *point + ((four[1] - four[0]) - (four[3] - four[2])) / 16.0;
+            *point = if middle.is_finite() { middle } else { *point };
         }
     });
-    if let (Some(point), Some(value)) = (points.last_mut(), values.last()) {
-        *point = *value;
-    }
+    let mut points = pairs.into_flattened();
+    points.push(*last);
     points
 }
 

@@ -17,19 +17,45 @@ pub(crate) struct AlignedBuffer {
     length: usize,
 }
 
+/// Length of a cache line in bytes.
+const LINE: usize = 64;
+
+/// Index of the first number of a buffer that begins a cache line.
+fn first_of_line(buffer: &[f64]) -> usize {
+    let offset = buffer.as_ptr().align_offset(LINE);
+    offset.min(LINE / size_of::<f64>())
+}
+
 impl AlignedBuffer {
     pub fn zeros(length: usize) -> AlignedBuffer {
-        const LINE: usize = 64;
-        let buffer = vec![0.0; length + LINE / size_of::<f64>()];
-        let first = buffer
-            .as_ptr()
-            .align_offset(LINE)
-            .min(LINE / size_of::<f64>());
+        let mut buffer = vec![0.0; length + LINE / size_of::<f64>()];
+        let first = first_of_line(&buffer);
+        buffer.truncate(first + length);
         AlignedBuffer {
             buffer,
             first,
             length,
         }
+    }
+
+    /// Removes all values and makes room for a number of values, which are not cleared before they
+    /// are appended.
+    pub fn clear_with_room(&mut self, length: usize) {
+        let room = length + LINE / size_of::<f64>();
+        if self.buffer.capacity() < room {
+            self.buffer = Vec::with_capacity(room);
+            self.first = first_of_line(&self.buffer);
+            self.buffer.resize(self.first, 0.0);
+        }
+        self.buffer.truncate(self.first);
+        self.length = 0;
+    }
+
+    /// Appends values.
+    #[inline]
+    pub fn append(&mut self, values: &[f64]) {
+        self.buffer.extend_from_slice(values);
+        self.length += values.len();
     }
 
     #[inline]

@@ -52,7 +52,10 @@ impl<const NX: usize> BuildUp<NX> {
             Some(state) => &mut self.slope[term.coefficient][state],
             None => &mut self.offset[term.coefficient],
         };
-        sum.resize(column.len(), 0.0);
+        if sum.is_empty() {
+            sum.extend(column.iter().map(|r| value * r));
+            return;
+        }
         for (sum, r) in sum.iter_mut().zip(column) {
             *sum += value * r;
         }

@@ -84,7 +84,7 @@ impl NormalSums {
 
     /// Prepares sums just made for a whole pass.
     pub fn with_blocks(mut self) -> NormalSums {
-        self.blocks = AlignedBuffer::zeros(self.length_of_blocks());
+        self.blocks.clear_with_room(self.length_of_blocks());
         self
     }
 
@@ -94,14 +94,8 @@ impl NormalSums {
             sums.slice_mut().fill(0.0);
         }
         (self.counts, self.stride) = ([0; OUTPUTS], stride);
-        if stride != 1 {
-            return;
-        }
-        let length = self.length_of_blocks();
-        if self.blocks.slice().len() == length {
-            self.blocks.slice_mut().fill(0.0);
-        } else {
-            self.blocks = AlignedBuffer::zeros(length);
+        if stride == 1 {
+            self.blocks.clear_with_room(self.length_of_blocks());
         }
     }
 
@@ -308,14 +302,7 @@ impl NormalSums {
         } = self;
         let width = layout.width();
         if *stride == 1 {
-            add_to_blocks(
-                simd,
-                first,
-                *samples_per_block,
-                rows,
-                samples,
-                blocks.slice_mut(),
-            );
+            add_to_blocks(simd, first, *samples_per_block, rows, samples, blocks);
         }
         for o in 0..OUTPUTS {
             let own = StridedRows {
@@ -335,7 +322,8 @@ impl NormalSums {
     }
 }
 
-/// Adds the rows of some samples, from `first` on, to the rows of their blocks.
+/// Adds the rows of some samples, from `first` on, to the rows of their blocks. The first sample of a
+/// block appends its rows.
 #[inline(always)]
 fn add_to_blocks<S: Simd>(
     simd: S,
@@ -343,14 +331,18 @@ fn add_to_blocks<S: Simd>(
     samples_per_block: usize,
     rows: &[f64],
     samples: usize,
-    blocks: &mut [f64],
+    blocks: &mut AlignedBuffer,
 ) {
     let row = rows.len() / CHUNK;
     let mut k = 0;
     while k < samples {
         let block = (first + k) / samples_per_block;
         let next = ((block + 1) * samples_per_block - first).min(samples);
-        let sums = S::as_mut_simd_f64s(&mut blocks[block * row..][..row]).0;
+        if blocks.slice().len() <= block * row {
+            blocks.append(&rows[k * row..][..row]);
+            k += 1;
+        }
+        let sums = S::as_mut_simd_f64s(&mut blocks.slice_mut()[block * row..][..row]).0;
         let lines = S::as_simd_f64s(&rows[k * row..next * row]).0;
         let vectors = sums.len();
         // The number of vectors is a multiple of OUTPUTS: so many sums go on side by side.
