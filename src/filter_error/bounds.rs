@@ -171,19 +171,18 @@ pub struct WidePass {
 }
 
 impl WidePass {
-    /// Computes the pass of the wide filter `wide` at the fit of `filter`. `values` has the
-    /// parameters by name; a parameter without a value is zero. `None` if the wide filter diverges.
+    /// Computes the pass of the wide filter `wide` at the fit of `filter`, whose noise it knows.
+    /// `values` has the parameters by name; a parameter without a value is zero. `None` if the wide
+    /// filter diverges.
     #[must_use]
     pub fn pass_at_fit<const NX: usize, E: InGusts<NX>>(
         filter: &Filter<NX, E>,
-        parameters: &[f64],
         wide: &Filter<NX, E>,
         values: &BTreeMap<&str, f64>,
     ) -> Option<Self> {
         let value = |name: &String| values.get(name.as_str()).copied().unwrap_or(0.0);
         let wide_parameters: Vec<f64> = wide.names().iter().map(value).collect();
-        let at = wide.with_noise(&wide_parameters, &filter.noise(parameters));
-        let response = wide.respond(&at).ok()?;
+        let response = wide.respond(&wide_parameters).ok()?;
         Some(WidePass {
             own: filter.names().to_vec(),
             names: wide.names().to_vec(),

@@ -37,7 +37,9 @@ pub struct Filter<const NX: usize, E: InGusts<NX>> {
     input_noise: InputNoise<NX>,
     biased_outputs: Vec<usize>,
     initial_states: usize,
+    /// Free parameters of the noise; none if the noise is known.
     noise_parameters: Vec<NoiseParameter>,
+    known_noise: Option<Noise>,
     patterns: Vec<Pattern>,
     pattern_of: Vec<u8>,
     /// Priors of biases and noise, with the parameter of each.
@@ -57,10 +59,11 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         biases: &[Option<f64>],
     ) -> Self {
         let case = Case::new(aircraft, signals, measurements, &without_own(model));
-        Self::of_case(case, model, biases)
+        Self::of_case(case, model, biases, None)
     }
 
-    /// Prepares the same maneuver with another model. `signals` may have other surfaces.
+    /// Prepares the same maneuver with another model. `signals` may have other surfaces. A known
+    /// noise is not estimated.
     #[must_use]
     pub fn with_model(
         &self,
@@ -68,18 +71,27 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         signals: &ManeuverSignals,
         model: &Model,
         biases: &[Option<f64>],
+        known_noise: Option<Noise>,
     ) -> Self {
         let case = self.case.with_model(aircraft, signals, &without_own(model));
-        Self::of_case(case, model, biases)
+        Self::of_case(case, model, biases, known_noise)
     }
 
-    fn of_case(case: Case<NX, E>, model: &Model, biases: &[Option<f64>]) -> Self {
+    fn of_case(
+        case: Case<NX, E>,
+        model: &Model,
+        biases: &[Option<f64>],
+        known_noise: Option<Noise>,
+    ) -> Self {
         let biased_outputs = model.biased_outputs::<NX, E>();
         let initial_states = match model.initial_state {
             InitialState::Estimated => E::states_in_still_air(),
             InitialState::Measured => 0,
         };
-        let noise_parameters = NoiseParameter::all(E::AIR_RELATIVE_RATES.len());
+        let noise_parameters = match known_noise {
+            Some(_) => vec![],
+            None => NoiseParameter::all(E::AIR_RELATIVE_RATES.len()),
+        };
         let others = biased_outputs.len() + initial_states + noise_parameters.len();
         let layout = LaneLayout::dense(&case.terms, E::REGRESSOR_STATES, others);
         let (patterns, pattern_of) = patterns(&case.measurements.used);
@@ -91,6 +103,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
             biased_outputs,
             initial_states,
             noise_parameters,
+            known_noise,
             patterns,
             pattern_of,
             priors: vec![],
@@ -154,10 +167,10 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     /// Noise of these parameters.
     #[must_use]
     pub fn noise(&self, parameters: &[f64]) -> Noise {
-        Noise::of_parameters(
-            &parameters[self.first_noise()..],
-            E::AIR_RELATIVE_RATES.len(),
-        )
+        self.known_noise.unwrap_or_else(|| {
+            let parameters = &parameters[self.first_noise()..];
+            Noise::of_parameters(parameters, E::AIR_RELATIVE_RATES.len())
+        })
     }
 
     /// Joins the filter's own parameters with the parameters of a noise.
@@ -387,7 +400,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     }
 
     /// Adds the parts of cost, gradient and information that come from log|S|, the slopes of S, and
-    /// the priors.
+    /// the priors. A known noise has no priors.
     fn add_covariance_part(
         &self,
         parameters: &[f64],
@@ -395,6 +408,16 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         response: &mut FilterResponse,
     ) {
         response.add_covariance(gains, &self.patterns, &self.pattern_of);
+        if self.known_noise.is_none() {
+            self.add_rotary_costs(parameters, response);
+        }
+        for (j, prior) in &self.priors {
+            response.add_prior(*j, prior.cost(parameters[*j]));
+        }
+    }
+
+    /// Adds the costs of rotary gusts that are smaller than the random walk of the angle implies.
+    fn add_rotary_costs(&self, parameters: &[f64], response: &mut FilterResponse) {
         let place = |kind: NoiseParameter| {
             let place = self.noise_parameters.iter().position(|p| *p == kind);
             self.first_noise() + place.unwrap_or(0)
@@ -404,9 +427,6 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
             if let Some(cost) = cost {
                 response.add_rotary_cost(&cost, place);
             }
-        }
-        for (j, prior) in &self.priors {
-            response.add_prior(*j, prior.cost(parameters[*j]));
         }
     }
 }

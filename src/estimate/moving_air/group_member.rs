@@ -12,6 +12,7 @@ use crate::estimate::task::{Task, values_by_name};
 use crate::filter_error::bounds::WidePass;
 use crate::filter_error::calibration_gradients::Recorded;
 use crate::filter_error::filter::Filter;
+use crate::filter_error::noise::Noise;
 use crate::output_error::calibration_errors::SignalError;
 use crate::output_error::{Case, Diverged, Model, equation_error};
 
@@ -60,13 +61,23 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
         model: &Model,
         like: Option<&Filter<NG, G>>,
     ) -> Filter<NG, G> {
+        match like {
+            None => new_filter(&self.task, self.prepared, &self.slopes.signals, model),
+            Some(filter) => self.filter_like(filter, model, None),
+        }
+    }
+
+    /// Filter of a model, from another filter of the maneuver. A known noise is not estimated.
+    fn filter_like<const NG: usize, G: InGusts<NG>>(
+        &self,
+        filter: &Filter<NG, G>,
+        model: &Model,
+        known_noise: Option<Noise>,
+    ) -> Filter<NG, G> {
         let signals = &self.slopes.signals;
-        let Some(filter) = like else {
-            return new_filter(&self.task, self.prepared, signals, model);
-        };
         let aircraft = self.task.context.aircraft;
         let biases = bias_uncertainties(&self.task, model);
-        let filter = filter.with_model(aircraft, signals, model, &biases);
+        let filter = filter.with_model(aircraft, signals, model, &biases, known_noise);
         filter.with_noisy_inputs(noisy_inputs(&self.task, self.prepared, signals, model))
     }
 
@@ -84,10 +95,10 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
         } else {
             all
         };
-        let wide = self.filter(&all, Some(filter));
+        let wide = self.filter_like(filter, &all, Some(filter.noise(parameters)));
         let own = &parameters[..filter.first_noise()];
         let values = values_by_name(&model, filter.names(), own);
-        let pass = WidePass::pass_at_fit(filter, parameters, &wide, &values)?;
+        let pass = WidePass::pass_at_fit(filter, &wide, &values)?;
         Some(self.slopes.with_lines(pass))
     }
 
