@@ -42,7 +42,7 @@ const RATES: [&str; 3] = [signal::P, signal::Q, signal::R];
 #[derive(Clone, Debug)]
 pub struct ManeuverSignals {
     /// Values at the points by signal. Copies that differ in few signals share the others.
-    points: BTreeMap<String, Arc<Vec<f64>>>,
+    points: BTreeMap<Arc<str>, Arc<Vec<f64>>>,
     sensors: Sensors,
     /// α and β at the c.g. at every point, rad. Inverting the vanes is the most expensive part of a
     /// motion.
@@ -75,12 +75,12 @@ impl ManeuverSignals {
             } else {
                 with_half_samples(values)
             };
-            points.insert(name.to_owned(), Arc::new(at_points));
+            points.insert(name.into(), Arc::new(at_points));
         }
         for name in RATES {
             let values = record.values(name).unwrap_or_default();
             let slope = slope(values, &range, record.step_s);
-            points.insert(slope_name(name), Arc::new(with_half_samples(&slope)));
+            points.insert(slope_name(name).into(), Arc::new(with_half_samples(&slope)));
         }
         let mut signals = ManeuverSignals {
             points,
@@ -105,7 +105,7 @@ impl ManeuverSignals {
 
     /// Replaces the points of a signal, or adds one.
     fn set(&mut self, name: &str, points: Vec<f64>) {
-        self.points.insert(name.to_owned(), Arc::new(points));
+        self.points.insert(name.into(), Arc::new(points));
         if FLOW_SIGNALS.contains(&name) {
             self.flow = Arc::new(self.flow_at_cg());
         }
@@ -149,7 +149,7 @@ impl ManeuverSignals {
         let points = self.points.iter();
         ManeuverSignals {
             points: points
-                .map(|(name, points)| (name.clone(), Arc::new(every(points))))
+                .map(|(name, points)| (Arc::clone(name), Arc::new(every(points))))
                 .collect(),
             sensors: self.sensors.clone(),
             flow: Arc::new(self.flow.iter().step_by(stride).copied().collect()),
