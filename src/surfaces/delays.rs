@@ -255,9 +255,10 @@ impl DelayPosterior {
     /// Mixture over the standard deviations of the delays, weighted by the evidence for each.
     fn of(data: &DelayInformation) -> Option<DelayPosterior> {
         let mut parts = Vec::with_capacity(STANDARD_DEVIATIONS_S.len().pow(2));
-        for common_s in STANDARD_DEVIATIONS_S {
-            for own_s in STANDARD_DEVIATIONS_S {
-                parts.push(PosteriorAtDeviations::new(data, common_s, own_s)?);
+        for own_s in STANDARD_DEVIATIONS_S {
+            let independent = IndependentPosterior::new(data, own_s)?;
+            for common_s in STANDARD_DEVIATIONS_S {
+                parts.push(independent.with_common_delay(data, common_s)?);
             }
         }
         let largest = parts
@@ -289,23 +290,52 @@ struct PosteriorAtDeviations {
     log_evidence: f64,
 }
 
-impl PosteriorAtDeviations {
-    /// Posterior for one pair of standard deviations. The prior covariance is own² I + common² 1 1ᵀ.
-    fn new(data: &DelayInformation, common_s: f64, own_s: f64) -> Option<PosteriorAtDeviations> {
-        let count = data.moment.len();
-        let (own, common) = (own_s * own_s, common_s * common_s);
-        let along_one = own + count as f64 * common;
-        let prior = DMatrix::from_fn(count, count, |i, j| {
-            f64::from(u8::from(i == j)) / own - common / (own * along_one)
-        });
-        let posterior = &data.matrix + prior;
+/// Posterior of delays without a common part, at one standard deviation of the own parts.
+struct IndependentPosterior {
+    /// Variance of the own parts.
+    own: f64,
+    covariance: DMatrix<f64>,
+    delays: DVector<f64>,
+    log_determinant: f64,
+}
+
+impl IndependentPosterior {
+    fn new(data: &DelayInformation, own_s: f64) -> Option<IndependentPosterior> {
+        let (count, own) = (data.moment.len(), own_s * own_s);
+        let posterior = &data.matrix + DMatrix::identity(count, count) / own;
         let covariance = symmetric::inverse(&posterior)?;
-        let delays = &covariance * &data.moment;
-        let log_determinant = posterior.cholesky()?.ln_determinant();
-        let log_prior = (count as f64 - 1.0) * own.ln() + along_one.ln();
+        Some(IndependentPosterior {
+            own,
+            delays: &covariance * &data.moment,
+            covariance,
+            log_determinant: posterior.cholesky()?.ln_determinant(),
+        })
+    }
+
+    /// Posterior with a common part. The prior covariance own² I + common² 1 1ᵀ of n delays has the
+    /// inverse I/own² − f 1 1ᵀ with f = common²/(own² (own² + n common²)). With C the covariance
+    /// without the common part, the covariance is C + f/g C 1 1ᵀ C with g = 1 − f 1ᵀ C 1, and the
+    /// determinant of its inverse is g times the one without. `None` unless g is positive.
+    fn with_common_delay(
+        &self,
+        data: &DelayInformation,
+        common_s: f64,
+    ) -> Option<PosteriorAtDeviations> {
+        let (count, own, common) = (data.moment.len() as f64, self.own, common_s * common_s);
+        let along_one = own + count * common;
+        let factor = common / (own * along_one);
+        let column = self.covariance.column_sum();
+        let left = 1.0 - factor * column.sum();
+        if left.is_nan() || left <= 0.0 {
+            return None;
+        }
+        let raise = factor / left;
+        let delays = &self.delays + raise * column.dot(&data.moment) * &column;
+        let log_prior = (count - 1.0) * own.ln() + along_one.ln();
+        let log_determinant = self.log_determinant + left.ln();
         Some(PosteriorAtDeviations {
             log_evidence: 0.5 * (data.moment.dot(&delays) - log_prior - log_determinant),
-            variances: covariance.diagonal(),
+            variances: self.covariance.diagonal() + raise * column.component_mul(&column),
             delays,
         })
     }
@@ -313,8 +343,35 @@ impl PosteriorAtDeviations {
 
 #[cfg(test)]
 mod tests {
+    use approx::assert_relative_eq;
+
     use super::*;
     use crate::output_error::tests::Noise;
+
+    #[test]
+    fn the_posterior_with_a_common_delay_is_that_of_its_whole_prior() {
+        let evidence = maneuver(&[("da", 3.0, 0.5), ("de", 1.0, 2.0), ("dr", -2.0, 4.0)]);
+        let surfaces = surfaces_of(&[vec![&evidence]]);
+        let data = DelayInformation::of(&evidence, &surfaces);
+        for (own_s, common_s) in [(1e-3, 4e-3), (0.125e-3, 16e-3), (16e-3, 0.125e-3)] {
+            let found = IndependentPosterior::new(&data, own_s)
+                .unwrap()
+                .with_common_delay(&data, common_s)
+                .unwrap();
+            let prior = DMatrix::from_fn(3, 3, |i, j| {
+                common_s.powi(2) + if i == j { own_s.powi(2) } else { 0.0 }
+            });
+            let information = &data.matrix + prior.clone().try_inverse().unwrap();
+            let covariance = information.clone().try_inverse().unwrap();
+            let delays = &covariance * &data.moment;
+            let determinants = information.determinant() * prior.determinant();
+            let log_evidence = 0.5 * (data.moment.dot(&delays) - determinants.ln());
+            assert_relative_eq!(found.delays, delays, max_relative = 1e-8);
+            let variances = covariance.diagonal();
+            assert_relative_eq!(found.variances, variances, max_relative = 1e-8);
+            assert_relative_eq!(found.log_evidence, log_evidence, max_relative = 1e-8);
+        }
+    }
 
     /// Evidence of one surface each: its delay in ms with a bound in ms.
     fn maneuver(entries: &[(&str, f64, f64)]) -> DelayEvidence {

@@ -45,7 +45,7 @@ impl<'a> Step for SurfacesStep<'a> {
     type Artefact = FlightEvidence;
 
     const KIND: Kind = Kind::Surfaces;
-    const VERSION: u32 = 4;
+    const VERSION: u32 = 5;
 
     fn item(&self) -> &str {
         self.flight.id()
