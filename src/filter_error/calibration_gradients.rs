@@ -12,6 +12,9 @@
 //!
 //! with the filter's own steps Φ, slopes C of the outputs, gain K and decay T. A pass of each error
 //! would integrate the whole maneuver again, from inputs at twice as many points.
+//!
+//! f and y at a sample depend on the signals at this sample alone. Their slopes along a signal
+//! therefore serve all errors of the signal: its bias, its scale and its delay.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 #![expect(
     clippy::needless_range_loop,
@@ -62,24 +65,23 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         let names = self.names().iter().map(String::as_str);
         let values: BTreeMap<&str, f64> = names.zip(parameters.iter().copied()).collect();
         let samples = SampleEquations::new(&self.case, recorded, &values);
-        let exact = evaluate(&samples.exact, &pass.steps);
-        let mut changes = AlignedMatrix::zeros(errors.len(), OUTPUTS * self.samples());
-        for (error, changes) in errors.iter().zip(changes.rows_mut()) {
-            let in_error = samples.case_with_error(recorded, error);
-            let in_error = in_error.map(|case| evaluate(&case, &pass.steps));
+        let changes = samples.signal_changes(recorded, errors);
+        let slopes = samples.slopes_along(recorded, &changes, &pass.steps);
+        let mut white = AlignedMatrix::zeros(errors.len(), OUTPUTS * self.samples());
+        for ((error, changes), white) in errors.iter().zip(&changes).zip(white.rows_mut()) {
             Arch::new().dispatch(ErrorPropagation::<NX, E, _> {
                 steps: &pass.steps,
                 gains: &gains,
                 patterns: self.patterns(),
                 decay: self.noise(parameters).decay(self.case.step_s),
                 half_step_s: 0.5 * self.case.step_s,
-                inputs: [&exact, in_error.as_ref().unwrap_or(&exact)],
+                inputs: inputs_in_error(&slopes, changes),
                 measured: output_errors::<NX, E>(&self.case.measurements, error),
-                changes,
+                white,
                 equations: std::marker::PhantomData,
             });
         }
-        let lanes = changes.product(&pass.rows);
+        let lanes = white.product(&pass.rows);
         if lanes.values().iter().all(|change| change.is_finite()) {
             Ok(lanes
                 .rows()
@@ -95,6 +97,18 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         let values = (0..self.first_noise()).map(|j| lanes[self.lane(j)]);
         DVector::from_iterator(self.first_noise(), values)
     }
+}
+
+/// Slopes of rates and outputs along the signals that change, with the changes.
+fn inputs_in_error<'s, const NX: usize>(
+    slopes: &'s BTreeMap<String, Vec<SampleValues<NX>>>,
+    changes: &'s [SignalChange],
+) -> Vec<(&'s [SampleValues<NX>], &'s [f64])> {
+    let along = |change: &'s SignalChange| {
+        let slopes = slopes.get(&change.signal)?;
+        Some((&slopes[..], &change.samples[..]))
+    };
+    changes.iter().filter_map(along).collect()
 }
 
 /// Changes of the measured outputs by an error.
@@ -114,10 +128,34 @@ fn output_errors<'a, const NX: usize, E: Equations<NX>>(
     }
 }
 
-/// Rates and outputs at a sample.
+/// Rates and outputs at a sample, or their slopes along a signal.
 struct SampleValues<const NX: usize> {
     rates: [f64; NX],
     outputs: [f64; OUTPUTS],
+}
+
+impl<const NX: usize> SampleValues<NX> {
+    /// Replaces values after a step of a signal by the slopes along the signal.
+    fn become_slope_from(&mut self, before: &SampleValues<NX>, step: f64) {
+        let rates = self.rates.iter_mut().zip(&before.rates);
+        let outputs = self.outputs.iter_mut().zip(&before.outputs);
+        rates
+            .chain(outputs)
+            .for_each(|(value, before)| *value = (*value - before) / step);
+    }
+}
+
+/// Change of a signal at the samples by an error.
+struct SignalChange {
+    signal: String,
+    samples: Vec<f64>,
+}
+
+impl SignalChange {
+    /// Largest magnitude of the change.
+    fn largest(&self) -> f64 {
+        self.samples.iter().fold(0.0, |most, s| s.abs().max(most))
+    }
 }
 
 /// Equations of a maneuver at its samples, with all derivatives held at their values.
@@ -147,25 +185,55 @@ impl<'a, const NX: usize, E: Equations<NX>> SampleEquations<'a, NX, E> {
         }
     }
 
-    /// Maneuver as an instrument in error would have recorded it; `None` if the equations do not
-    /// read the instrument.
-    fn case_with_error(&self, recorded: &Recorded, error: &SignalError) -> Option<Case<NX, E>> {
-        if !self.reads(error.signal) {
-            return None;
-        }
-        let signals = if error.delay_s == 0.0 {
-            error.apply_to(&self.signals)
-        } else {
-            // A delay needs the slope of the signal, and that the points between samples.
-            let delayed = error.apply_to(recorded.signals);
-            self.signals.with_samples_of(error.signal, &delayed)
+    /// Changes of the signals that the equations read, by each error.
+    fn signal_changes(
+        &self,
+        recorded: &Recorded,
+        errors: &[SignalError],
+    ) -> Vec<Vec<SignalChange>> {
+        let changes = |error: &SignalError| {
+            let changes = error.changes_at_samples(recorded.signals);
+            let mut changes: Vec<SignalChange> = changes
+                .into_iter()
+                .map(|(signal, samples)| SignalChange { signal, samples })
+                .collect();
+            changes.retain(|change| self.reads(error.signal) && change.largest() > 0.0);
+            changes
         };
+        errors.iter().map(changes).collect()
+    }
+
+    /// Slopes of rates and outputs at the corrected states along each signal that changes, from a
+    /// constant change as large as the largest one.
+    fn slopes_along(
+        &self,
+        recorded: &Recorded,
+        changes: &[Vec<SignalChange>],
+        steps: &[RecordedStep<NX>],
+    ) -> BTreeMap<String, Vec<SampleValues<NX>>> {
+        let mut largest: BTreeMap<&String, f64> = BTreeMap::new();
+        for change in changes.iter().flatten() {
+            let size = largest.entry(&change.signal).or_default();
+            *size = size.max(change.largest());
+        }
+        let exact = evaluate(&self.exact, steps);
+        let slopes = |(signal, size): (&String, f64)| {
+            let mut values = evaluate(&self.case_with_bias(recorded, signal, size), steps);
+            for (values, exact) in values.iter_mut().zip(&exact) {
+                values.become_slope_from(exact, size);
+            }
+            (signal.clone(), values)
+        };
+        largest.into_iter().map(slopes).collect()
+    }
+
+    /// Maneuver as an instrument with a bias would have recorded it.
+    fn case_with_bias(&self, recorded: &Recorded, signal: &str, bias: f64) -> Case<NX, E> {
+        let signals = self.signals.with_error(signal, 0.0, bias);
         let windows = [&self.signals, &signals];
         let nothing = Measurements::default();
-        let case = self
-            .exact
-            .as_recorded(recorded.aircraft, windows, nothing, &self.model);
-        Some(case)
+        self.exact
+            .as_recorded(recorded.aircraft, windows, nothing, &self.model)
     }
 
     /// `true` if rates, outputs or regressors depend on a signal. The rate of the angle of attack as
@@ -221,12 +289,12 @@ struct ErrorPropagation<'a, const NX: usize, E: InGusts<NX>, M: Fn(usize) -> [f6
     patterns: (&'a [Pattern], &'a [u8]),
     decay: f64,
     half_step_s: f64,
-    /// Rates and outputs as recorded, and with the error.
-    inputs: [&'a [SampleValues<NX>]; 2],
+    /// Slopes of rates and outputs along the signals in error, and the changes of the signals.
+    inputs: Vec<(&'a [SampleValues<NX>], &'a [f64])>,
     /// Change of the measured outputs at a sample.
     measured: M,
     /// Changes of the whitened innovations: sample by sample, output by output.
-    changes: &'a mut [f64],
+    white: &'a mut [f64],
     equations: std::marker::PhantomData<E>,
 }
 
@@ -236,13 +304,10 @@ impl<const NX: usize, E: InGusts<NX>, M: Fn(usize) -> [f64; OUTPUTS]>
     /// Changes of rates and outputs at a sample.
     #[inline(always)]
     fn input_changes(&self, k: usize) -> ([f64; NX], [f64; OUTPUTS]) {
-        let [exact, in_error] = self.inputs.map(|values| &values[k]);
         let (mut rates, mut outputs) = ([0.0; NX], [0.0; OUTPUTS]);
-        for i in 0..NX {
-            rates[i] = in_error.rates[i] - exact.rates[i];
-        }
-        for o in 0..OUTPUTS {
-            outputs[o] = in_error.outputs[o] - exact.outputs[o];
+        for (slopes, changes) in &self.inputs {
+            add_scaled(&mut rates, changes[k], &slopes[k].rates);
+            add_scaled(&mut outputs, changes[k], &slopes[k].outputs);
         }
         (rates, outputs)
     }
@@ -271,7 +336,7 @@ impl<const NX: usize, E: InGusts<NX>, M: Fn(usize) -> [f64; OUTPUTS]> WithSimd
                 innovations[o] = measured[o] - outputs[o] - predicted[o];
             }
             let white = times(&gain.whitening, &innovations);
-            self.changes[k * OUTPUTS..][..OUTPUTS].copy_from_slice(&white);
+            self.white[k * OUTPUTS..][..OUTPUTS].copy_from_slice(&white);
             add_scaled(&mut state, 1.0, &times(&gain.gain, &innovations));
             let decayed = E::decayed(SVector::from(state), self.decay);
             state = decayed.data.0[0];

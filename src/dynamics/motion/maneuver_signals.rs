@@ -130,17 +130,6 @@ impl ManeuverSignals {
         self.points_per_sample > 1
     }
 
-    /// Signals with the samples of a signal from other signals of the maneuver.
-    #[must_use]
-    pub fn with_samples_of(&self, name: &str, other: &ManeuverSignals) -> ManeuverSignals {
-        let mut signals = self.clone();
-        if let Some(points) = other.points.get(name) {
-            let stride = other.points_per_sample / self.points_per_sample;
-            signals.set(name, points.iter().step_by(stride).copied().collect());
-        }
-        signals
-    }
-
     /// Signals without the points between samples, for equations at the samples alone.
     #[must_use]
     pub fn at_samples(&self) -> ManeuverSignals {
@@ -213,17 +202,29 @@ impl ManeuverSignals {
     pub fn delayed(&self, name: &str, delay_s: f64) -> ManeuverSignals {
         let mut signals = self.clone();
         if let Some(points) = self.points.get(name) {
-            // Time between the points on either side of a point.
-            let between_s = 2.0 * self.step_s / self.points_per_sample as f64;
-            let per_difference = delay_s / between_s;
-            let last = points.len().saturating_sub(1);
-            let value = |(i, value): (usize, &f64)| {
-                let difference = points[(i + 1).min(last)] - points[i.saturating_sub(1)];
-                value - per_difference * difference
-            };
-            signals.set(name, points.iter().enumerate().map(value).collect());
+            let values = points.iter().enumerate();
+            let late = values.map(|(i, value)| value + self.change_by_delay(points, i, delay_s));
+            signals.set(name, late.collect());
         }
         signals
+    }
+
+    /// Changes of a signal's samples by a delay, to first order in the delay.
+    #[must_use]
+    pub fn changes_by_delay(&self, name: &str, delay_s: f64) -> Vec<f64> {
+        let points = self.signal(name);
+        (0..points.len())
+            .step_by(self.points_per_sample)
+            .map(|i| self.change_by_delay(points, i, delay_s))
+            .collect()
+    }
+
+    /// Change of a point by a delay, from the points on either side.
+    fn change_by_delay(&self, points: &[f64], i: usize, delay_s: f64) -> f64 {
+        let between_s = 2.0 * self.step_s / self.points_per_sample as f64;
+        let last = points.len().saturating_sub(1);
+        let difference = points[(i + 1).min(last)] - points[i.saturating_sub(1)];
+        -delay_s / between_s * difference
     }
 
     /// Signals with a further signal, given at the samples.
@@ -320,7 +321,9 @@ fn checked_values<'r>(
     Ok(values)
 }
 
-fn slope_name(name: &str) -> String {
+/// Name of the slope of an angular rate among the signals.
+#[must_use]
+pub fn slope_name(name: &str) -> String {
     format!("slope of {name}")
 }
 

@@ -12,5 +12,5 @@ mod maneuver_signals;
 
 pub use instant::Motion;
 pub use local_slope::slope_reach;
-pub use maneuver_signals::{ManeuverSignals, MassProperties};
+pub use maneuver_signals::{ManeuverSignals, MassProperties, slope_name};
 pub use measured_motion::MeasuredMotion;

@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::aero::{Coefficient, Derivative, Regressor};
 use crate::aircraft::Aircraft;
-use crate::dynamics::motion::ManeuverSignals;
+use crate::dynamics::motion::{ManeuverSignals, slope_name};
 use crate::dynamics::{Equations, OUTPUTS};
 use crate::numerics::linear_algebra::symmetric::inverse;
 use crate::output_error::case::{Case, InitialState, Model};
@@ -81,6 +81,26 @@ impl<'a> SignalError<'a> {
             return in_error;
         }
         in_error.delayed(self.signal, self.delay_s)
+    }
+}
+
+impl SignalError<'_> {
+    /// Changes of the recorded signals at the samples by the error, with the names of the signals. A
+    /// scale error of a rate also changes its slope.
+    #[must_use]
+    pub fn changes_at_samples(&self, signals: &ManeuverSignals) -> Vec<(String, Vec<f64>)> {
+        if self.delay_s != 0.0 {
+            let changes = signals.changes_by_delay(self.signal, self.delay_s);
+            return vec![(self.signal.to_owned(), changes)];
+        }
+        let of_slope = slope_name(self.signal);
+        [(self.signal, self.bias), (&of_slope, 0.0)]
+            .map(|(name, bias)| {
+                let samples = signals.samples_of(name).into_iter();
+                let changes = samples.map(|value| self.scale * value + bias);
+                (name.to_owned(), changes.collect())
+            })
+            .into()
     }
 }
 
