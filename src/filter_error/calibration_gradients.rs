@@ -16,10 +16,6 @@
 //! f and y at a sample depend on the signals at this sample alone. Their slopes along a signal
 //! therefore serve all errors of the signal: its bias, its scale and its delay.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
-#![expect(
-    clippy::needless_range_loop,
-    reason = "plain indices become straight code for the vectors"
-)]
 
 use std::collections::BTreeMap;
 
