@@ -31,7 +31,7 @@ use crate::aircraft::Aircraft;
 use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
 use crate::numerics::linear_algebra::matrix::AlignedMatrix;
-use crate::output_error::calibration_errors::SignalError;
+use crate::output_error::calibration_errors::{SignalChange, SignalError};
 use crate::output_error::{Case, Diverged, InitialState, Measurements, Model};
 
 /// Maneuver as its instruments recorded it.
@@ -141,19 +141,6 @@ impl<const NX: usize> SampleValues<NX> {
     }
 }
 
-/// Change of a signal at the samples by an error.
-struct SignalChange {
-    signal: String,
-    samples: Vec<f64>,
-}
-
-impl SignalChange {
-    /// Largest magnitude of the change.
-    fn largest(&self) -> f64 {
-        self.samples.iter().fold(0.0, |most, s| s.abs().max(most))
-    }
-}
-
 /// Equations of a maneuver at its samples, with all derivatives held at their values.
 struct SampleEquations<'a, const NX: usize, E: Equations<NX>> {
     signals: ManeuverSignals,
@@ -188,12 +175,11 @@ impl<'a, const NX: usize, E: Equations<NX>> SampleEquations<'a, NX, E> {
         errors: &[SignalError],
     ) -> Vec<Vec<SignalChange>> {
         let changes = |error: &SignalError| {
-            let changes = error.changes_at_samples(recorded.signals);
-            let mut changes: Vec<SignalChange> = changes
-                .into_iter()
-                .map(|(signal, samples)| SignalChange { signal, samples })
-                .collect();
-            changes.retain(|change| self.reads(error.signal) && change.largest() > 0.0);
+            if !self.reads(error.signal) {
+                return vec![];
+            }
+            let mut changes = error.changes_at_samples(recorded.signals);
+            changes.retain(|change| change.largest() > 0.0);
             changes
         };
         errors.iter().map(changes).collect()

@@ -82,25 +82,42 @@ impl<'a> SignalError<'a> {
         }
         in_error.delayed(self.signal, self.delay_s)
     }
-}
 
-impl SignalError<'_> {
-    /// Changes of the recorded signals at the samples by the error, with the names of the signals. A
-    /// scale error of a rate also changes its slope.
+    /// Changes of the recorded signals at the samples by the error. A scale error of a rate also
+    /// changes its slope.
     #[must_use]
-    pub fn changes_at_samples(&self, signals: &ManeuverSignals) -> Vec<(String, Vec<f64>)> {
+    pub fn changes_at_samples(&self, signals: &ManeuverSignals) -> Vec<SignalChange> {
         if self.delay_s != 0.0 {
-            let changes = signals.changes_by_delay(self.signal, self.delay_s);
-            return vec![(self.signal.to_owned(), changes)];
+            return vec![SignalChange {
+                signal: self.signal.to_owned(),
+                samples: signals.changes_by_delay(self.signal, self.delay_s),
+            }];
         }
         let of_slope = slope_name(self.signal);
         [(self.signal, self.bias), (&of_slope, 0.0)]
-            .map(|(name, bias)| {
-                let samples = signals.samples_of(name).into_iter();
-                let changes = samples.map(|value| self.scale * value + bias);
-                (name.to_owned(), changes.collect())
+            .map(|(signal, bias)| {
+                let samples = signals.samples_of(signal).into_iter();
+                SignalChange {
+                    signal: signal.to_owned(),
+                    samples: samples.map(|value| self.scale * value + bias).collect(),
+                }
             })
             .into()
+    }
+}
+
+/// Change of a signal at the samples by an error.
+#[derive(Clone, Debug)]
+pub struct SignalChange {
+    pub signal: String,
+    pub samples: Vec<f64>,
+}
+
+impl SignalChange {
+    /// Largest magnitude of the change.
+    #[must_use]
+    pub fn largest(&self) -> f64 {
+        self.samples.iter().fold(0.0, |most, s| s.abs().max(most))
     }
 }
 
