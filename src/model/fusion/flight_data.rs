@@ -9,6 +9,8 @@ use super::observation::Observation;
 use super::unknowns::{SparseRow, Unknowns, is_of_campaign};
 use crate::model::prior::scale_prior::Scale;
 use crate::model::prior::term::PosteriorTerm;
+use crate::numerics::linear_algebra::symmetric::square;
+use crate::numerics::linear_algebra::triangular::solve_lower;
 use crate::output_error::error_effect::SharedError;
 
 /// Evidence of a flight, y = A z + K u + e.
@@ -153,18 +155,14 @@ impl FlightData {
         let active = self.active();
         let lower = cholesky.l_dirty();
         let mut rows = self.dense(&active);
-        lower.solve_lower_triangular_mut(&mut rows);
+        solve_lower(lower.as_view(), rows.as_view_mut());
         let mut differences = self.differences.clone();
         lower.solve_lower_triangular_mut(&mut differences);
-        let vector = rows.tr_mul(&differences);
+        let (matrix, vector) = (square(&rows), rows.tr_mul(&differences));
         for (j, &column) in active.iter().enumerate() {
             sums.vector[column] += vector[j];
-            for (i, &row) in active[..=j].iter().enumerate() {
-                let product = rows.column(i).dot(&rows.column(j));
-                sums.matrix[(row, column)] += product;
-                if row != column {
-                    sums.matrix[(column, row)] += product;
-                }
+            for (i, &row) in active.iter().enumerate() {
+                sums.matrix[(row, column)] += matrix[(i, j)];
             }
         }
     }
@@ -213,7 +211,9 @@ impl FlightData {
     ) -> (DVector<f64>, DMatrix<f64>) {
         let active = self.active();
         let dense = self.dense(&active);
-        let of_active = covariance.select_rows(&active).select_columns(&active);
+        let of_active = DMatrix::from_fn(active.len(), active.len(), |i, j| {
+            covariance[(active[i], active[j])]
+        });
         (
             &dense * mean.select_rows(&active),
             &dense * of_active * dense.transpose(),

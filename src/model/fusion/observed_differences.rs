@@ -99,7 +99,7 @@ impl ObservedDifferences {
             root.push(with_all.select_rows(&term.points));
             of_all.push(with_all);
         }
-        let lower = inner_root(root.right(&root.left(matrix)))?;
+        let lower = inner_root(root.lower_product(&root.left(matrix)))?;
         let mut seen = root.left_of(vector);
         lower.solve_lower_triangular_mut(&mut seen);
         lower.tr_solve_lower_triangular_mut(&mut seen);
@@ -113,7 +113,7 @@ impl ObservedDifferences {
         let Information { matrix, vector } = &self.information;
         let root = self.root(scales, least);
         let mut halves = root.left(matrix);
-        let lower = inner_root(root.right(&halves))?;
+        let lower = inner_root(root.lower_product(&halves))?;
         solve_lower(lower.as_view(), halves.as_view_mut());
         let mut seen = root.left_of(vector);
         lower.solve_lower_triangular_mut(&mut seen);

@@ -16,7 +16,7 @@
 //! m(θ), so 1/6 of the squares of both differences from m(θ) is added to the covariance. Without
 //! data m does not depend on the scales, and the tunnel's uncertainty stays as stated.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::observed_differences::ObservedDifferences;
 use super::posterior::Gaussian;
@@ -42,15 +42,18 @@ pub fn add_open_scales(observed: &ObservedDifferences, scales: &[Scale], posteri
         return;
     };
     let eigen = local.curvature.symmetric_eigen();
-    let n = centre.len();
+    let mut changes = vec![];
     for (direction, curvature) in eigen.eigenvectors.column_iter().zip(&eigen.eigenvalues) {
         let step = direction * (3.0 / curvature.max(LEAST_CURVATURE)).sqrt();
         let (Some(above), Some(below)) = (mean(&(&at + &step)), mean(&(&at - &step))) else {
             continue;
         };
-        let (above, below) = (above - &centre, below - &centre);
-        let squares = &above * above.transpose() + &below * below.transpose();
-        let mut of_differences = posterior.covariance.view_mut((0, 0), (n, n));
-        of_differences += squares * OUTER;
+        changes.extend([above - &centre, below - &centre]);
     }
+    if changes.is_empty() {
+        return;
+    }
+    let (changes, n) = (DMatrix::from_columns(&changes), centre.len());
+    let mut of_differences = posterior.covariance.view_mut((0, 0), (n, n));
+    of_differences.gemm(OUTER, &changes, &changes.transpose(), 1.0);
 }

@@ -9,8 +9,8 @@ use super::unknowns::Unknowns;
 use crate::model::prior::scale_prior::Scale;
 use crate::model::prior::term::PosteriorTerm;
 use crate::numerics::linear_algebra::root::{BlockRoot, EXACT};
-use crate::numerics::linear_algebra::symmetric::square;
-use crate::numerics::linear_algebra::triangular::{cholesky, solve_lower};
+use crate::numerics::linear_algebra::symmetric::{square, staircase_square};
+use crate::numerics::linear_algebra::triangular::{cholesky, solve_lower, solve_staircase};
 
 /// Share of the information that may be lost by rounding: with data a million times more accurate
 /// than the prior, matrices stay positive definite.
@@ -49,7 +49,7 @@ impl<'a> SolvedPosterior<'a> {
     /// Posterior; `None` if the data are not finite.
     #[must_use]
     pub fn new(root: &'a BlockRoot, information: &Information) -> Option<SolvedPosterior<'a>> {
-        let lower = inner_root(root.right(&root.left(&information.matrix)))?;
+        let lower = inner_root(root.lower_product(&root.left(&information.matrix)))?;
         let mut vector = root.left_of(&information.vector);
         lower.solve_lower_triangular_mut(&mut vector);
         Some(SolvedPosterior {
@@ -61,26 +61,28 @@ impl<'a> SolvedPosterior<'a> {
 
     /// Product L⁻¹ Rᵀ A for some columns A over the unknowns, from which Aᵀ P A follows as its
     /// square.
-    fn whitened_columns(&self, mut columns: DMatrix<f64>) -> DMatrix<f64> {
-        solve_lower(self.lower.as_view(), columns.as_view_mut());
-        columns
+    fn whitened_columns(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut halves = self.root.left(columns);
+        solve_lower(self.lower.as_view(), halves.as_view_mut());
+        halves
     }
 
-    /// Covariance P of the unknowns.
+    /// Covariance P of the unknowns, the square of L⁻¹ Rᵀ.
     fn covariance(&self) -> DMatrix<f64> {
-        square(&self.whitened_columns(self.root.transposed()))
+        let (mut halves, first_rows) = (self.root.transposed(), self.root.first_rows());
+        solve_staircase(&self.lower, &mut halves, &first_rows);
+        staircase_square(&halves, &first_rows)
     }
 
     /// Means and covariance that the posterior gives for a flight's rows.
     #[must_use]
     pub fn image(&self, flight: &FlightData, unknowns: usize) -> (DVector<f64>, DMatrix<f64>) {
-        let columns = flight.columns(unknowns);
-        let halves = self.whitened_columns(self.root.left(&columns));
+        let halves = self.whitened_columns(&flight.columns(unknowns));
         (halves.tr_mul(&self.vector), square(&halves))
     }
 }
 
-/// Cholesky factor L of I + Rᵀ Λ R = L Lᵀ, from `inner` = Rᵀ Λ R.
+/// Cholesky factor L of I + Rᵀ Λ R = L Lᵀ, from the lower triangle of `inner` = Rᵀ Λ R.
 #[must_use]
 pub fn inner_root(mut inner: DMatrix<f64>) -> Option<DMatrix<f64>> {
     for j in 0..inner.nrows() {
@@ -108,11 +110,13 @@ pub fn of_differences(information: &Information, unknowns: &Unknowns) -> Option<
         matrix: matrix.view((n, n), (all - n, all - n)).into_owned(),
         vector: vector.rows(n, all - n).into_owned(),
     };
-    let others = gaussian(&unknowns.root_of_others(EXACT), &of_others)?;
-    let cross = matrix.view((0, n), (n, all - n));
+    let root = unknowns.root_of_others(EXACT);
+    let others = SolvedPosterior::new(&root, &of_others)?;
+    let cross = matrix.view((n, 0), (all - n, n)).into_owned();
+    let halves = others.whitened_columns(&cross);
     Some(Information {
-        matrix: matrix.view((0, 0), (n, n)) - cross * &others.covariance * cross.transpose(),
-        vector: vector.rows(0, n) - cross * &others.mean,
+        matrix: matrix.view((0, 0), (n, n)).into_owned() - square(&halves),
+        vector: vector.rows(0, n) - halves.tr_mul(&others.vector),
     })
 }
 

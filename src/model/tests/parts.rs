@@ -219,8 +219,8 @@ fn the_likelihood_of_the_scales_is_that_of_the_data() {
     let (rows, differences, covariance) = dense(&data, &weights);
     let of_data = |scales: &[Scale]| {
         let root = data.unknowns.root(&terms, scales, EXACT);
-        let image = root.right(&rows);
-        let cholesky = Cholesky::new(&covariance + &image * image.transpose()).unwrap();
+        let image = root.left(&rows.transpose());
+        let cholesky = Cholesky::new(&covariance + image.tr_mul(&image)).unwrap();
         let roots: f64 = cholesky.l().diagonal().iter().map(|d| d.ln()).sum();
         0.5 * differences.dot(&cholesky.solve(&differences)) + roots
     };

@@ -145,15 +145,25 @@ impl BlockRoot {
         product
     }
 
-    /// M R.
+    /// Lower triangle of Rᵀ M R, from `half` = Rᵀ M for a symmetric M. Above the diagonal are zeros and
+    /// parts of the product.
     #[must_use]
-    pub fn right(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut product = DMatrix::zeros(matrix.nrows(), self.rank());
+    pub fn lower_product(&self, half: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut product = DMatrix::zeros(self.rank(), self.rank());
         for (block, rows, columns) in self.places() {
-            let mut own = product.columns_range_mut(columns);
-            own.gemm(1.0, &matrix.columns_range(rows), block, 0.0);
+            let below = columns.start..half.nrows();
+            let mut own = product.view_range_mut(below.clone(), columns);
+            own.gemm(1.0, &half.view_range(below, rows), block, 0.0);
         }
         product
+    }
+
+    /// Staircase of Rᵀ: the first row of each column's block, above which the column is zero.
+    #[must_use]
+    pub fn first_rows(&self) -> Vec<usize> {
+        let blocks = self.places();
+        let first = blocks.flat_map(|(_, rows, columns)| rows.map(move |_| columns.start));
+        first.collect()
     }
 
     /// Rᵀ.
@@ -249,11 +259,14 @@ mod tests {
         assert_eq!(whole.shape(), (4, 5));
         let matrix = DMatrix::from_fn(5, 5, |i, j| (3 * i + j) as f64);
         assert_relative_eq!(blocks.left(&matrix), &whole * &matrix, epsilon = 1e-12);
+        let symmetric = &matrix + matrix.transpose();
+        let product = blocks.lower_product(&blocks.left(&symmetric));
         assert_relative_eq!(
-            blocks.right(&matrix),
-            &matrix * whole.transpose(),
+            product.lower_triangle(),
+            (&whole * symmetric * whole.transpose()).lower_triangle(),
             epsilon = 1e-12
         );
+        assert_eq!(blocks.first_rows(), [0, 0, 0, 3, 3]);
         let vector = matrix.column(2).into_owned();
         assert_relative_eq!(blocks.left_of(&vector), &whole * &vector, epsilon = 1e-12);
         let seen = blocks.left_of(&vector);

@@ -94,13 +94,21 @@ const BLOCK: usize = 64;
 /// four times as long.
 #[must_use]
 pub fn square(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+    staircase_square(matrix, &vec![0; matrix.ncols()])
+}
+
+/// Aᵀ A of a staircase A: column j is zero above its row `first_rows[j]`, which does not fall with j.
+#[must_use]
+pub fn staircase_square(matrix: &DMatrix<f64>, first_rows: &[usize]) -> DMatrix<f64> {
     let n = matrix.ncols();
     let transposed = matrix.transpose();
     let mut square = DMatrix::zeros(n, n);
     for start in (0..n).step_by(BLOCK) {
         let end = (start + BLOCK).min(n);
-        let block = transposed.rows(0, end) * matrix.columns_range(start..end);
-        square.view_mut((0, start), block.shape()).copy_from(&block);
+        let rows = first_rows[start]..matrix.nrows();
+        let mut block = square.view_mut((0, start), (end, end - start));
+        let left = transposed.view_range(..end, rows.clone());
+        block.gemm(1.0, &left, &matrix.view_range(rows, start..end), 0.0);
     }
     square.fill_lower_triangle_with_upper_triangle();
     square
@@ -151,5 +159,20 @@ mod tests {
             let plain = matrix.transpose() * &matrix;
             assert_relative_eq!(square(&matrix), plain, epsilon = 1e-13);
         }
+    }
+
+    #[test]
+    fn the_square_of_a_staircase_is_that_of_the_whole_matrix() {
+        let first_rows: Vec<usize> = (0..150).map(|j| j / 40 * 3).collect();
+        let matrix = DMatrix::from_fn(11, 150, |i, j| {
+            let value = (3.0 * i as f64 - 0.7 * j as f64).sin();
+            if i < first_rows[j] { 0.0 } else { value }
+        });
+        let whole = square(&matrix);
+        assert_relative_eq!(
+            staircase_square(&matrix, &first_rows),
+            whole,
+            epsilon = 1e-13
+        );
     }
 }

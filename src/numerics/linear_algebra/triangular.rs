@@ -9,6 +9,9 @@ use pulp::Arch;
 /// Size up to which the plain methods are as fast.
 const PLAIN: usize = 48;
 
+/// Columns of a block where only a part of a matrix is computed.
+const BLOCK: usize = 64;
+
 /// Lower triangular L with L Lᵀ = A; the part above its diagonal is not defined. `None` unless A is
 /// positive definite.
 #[must_use]
@@ -34,8 +37,19 @@ fn factorise(mut matrix: DMatrixViewMut<f64>) -> bool {
     let lower = below.transpose();
     matrix.view_mut((half, 0), lower.shape()).copy_from(&lower);
     let mut rest = matrix.view_mut((half, half), (n - half, n - half));
-    rest.gemm(-1.0, &lower, &below, 1.0);
+    subtract_square(&lower, &below, &mut rest);
     factorise(rest)
+}
+
+/// Subtracts L Lᵀ on and below the diagonal, by blocks of columns; `above` is Lᵀ.
+fn subtract_square(lower: &DMatrix<f64>, above: &DMatrix<f64>, from: &mut DMatrixViewMut<f64>) {
+    let n = lower.nrows();
+    for start in (0..n).step_by(BLOCK) {
+        let width = BLOCK.min(n - start);
+        let mut block = from.view_mut((start, start), (n - start, width));
+        let columns = above.columns(start, width);
+        block.gemm(-1.0, &lower.rows_range(start..), &columns, 1.0);
+    }
 }
 
 /// Replaces B by L⁻¹ B for a lower triangular L.
@@ -56,6 +70,18 @@ pub fn solve_lower(lower: DMatrixView<f64>, mut right: DMatrixViewMut<f64>) {
         lower.view((half, half), (n - half, n - half)),
         second.as_view_mut(),
     );
+}
+
+/// Replaces B by L⁻¹ B for a lower triangular L and a staircase B: column j is zero above its row
+/// `first_rows[j]`, which does not fall with j.
+pub fn solve_staircase(lower: &DMatrix<f64>, right: &mut DMatrix<f64>, first_rows: &[usize]) {
+    for start in (0..right.ncols()).step_by(BLOCK) {
+        let width = BLOCK.min(right.ncols() - start);
+        let first = first_rows[start];
+        let rows = lower.nrows() - first;
+        let lower = lower.view((first, first), (rows, rows));
+        solve_lower(lower, right.view_mut((first, start), (rows, width)));
+    }
 }
 
 /// Columns that the plain method solves together; a single column would wait for its own divisions.
@@ -124,6 +150,20 @@ mod tests {
             solve_lower(plain.as_view(), right.as_view_mut());
             assert_relative_eq!(&plain * right, given, epsilon = 1e-9);
         }
+    }
+
+    #[test]
+    fn a_staircase_is_solved_as_the_whole_matrix_is() {
+        let lower = Cholesky::new(matrix(100)).unwrap().l();
+        let first_rows: Vec<usize> = (0..150).map(|j| j / 40 * 30).collect();
+        let mut whole = DMatrix::from_fn(100, 150, |i, j| {
+            let value = (i * j) as f64 - 3.0;
+            if i < first_rows[j] { 0.0 } else { value }
+        });
+        let mut staircase = whole.clone();
+        solve_staircase(&lower, &mut staircase, &first_rows);
+        solve_lower(lower.as_view(), whole.as_view_mut());
+        assert_relative_eq!(staircase, whole, epsilon = 1e-8);
     }
 
     #[test]
