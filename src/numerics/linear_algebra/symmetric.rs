@@ -4,6 +4,8 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 use pulp::{Arch, Simd, WithSimd};
 
+use super::BLOCK;
+
 /// 1/√H_jj of each parameter; one where the diagonal is not positive.
 #[must_use]
 pub fn scale(information: &DMatrix<f64>) -> DVector<f64> {
@@ -86,9 +88,6 @@ pub fn solve_damped(
     let solution = Cholesky::new(h)?.solve(&right.component_mul(&unit));
     Some(solution.component_mul(&unit))
 }
-
-/// Columns of a block of [`square`].
-const BLOCK: usize = 64;
 
 /// Aᵀ A, by blocks of columns up to the diagonal. The library's `tr_mul` goes column by column, which takes
 /// four times as long.

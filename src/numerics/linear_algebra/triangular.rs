@@ -6,11 +6,10 @@
 use nalgebra::{Cholesky, DMatrix, DMatrixView, DMatrixViewMut, Matrix};
 use pulp::Arch;
 
+use super::BLOCK;
+
 /// Size up to which the plain methods are as fast.
 const PLAIN: usize = 48;
-
-/// Columns of a block where only a part of a matrix is computed.
-const BLOCK: usize = 64;
 
 /// Lower triangular L with L Lᵀ = A; the part above its diagonal is not defined. `None` unless A is
 /// positive definite.
@@ -32,12 +31,12 @@ fn factorise(mut matrix: DMatrixViewMut<f64>) -> bool {
     if !factorise(matrix.view_mut((0, 0), (half, half))) {
         return false;
     }
-    let mut below = matrix.view((half, 0), (n - half, half)).transpose();
-    solve_lower(matrix.view((0, 0), (half, half)), below.as_view_mut());
-    let lower = below.transpose();
+    let mut above = matrix.view((half, 0), (n - half, half)).transpose();
+    solve_lower(matrix.view((0, 0), (half, half)), above.as_view_mut());
+    let lower = above.transpose();
     matrix.view_mut((half, 0), lower.shape()).copy_from(&lower);
     let mut rest = matrix.view_mut((half, half), (n - half, n - half));
-    subtract_square(&lower, &below, &mut rest);
+    subtract_square(&lower, &above, &mut rest);
     factorise(rest)
 }
 
