@@ -85,11 +85,12 @@ pub fn upper_median_of_magnitudes(bits: &mut [u64]) -> Option<f64> {
 /// Quantile of the finite values at a share between 0 and 1, linear between neighbours.
 #[must_use]
 pub fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> Option<f64> {
-    let sorted = sorted_finite(values);
-    let rank = share * sorted.len().checked_sub(1)? as f64;
-    let below = sorted.get(whole(rank))?;
-    let above = sorted.get(whole(rank.ceil()))?;
-    Some(below + (above - below) * rank.fract())
+    let mut values = finite(values);
+    let rank = share * values.len().checked_sub(1)? as f64;
+    let below = select(&mut values, whole(rank))?;
+    let larger = values.get(whole(rank) + 1..).unwrap_or_default();
+    let above = larger.iter().copied().min_by(f64::total_cmp);
+    Some(below + (above.unwrap_or(below) - below) * rank.fract())
 }
 
 /// Quantile of sorted values at a share between 0 and 1, linear between neighbours; infinite if one
@@ -115,20 +116,14 @@ pub fn lower_quantile_in_place(values: &mut [f64], share: f64) -> Option<f64> {
 /// Largest minus smallest value, after a share of the values is left out at either end.
 #[must_use]
 pub fn trimmed_range(mut values: Vec<f64>, share: f64) -> Option<f64> {
-    values.sort_unstable_by(f64::total_cmp);
     let left_out = whole(values.len() as f64 * share);
-    let largest = values.get(values.len().checked_sub(left_out + 1)?)?;
-    Some(largest - values.get(left_out)?)
+    let smallest = select(&mut values, left_out)?;
+    let largest = values.len().checked_sub(left_out + 1)?;
+    Some(select(&mut values, largest)? - smallest)
 }
 
 fn finite(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     values.into_iter().filter(|v| v.is_finite()).collect()
-}
-
-fn sorted_finite(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
-    let mut values = finite(values);
-    values.sort_unstable_by(f64::total_cmp);
-    values
 }
 
 fn select(values: &mut [f64], rank: usize) -> Option<f64> {
