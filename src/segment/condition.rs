@@ -96,27 +96,29 @@ fn mean_of_signal(
 fn mean_alpha_deg(
     record: &Record,
     aircraft: &Aircraft,
-    mut window: RangeInclusive<usize>,
+    window: RangeInclusive<usize>,
 ) -> Option<f64> {
-    let alpha = |k: usize| -> Option<f64> {
-        let at = |name: &str| record.values(name).and_then(|v| v.get(k)).copied();
+    let of = |name: &str| record.values(name)?.get(window.clone());
+    let (alpha, beta, velocity) = (
+        of(signal::ALPHA_VANE)?,
+        of(signal::BETA_VANE)?,
+        of(signal::VELOCITY)?,
+    );
+    let [p, q, r] = [of(signal::P)?, of(signal::Q)?, of(signal::R)?];
+    let [x, y, z] = [of(signal::X_CG)?, of(signal::Y_CG)?, of(signal::Z_CG)?];
+    let alpha_at_cg = |k: usize| {
         let at_vanes = VaneFlow {
-            alpha: at(signal::ALPHA_VANE)? / DEG,
-            beta: at(signal::BETA_VANE)? / DEG,
-            velocity: at(signal::VELOCITY)?,
-            rates: [
-                at(signal::P)? / DEG,
-                at(signal::Q)? / DEG,
-                at(signal::R)? / DEG,
-            ],
+            alpha: alpha[k] / DEG,
+            beta: beta[k] / DEG,
+            velocity: velocity[k],
+            rates: [p[k] / DEG, q[k] / DEG, r[k] / DEG],
         };
         let cg = Position {
-            x_ft: at(signal::X_CG)?,
-            y_ft: at(signal::Y_CG)?,
-            z_ft: at(signal::Z_CG)?,
+            x_ft: x[k],
+            y_ft: y[k],
+            z_ft: z[k],
         };
-        Some(aircraft.sensors.flow_at_cg(&at_vanes, cg).alpha * DEG)
+        aircraft.sensors.flow_at_cg(&at_vanes, cg).alpha * DEG
     };
-    let alphas: Option<Vec<f64>> = window.by_ref().map(alpha).collect();
-    finite_mean(alphas?)
+    finite_mean((0..alpha.len()).map(alpha_at_cg))
 }

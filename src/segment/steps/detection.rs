@@ -92,9 +92,7 @@ pub(in crate::segment) fn largest_change(
         .values(signal)
         .and_then(|v| v.get(first..end))
         .unwrap_or_default();
-    changes(&levels(values, lengths.level), lengths)
-        .map(|change| change.size())
-        .fold(0.0, f64::max)
+    largest(&levels(values, lengths.level), lengths)
 }
 
 /// Standard deviation of the changes between levels that white noise of a signal causes. `None`
@@ -113,9 +111,7 @@ pub(in crate::segment) fn level_noise(
 /// all changes. In a recording that is a single maneuver they are not few; there it follows from
 /// the rests between the inputs.
 fn noise(levels: &[f64], lengths: DetectorLengths, is_maneuver_alone: bool) -> f64 {
-    let mut sizes: Vec<f64> = changes(levels, lengths)
-        .map(|change| change.size())
-        .collect();
+    let mut sizes: Vec<f64> = sizes(levels, lengths).collect();
     if sizes.len() < 2 {
         return 0.0;
     }
@@ -129,9 +125,7 @@ fn noise(levels: &[f64], lengths: DetectorLengths, is_maneuver_alone: bool) -> f
 
 /// Largest change of a signal.
 fn largest(levels: &[f64], lengths: DetectorLengths) -> f64 {
-    changes(levels, lengths)
-        .map(|change| change.size())
-        .fold(0.0, f64::max)
+    sizes(levels, lengths).fold(0.0, f64::max)
 }
 
 /// Longest recording that may be one maneuver alone, s: the longest maneuvers take 40 s with their
@@ -193,23 +187,51 @@ impl LevelChange {
     }
 }
 
-/// The changes between levels at each time at which both levels exist.
-fn changes(levels: &[f64], lengths: DetectorLengths) -> impl Iterator<Item = LevelChange> {
-    let reach = lengths.reach();
-    let after = levels
-        .get(reach + lengths.half_transit..)
-        .unwrap_or_default();
-    let change = move |(k, (before, after)): (usize, (&f64, &f64))| LevelChange {
-        at: k + reach,
-        before: *before,
-        after: *after,
+/// The levels before and after each time at which the detector looks, from [`DetectorLengths::reach`] on.
+fn befores_and_afters(levels: &[f64], lengths: DetectorLengths) -> (&[f64], &[f64]) {
+    let apart = lengths.reach() + lengths.half_transit;
+    let after = levels.get(apart..).unwrap_or_default();
+    (&levels[..after.len()], after)
+}
+
+/// Sizes of the changes between levels, at each time at which both levels exist.
+fn sizes(levels: &[f64], lengths: DetectorLengths) -> impl Iterator<Item = f64> {
+    let (before, after) = befores_and_afters(levels, lengths);
+    let changes = before.iter().zip(after);
+    changes
+        .map(|(before, after)| (after - before).abs())
+        .filter(|size| size.is_finite())
+}
+
+/// The finite changes between levels of at least the smallest size.
+fn large_changes(
+    levels: &[f64],
+    smallest: f64,
+    lengths: DetectorLengths,
+) -> impl Iterator<Item = LevelChange> {
+    let (before, after) = befores_and_afters(levels, lengths);
+    let is_large = move |before: f64, after: f64| {
+        let size = (after - before).abs();
+        (size >= smallest) & size.is_finite()
     };
-    levels
-        .iter()
-        .zip(after)
-        .enumerate()
-        .map(change)
-        .filter(|change| change.size().is_finite())
+    let parts = before
+        .chunks(LOOKED_AT_ONCE)
+        .zip(after.chunks(LOOKED_AT_ONCE));
+    // Few parts contain one. Without an early exit, for the vectors.
+    let with_large = parts.enumerate().filter(move |(_, (before, after))| {
+        let changes = before.iter().zip(*after);
+        pulp::Arch::new().dispatch(|| changes.fold(false, |any, (b, a)| any | is_large(*b, *a)))
+    });
+    with_large.flat_map(move |(part, (before, after))| {
+        let first = part * LOOKED_AT_ONCE + lengths.reach();
+        let changes = before.iter().zip(after).enumerate();
+        let large = changes.filter(move |(_, (before, after))| is_large(**before, **after));
+        large.map(move |(k, (before, after))| LevelChange {
+            at: first + k,
+            before: *before,
+            after: *after,
+        })
+    })
 }
 
 /// Finds the steps among the changes between levels, times in samples: a step between samples 9
@@ -220,20 +242,22 @@ fn changes(levels: &[f64], lengths: DetectorLengths) -> impl Iterator<Item = Lev
 fn steps_of_levels(levels: &[f64], smallest: f64, lengths: DetectorLengths) -> Vec<Step> {
     let mut steps = Vec::new();
     let mut run: Vec<LevelChange> = Vec::new();
-    for change in changes(levels, lengths) {
-        let is_large = change.size() >= smallest;
+    let (before, after) = befores_and_afters(levels, lengths);
+    let is_known = |at: usize| {
+        let place = at - lengths.reach();
+        (after[place] - before[place]).is_finite()
+    };
+    for change in large_changes(levels, smallest, lengths) {
         let continues = |last: &LevelChange| {
-            is_large
-                && change.signed() * last.signed() > 0.0
+            change.signed() * last.signed() > 0.0
                 && change.at - last.at <= lengths.reach()
+                && !(last.at + 1..change.at).any(is_known)
         };
         if !run.last().is_none_or(continues) {
             steps.extend(step_of_run(&run));
             run.clear();
         }
-        if is_large {
-            run.push(change);
-        }
+        run.push(change);
     }
     steps.extend(step_of_run(&run));
     steps
@@ -265,8 +289,11 @@ fn step_of_run(run: &[LevelChange]) -> Option<Step> {
     })
 }
 
-/// Number of levels averaged side by side: a multiple of every vector width, small enough for L1.
-const SIDE: usize = 64;
+/// Number of levels averaged side by side: a multiple of every vector width, and few enough for the registers.
+const SIDE: usize = 8;
+
+/// Changes that are looked at together for a large one.
+const LOOKED_AT_ONCE: usize = 64;
 
 /// Least number of finite samples of a level that leaves out its largest and smallest: two remain.
 const FEWEST_TO_TRIM: f64 = 4.0;
@@ -274,38 +301,44 @@ const FEWEST_TO_TRIM: f64 = 4.0;
 /// Level that begins at each sample: the mean of its finite samples without the largest and the
 /// smallest. NaN if fewer than half are finite.
 fn levels(values: &[f64], length: usize) -> Vec<f64> {
-    let mut levels = vec![f64::NAN; (values.len() + 1).saturating_sub(length)];
-    let side_by_side = pulp::Arch::new();
-    for (from, levels) in levels
-        .chunks_mut(SIDE)
-        .enumerate()
-        .map(|(i, levels)| (i * SIDE, levels))
-    {
-        let samples = &values[from..from + levels.len() + length - 1];
-        side_by_side.dispatch(|| average_levels(samples, length, levels));
-    }
+    let count = (values.len() + 1).saturating_sub(length);
+    let mut levels = Vec::with_capacity(count + SIDE);
+    // Samples of the last levels, and missing ones up to a full side.
+    let mut last = values[count / SIDE * SIDE..].to_vec();
+    last.resize(SIDE + length - 1, f64::NAN);
+    pulp::Arch::new().dispatch(|| {
+        let side_by_side = values.windows(SIDE + length - 1).step_by(SIDE);
+        for samples in side_by_side.take(count / SIDE).chain([&last[..]]) {
+            levels.extend(average_levels(samples, length));
+        }
+    });
+    levels.truncate(count);
     levels
 }
 
 #[expect(clippy::inline_always, reason = "compiled for each width of vectors")]
 #[inline(always)]
-fn average_levels(samples: &[f64], length: usize, levels: &mut [f64]) {
+fn average_levels(samples: &[f64], length: usize) -> [f64; SIDE] {
     let (mut known, mut sum) = ([0.0; SIDE], [0.0; SIDE]);
     let (mut low, mut high) = ([f64::INFINITY; SIDE], [f64::NEG_INFINITY; SIDE]);
-    for later in samples.windows(levels.len()).take(length) {
+    let later = samples.windows(SIDE).take(length);
+    for later in later.filter_map(|part| part.first_chunk::<SIDE>()) {
         let of_level = known
             .iter_mut()
             .zip(&mut sum)
             .zip(low.iter_mut().zip(&mut high));
         for (v, ((known, sum), (low, high))) in later.iter().zip(of_level) {
             let finite = v.is_finite();
+            let or = |missing: f64| if finite { *v } else { missing };
             *known += if finite { 1.0 } else { 0.0 };
-            *sum += if finite { *v } else { 0.0 };
-            *low = if finite && *v < *low { *v } else { *low };
-            *high = if finite && *v > *high { *v } else { *high };
+            *sum += or(0.0);
+            let (smaller, larger) = (or(f64::INFINITY), or(f64::NEG_INFINITY));
+            *low = if smaller < *low { smaller } else { *low };
+            *high = if larger > *high { larger } else { *high };
         }
     }
     let of_level = known.iter().zip(&sum).zip(low.iter().zip(&high));
+    let mut levels = [f64::NAN; SIDE];
     for (level, ((known, sum), (low, high))) in levels.iter_mut().zip(of_level) {
         let inner = (sum - low - high) / (known - 2.0);
         let mean = if *known >= FEWEST_TO_TRIM {
@@ -319,6 +352,7 @@ fn average_levels(samples: &[f64], length: usize, levels: &mut [f64]) {
             mean
         };
     }
+    levels
 }
 
 #[cfg(test)]

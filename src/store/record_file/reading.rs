@@ -7,6 +7,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use arrow::array::{Array, AsArray, RecordBatch};
+use arrow::buffer::NullBuffer;
 use arrow::datatypes::{Float64Type, UInt8Type};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
@@ -234,16 +235,11 @@ fn add_batch(record: &mut Record, batch: &RecordBatch, samples: usize) -> Result
         let other = || format!("column `{}` is of type {}", field.name(), field.data_type());
         if field.name().ends_with(MARK) {
             let marks = array.as_primitive_opt::<UInt8Type>().ok_or_else(other)?;
-            if marks.null_count() == marks.len() {
-                series
-                    .marks
-                    .resize(series.marks.len() + marks.len(), Mark::Measured);
-            } else {
-                series.marks.extend(
-                    marks
-                        .iter()
-                        .map(|code| code.map_or(Mark::Measured, Mark::from_u8)),
-                );
+            let first = series.marks.len();
+            series.marks.resize(first + marks.len(), Mark::Measured);
+            let all = NullBuffer::new_valid(marks.len());
+            for k in marks.nulls().unwrap_or(&all).valid_indices() {
+                series.marks[first + k] = Mark::from_u8(marks.value(k));
             }
         } else {
             let values = array.as_primitive_opt::<Float64Type>().ok_or_else(other)?;
