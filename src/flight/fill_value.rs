@@ -6,12 +6,14 @@ use crate::units::{Quantity, Unit};
 /// Numbers of nines that recorders write for a missing value.
 const FILL_VALUES: [f64; 4] = [999.0, 9_999.0, 99_999.0, 999_999.0];
 
-/// `true` for a number that is usual as a fill value. Most samples are decided by one comparison.
+/// `true` for a number that is usual as a fill value. Without branches, for the vectors.
 #[inline]
 #[must_use]
 pub fn is_usual(recorded: f64) -> bool {
     let size = recorded.abs();
-    size >= FILL_VALUES[0] && FILL_VALUES.contains(&size)
+    FILL_VALUES
+        .iter()
+        .fold(false, |any, fill| any | (size == *fill))
 }
 
 /// `true` for a fill value that is no measurement of a signal either. `convert` returns the number in the signal's

@@ -54,7 +54,7 @@ impl Mark {
 }
 
 /// One signal: values in the unit of its name, and the marks of its samples.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Series {
     pub values: Vec<f64>,
     pub marks: Vec<Mark>,

@@ -14,7 +14,7 @@ use crate::aircraft::Aircraft;
 use crate::error::Problem;
 use crate::flight::record::Series;
 use crate::flight::stand_in::GapExtent;
-use crate::flight::{Channel, RawFlight, Record};
+use crate::flight::{Channel, Mark, RawFlight, Record};
 use crate::tables::{ChannelRow, CheckRow, FlightRow, InstrumentRow};
 
 /// One stretch of a flight after ingest.
@@ -152,13 +152,10 @@ fn read_whole<'a>(
 ) -> Result<(Series, ConditionedChannel<'a>), Problem> {
     let samples = stretch.clock.samples;
     let mut reader = ChannelReader::new(plan, stretch, settings);
-    let mut whole = Series {
-        values: Vec::new(),
-        marks: Vec::new(),
-    };
-    let mut append = |series: &Series| {
-        whole.values.extend_from_slice(&series.values);
-        whole.marks.extend_from_slice(&series.marks);
+    let mut whole = Series::default();
+    let mut append = |values: &[f64], marks: &[Mark]| {
+        whole.values.extend_from_slice(values);
+        whole.marks.extend_from_slice(marks);
         Ok(())
     };
     reader

@@ -64,12 +64,13 @@ impl Conversion {
     /// Converted value.
     #[must_use]
     pub fn of(self, value: f64) -> f64 {
-        // The sum with zero would turn -0 into 0.
-        if self.offset == 0.0 {
-            value * self.factor
+        // The sum with 0 would turn -0 into 0, that with -0 changes nothing.
+        let offset = if self.offset == 0.0 {
+            -0.0
         } else {
-            value * self.factor + self.offset
-        }
+            self.offset
+        };
+        value * self.factor + offset
     }
 }
 

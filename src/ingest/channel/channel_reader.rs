@@ -5,13 +5,15 @@ use super::channel_statistics::ChannelStatistics;
 use super::column_samples::ColumnSamples;
 use super::conditioner::Conditioner;
 use super::signature::SignatureSamples;
-use crate::flight::Channel;
-use crate::flight::record::Series;
+use crate::flight::{Channel, Mark};
 use crate::ingest::checks::BlockAverager;
 use crate::ingest::clock::{Clock, Stretch};
 use crate::ingest::column_source::ColumnSource;
 use crate::ingest::refusal::Refusal;
 use crate::ingest::settings::Settings;
+
+/// Receiver of conditioned samples: values and marks.
+pub type SampleSink<'s> = dyn FnMut(&[f64], &[Mark]) -> Result<(), String> + 's;
 
 /// Reader of one channel over a stretch; its samples leave in order.
 #[derive(Clone, Debug)]
@@ -75,7 +77,7 @@ impl<'a> ChannelReader<'a> {
         source: &(impl ColumnSource + ?Sized),
         until: usize,
         piece: usize,
-        sink: &mut dyn FnMut(&Series) -> Result<(), String>,
+        sink: &mut SampleSink,
     ) -> Result<(), Refusal> {
         let (clock, name) = (&self.stretch.clock, self.name);
         let output = &mut self.output;
@@ -98,6 +100,7 @@ impl<'a> ChannelReader<'a> {
         }
         // Samples pushed by an earlier call may be all that is wanted.
         pass(&[]);
+        output.conditioner.free();
         written.map_err(|reason| Refusal::of_channel(name, reason))
     }
 
@@ -133,18 +136,18 @@ impl Output {
         &mut self,
         until: usize,
         piece: usize,
-        sink: &mut dyn FnMut(&Series) -> Result<(), String>,
+        sink: &mut SampleSink,
     ) -> Result<(), String> {
         let ready = self.conditioner.ready().min(until);
         let least = if ready == until { 1 } else { piece };
         if ready < self.conditioner.settled() + least {
             return Ok(());
         }
-        let series = self.conditioner.settle(ready);
+        let (values, marks) = self.conditioner.settle(ready);
         if let Some(means) = &mut self.block_means {
-            means.push(&series.values);
+            means.push(values);
         }
-        self.signature_samples.push(&series);
-        sink(&series)
+        self.signature_samples.push(values, marks);
+        sink(values, marks)
     }
 }

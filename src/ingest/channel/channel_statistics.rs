@@ -42,25 +42,27 @@ impl ChannelStatistics {
         self.marks[mark as usize]
     }
 
-    /// Counts the marks of the samples from `first` on.
-    pub fn add(&mut self, first: usize, marks: &[Mark]) {
-        let measured = marks.iter().filter(|mark| **mark == Mark::Measured).count();
-        if measured == marks.len() {
-            self.marks[Mark::Measured as usize] += measured;
-            return;
-        }
-        for (k, mark) in marks.iter().enumerate() {
-            self.marks[*mark as usize] += 1;
-            if *mark == Mark::Stuck {
-                self.add_stuck(first + k);
+    /// Counts the marks of the samples from `first` on, which were recorded as these values.
+    pub fn add(&mut self, first: usize, marks: &[Mark], recorded: &[f64]) {
+        let mut from = 0;
+        for run in marks.chunk_by(|a, b| a == b) {
+            let (mark, to) = (run[0], from + run.len());
+            self.marks[mark as usize] += run.len();
+            match mark {
+                Mark::Stuck => self.add_stuck(first + from, first + to),
+                Mark::Missing => {
+                    self.absent += recorded[from..to].iter().filter(|v| v.is_nan()).count();
+                }
+                _ => {}
             }
+            from = to;
         }
     }
 
-    fn add_stuck(&mut self, sample: usize) {
+    fn add_stuck(&mut self, from: usize, to: usize) {
         match self.stuck.last_mut() {
-            Some((_, end)) if *end == sample => *end = sample + 1,
-            _ => self.stuck.push((sample, sample + 1)),
+            Some((_, end)) if *end == from => *end = to,
+            _ => self.stuck.push((from, to)),
         }
     }
 }

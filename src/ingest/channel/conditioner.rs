@@ -8,6 +8,8 @@
 
 use std::ops::Range;
 
+use pulp::Arch;
+
 use super::channel_statistics::{ChannelStatistics, LARGEST};
 use super::character::{Character, SPELL};
 use super::gaps::{Bridge, BridgedGaps, bridge_gaps};
@@ -16,7 +18,7 @@ use super::spell_characters::Characters;
 use super::spikes;
 use super::unwrap::Unwrapper;
 use super::update_rate::{LONGEST_PERIOD, UpdateRate};
-use crate::flight::fill_value::is_fill_value;
+use crate::flight::fill_value::{is_fill_value, is_usual};
 use crate::flight::record::Series;
 use crate::flight::{Channel, Mark};
 use crate::ingest::settings::Settings;
@@ -51,6 +53,8 @@ pub struct Conditioner {
     /// Converted values from sample `first` on.
     values: Vec<f64>,
     first: usize,
+    /// The samples that left last, with those on which they depend. Its memory is used again.
+    latest: Series,
     /// Number of samples that have left, from the first.
     settled: usize,
     characters: Characters,
@@ -82,6 +86,7 @@ impl Conditioner {
             unwrapper: Unwrapper::of(channel, step_s, LONGEST_PERIOD, settings),
             values: Vec::new(),
             first: 0,
+            latest: Series::default(),
             settled: 0,
             characters: Characters::none(),
             statistics: ChannelStatistics::default(),
@@ -135,9 +140,14 @@ impl Conditioner {
     /// Recorded values with fill values and those beyond any measurement set to NaN; `None` if no value is.
     fn without_impossible(&mut self, recorded: &[f64]) -> Option<Vec<f64>> {
         let (conversion, signal) = (self.conversion, &self.signal);
-        let is_beyond = |value: f64| value.is_finite() && conversion.of(value).abs() > LARGEST;
+        let is_beyond = |value: f64| value.is_finite() & (conversion.of(value).abs() > LARGEST);
         let is_fill = |value: f64| is_fill_value(value, signal, |value| conversion.of(value));
-        if !recorded.iter().any(|v| is_beyond(*v) || is_fill(*v)) {
+        // Without an early exit, for the vectors.
+        let is_any_suspect = Arch::new().dispatch(|| {
+            let suspect = |v: &f64| is_usual(*v) | is_beyond(*v);
+            recorded.iter().fold(false, |any, v| any | suspect(v))
+        });
+        if !is_any_suspect {
             return None;
         }
         let pushed = self.first + self.values.len();
@@ -169,7 +179,8 @@ impl Conditioner {
             }
         };
         let Some(unwrapper) = &mut self.unwrapper else {
-            self.values.extend(recorded.iter().map(|v| converted(*v)));
+            let values = &mut self.values;
+            Arch::new().dispatch(|| values.extend(recorded.iter().map(|v| converted(*v))));
             return;
         };
         for part in recorded.chunks(UNWRAPPED_AT_ONCE) {
@@ -199,20 +210,40 @@ impl Conditioner {
     }
 
     /// Returns the samples up to `until`, which must have been `wanted` and pushed.
-    pub fn settle(&mut self, until: usize) -> Series {
+    pub fn settle(&mut self, until: usize) -> (&[f64], &[Mark]) {
         let until = until.min(self.samples);
         let from = self.settled.saturating_sub(MARGIN).max(self.first);
         let to = (until + MARGIN).min(self.pushed());
-        let mut values = self.values[from - self.first..to - self.first].to_vec();
-        let is_absent: Vec<bool> = values.iter().map(|value| value.is_nan()).collect();
-        self.blank_repeats(&mut values, from);
-        let stuck = self.blank_stuck(&mut values, from);
+        let Series {
+            mut values,
+            mut marks,
+        } = std::mem::take(&mut self.latest);
+        values.clear();
+        values.extend_from_slice(&self.values[from - self.first..to - self.first]);
+        self.repair(&mut values, &mut marks, from);
+        let leaving = self.settled - from..until - from;
+        let recorded = &self.values[self.settled - self.first..until - self.first];
+        self.statistics
+            .add(self.settled, &marks[leaving.clone()], recorded);
+        self.settled = until;
+        self.forget();
+        self.latest = Series { values, marks };
+        (
+            &self.latest.values[leaving.clone()],
+            &self.latest.marks[leaving],
+        )
+    }
+
+    /// Repairs converted values from sample `from` on and marks them.
+    fn repair(&self, values: &mut [f64], marks: &mut Vec<Mark>, from: usize) {
+        self.blank_repeats(values, from);
+        let stuck = self.blank_stuck(values, from);
         let despiked = if self.is_flag {
             Vec::new()
         } else {
-            self.despike(&mut values, from)
+            self.despike(values, from)
         };
-        let mut marks = self.bridge(&mut values, from);
+        self.bridge(values, marks, from);
         for range in stuck {
             values[range.clone()].fill(f64::NAN);
             marks[range].fill(Mark::Stuck);
@@ -220,16 +251,11 @@ impl Conditioner {
         for k in despiked {
             marks[k] = Mark::Despiked;
         }
-        let core = self.settled - from..until - from;
-        self.statistics.add(self.settled, &marks[core.clone()]);
-        let missing = core.clone().filter(|k| marks[*k] == Mark::Missing);
-        self.statistics.absent += missing.filter(|k| is_absent[*k]).count();
-        self.settled = until;
-        self.forget();
-        Series {
-            values: cut(values, &core),
-            marks: cut(marks, &core),
-        }
+    }
+
+    /// Frees the memory of the samples that left.
+    pub fn free(&mut self) {
+        self.latest = Series::default();
     }
 
     /// Drops values and characters on which no later sample depends.
@@ -251,10 +277,12 @@ impl Conditioner {
             else {
                 continue;
             };
-            for k in range {
-                if (from + k) % period != phase {
-                    values[k] = f64::NAN;
-                }
+            let mut repeats = range.start;
+            while repeats < range.end {
+                let ahead = (period + phase - (from + repeats) % period) % period;
+                let new = (repeats + ahead).min(range.end);
+                values[repeats..new].fill(f64::NAN);
+                repeats = new + 1;
             }
         }
     }
@@ -311,14 +339,14 @@ impl Conditioner {
         despiked.into_iter().map(|i| places[i]).collect()
     }
 
-    fn bridge(&self, values: &mut [f64], from: usize) -> Vec<Mark> {
+    fn bridge(&self, values: &mut [f64], marks: &mut Vec<Mark>, from: usize) {
         let bridge = if self.is_flag {
             Bridge::Held
         } else {
             Bridge::Line
         };
         let period = |k: usize| self.characters.at(from + k).rate.period;
-        bridge_gaps(values, self.reach, bridge, period)
+        bridge_gaps(values, marks, self.reach, bridge, period);
     }
 
     /// Ends the channel and returns its statistics.
@@ -341,8 +369,9 @@ impl Conditioner {
 
 /// The finite values and their places.
 fn finite_values(values: &[f64]) -> (Vec<usize>, Vec<f64>) {
-    let is_finite = |k: &usize| values[*k].is_finite();
-    let places: Vec<usize> = (0..values.len()).filter(is_finite).collect();
+    let count = values.iter().filter(|v| v.is_finite()).count();
+    let mut places = Vec::with_capacity(count);
+    places.extend((0..values.len()).filter(|k| values[*k].is_finite()));
     let finite = places.iter().map(|k| values[*k]).collect();
     (places, finite)
 }
@@ -354,21 +383,10 @@ fn equal_runs(values: &[f64], least: usize) -> Vec<(Range<usize>, usize)> {
         let runs = long_runs(values, least).into_iter();
         return runs.map(|run| (run.clone(), run.len())).collect();
     }
-    let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    let (places, finite) = finite_values(values);
     let runs = long_runs(&finite, least);
-    if runs.is_empty() {
-        return Vec::new();
-    }
-    let (places, _) = finite_values(values);
     let place = |run: &Range<usize>| places[run.start]..places[run.end - 1] + 1;
     runs.iter().map(|run| (place(run), run.len())).collect()
-}
-
-/// A range of the values alone.
-fn cut<T>(mut values: Vec<T>, range: &Range<usize>) -> Vec<T> {
-    values.truncate(range.end);
-    values.drain(..range.start);
-    values
 }
 
 #[cfg(test)]

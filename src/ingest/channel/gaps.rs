@@ -91,7 +91,10 @@ impl BridgedGaps {
     }
 }
 
-/// Bridges the gaps (NaN) within reach in place and returns the flag of every sample.
+/// Samples that are looked at together for a gap, since few of them begin one.
+const LOOKED_AT_ONCE: usize = 16;
+
+/// Bridges the gaps (NaN) within reach in place and marks every sample.
 ///
 /// A gap at an end of the record has one neighbour only and stays missing. There are two
 /// exceptions: a gap between two values of a slow channel, and a gap within the reach at an end. It
@@ -99,11 +102,13 @@ impl BridgedGaps {
 /// sample. A gap that is no longer lies between two recorded values and is no fault.
 pub fn bridge_gaps(
     values: &mut [f64],
+    marks: &mut Vec<Mark>,
     reach: BridgedGaps,
     bridge: Bridge,
     period: impl Fn(usize) -> usize,
-) -> Vec<Mark> {
-    let mut marks = vec![Mark::Measured; values.len()];
+) {
+    marks.clear();
+    marks.resize(values.len(), Mark::Measured);
     let mut from = 0;
     while let Some(gap) = next_gap(values, from) {
         let before = gap
@@ -134,12 +139,15 @@ pub fn bridge_gaps(
         from = gap.end;
         marks[gap].fill(mark);
     }
-    marks
 }
 
 /// The first gap from a sample on.
 fn next_gap(values: &[f64], from: usize) -> Option<Range<usize>> {
-    let start = from + values[from..].iter().position(|v| v.is_nan())?;
+    // Without an early exit, for the vectors.
+    let has_gap = |part: &[f64]| part.iter().fold(false, |any, v| any | v.is_nan());
+    let later = &values[from..];
+    let searched = LOOKED_AT_ONCE * later.chunks(LOOKED_AT_ONCE).position(has_gap)?;
+    let start = from + searched + later[searched..].iter().position(|v| v.is_nan())?;
     let end = values[start..].iter().position(|v| !v.is_nan());
     Some(start..end.map_or(values.len(), |k| start + k))
 }
@@ -163,6 +171,18 @@ mod tests {
 
     const GAP: f64 = f64::NAN;
 
+    /// Marks of values whose gaps are bridged.
+    fn bridged(
+        values: &mut [f64],
+        reach: BridgedGaps,
+        bridge: Bridge,
+        period: impl Fn(usize) -> usize,
+    ) -> Vec<Mark> {
+        let mut marks = vec![Mark::Missing; 3];
+        bridge_gaps(values, &mut marks, reach, bridge, period);
+        marks
+    }
+
     /// Gaps of a rate over a number of samples.
     fn samples(longest: usize) -> BridgedGaps {
         BridgedGaps::of(s::Q, longest as f64, 1.0)
@@ -171,7 +191,7 @@ mod tests {
     #[test]
     fn a_short_gap_is_bridged_by_a_straight_line_and_marked() {
         let mut values = [1.0, GAP, GAP, 4.0, 5.0];
-        let marks = bridge_gaps(&mut values, samples(2), Bridge::Line, |_| 1);
+        let marks = bridged(&mut values, samples(2), Bridge::Line, |_| 1);
         assert_eq!(values, [1.0, 2.0, 3.0, 4.0, 5.0]);
         assert_eq!(
             marks,
@@ -188,7 +208,7 @@ mod tests {
     #[test]
     fn a_long_gap_and_gaps_at_the_ends_stay_missing() {
         let mut values = [GAP, 1.0, GAP, GAP, GAP, 4.0, GAP];
-        let marks = bridge_gaps(&mut values, samples(2), Bridge::Line, |_| 1);
+        let marks = bridged(&mut values, samples(2), Bridge::Line, |_| 1);
         let missing: Vec<usize> = (0..7).filter(|&k| marks[k] == Mark::Missing).collect();
         assert_eq!(missing, [0, 2, 3, 4, 6]);
         assert!(missing.iter().all(|&k| values[k].is_nan()));
@@ -197,19 +217,19 @@ mod tests {
     #[test]
     fn a_slow_channel_holds_its_value_at_the_ends() {
         let mut values = [GAP, GAP, 1.0, GAP, GAP, 4.0, GAP];
-        let marks = bridge_gaps(&mut values, samples(0), Bridge::Line, |_| 3);
+        let marks = bridged(&mut values, samples(0), Bridge::Line, |_| 3);
         assert_eq!(values, [1.0, 1.0, 1.0, 2.0, 3.0, 4.0, 4.0]);
         assert_eq!(marks[0], Mark::Between);
         // A longer gap is no slow channel's.
         let mut values = [GAP, GAP, GAP, GAP, 1.0];
-        bridge_gaps(&mut values, samples(0), Bridge::Line, |_| 3);
+        bridged(&mut values, samples(0), Bridge::Line, |_| 3);
         assert!(values[0].is_nan());
     }
 
     #[test]
     fn a_flag_holds_its_last_value_and_never_takes_one_between() {
         let mut values = [0.0, GAP, GAP, 1.0];
-        bridge_gaps(&mut values, samples(5), Bridge::Held, |_| 1);
+        bridged(&mut values, samples(5), Bridge::Held, |_| 1);
         assert_eq!(values, [0.0, 0.0, 0.0, 1.0]);
     }
 
@@ -228,7 +248,7 @@ mod tests {
         for update in lost {
             values[update * period] = GAP;
         }
-        let marks = bridge_gaps(
+        let marks = bridged(
             &mut values,
             BridgedGaps::of(signal, 0.25, 0.025),
             Bridge::Line,
@@ -262,7 +282,7 @@ mod tests {
                 .collect();
             lost.for_each(|update| values[4 * update] = GAP);
             let reach = BridgedGaps::of(s::BETA_VANE, 0.25, 0.025);
-            bridge_gaps(&mut values[..57], reach, Bridge::Line, |_| 4);
+            bridged(&mut values[..57], reach, Bridge::Line, |_| 4);
             values[..57].iter().filter(|v| v.is_nan()).count()
         };
         assert_eq!(missing(5..7), 0);
@@ -275,7 +295,7 @@ mod tests {
             let mut values: Vec<f64> = (0..400).map(f64::from).collect();
             values[gap].fill(GAP);
             let reach = BridgedGaps::of(signal, 0.25, 0.025);
-            let marks = bridge_gaps(&mut values, reach, Bridge::Line, |_| 1);
+            let marks = bridged(&mut values, reach, Bridge::Line, |_| 1);
             assert!(marks.iter().any(|mark| mark.is_fault()));
             values.iter().filter(|v| v.is_nan()).count()
         };
@@ -294,7 +314,7 @@ mod tests {
     #[test]
     fn a_bridge_of_zero_bridges_nothing() {
         let mut values = [1.0, GAP, 3.0];
-        bridge_gaps(
+        bridged(
             &mut values,
             BridgedGaps::of(s::MACH, 0.0, 0.025),
             Bridge::Line,

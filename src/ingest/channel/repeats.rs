@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::update_rate::neighbours;
+use super::update_rate::Changes;
 use crate::ingest::settings::Stuck;
 use crate::numerics::series::sample_count::nearest;
 
@@ -103,15 +103,11 @@ pub fn stuck_run(values: &[f64], step_s: f64, settings: &Stuck) -> StuckRun {
 /// Share of values that repeat the one before, outside runs of `least` samples and more; `None` if
 /// there are too few.
 fn repeat_share(values: &[f64], runs: &[Range<usize>], least: usize) -> Option<f64> {
-    let finite = values.iter().filter(|v| v.is_finite()).count();
-    let is_new =
-        |(before, value): &(&f64, &f64)| value.is_finite() && value.to_bits() != before.to_bits();
-    let begins = usize::from(values.first().is_some_and(|v| v.is_finite()));
-    let all_runs = begins + neighbours(values).filter(is_new).count();
+    let changes = Changes::of(values);
     let lasting = runs.iter().map(Range::len).filter(|n| *n >= least);
     let (lasting, in_lasting) = lasting.fold((0, 0), |(runs, samples), n| (runs + 1, samples + n));
-    let samples = finite - in_lasting;
-    (samples >= LEAST_SAMPLES).then(|| 1.0 - (all_runs - lasting) as f64 / samples as f64)
+    let samples = changes.finite - in_lasting;
+    (samples >= LEAST_SAMPLES).then(|| 1.0 - (changes.runs() - lasting) as f64 / samples as f64)
 }
 
 /// Share of changes of value whose direction is opposite to that of the change before.

@@ -7,7 +7,6 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::flight::Mark;
-use crate::flight::record::Series;
 use crate::ingest::clock::Clock;
 use crate::numerics::series::sample_count::nearest;
 
@@ -62,16 +61,16 @@ impl SignatureSamples {
     }
 
     /// Takes the next conditioned samples.
-    pub fn push(&mut self, series: &Series) {
+    pub fn push(&mut self, values: &[f64], marks: &[Mark]) {
         if self.seen == 0 && self.next == 0 {
             let first_s = (self.start_s / INTERVAL_S).ceil() * INTERVAL_S;
             self.next = nearest((first_s - self.start_s) / self.step_s);
         }
-        let end = self.seen + series.values.len();
+        let end = self.seen + values.len();
         while (self.seen..end).contains(&self.next) {
             let (k, time) = (self.next - self.seen, self.next_time());
-            if series.marks[k] == Mark::Measured {
-                self.bits.insert(time, series.values[k].to_bits());
+            if marks[k] == Mark::Measured {
+                self.bits.insert(time, values[k].to_bits());
             }
             let then_s = (time + 1) as f64 * INTERVAL_S;
             let then = nearest((then_s - self.start_s) / self.step_s);
@@ -143,10 +142,7 @@ mod tests {
         let mut signal = SignatureSamples::of(&clock);
         for from in (0..samples).step_by(777) {
             let values: Vec<f64> = (from..(from + 777).min(samples)).map(value).collect();
-            signal.push(&Series {
-                marks: vec![Mark::Measured; values.len()],
-                values,
-            });
+            signal.push(&values, &vec![Mark::Measured; values.len()]);
         }
         Signature::of(std::iter::once(signal))
     }

@@ -48,7 +48,7 @@ const LEAST_REACH: usize = 4;
 /// Estimates the level with which a spike is compared, and the standard deviation of the noise.
 pub fn noise_levels(values: &[f64]) -> (f64, f64) {
     let mut deviations = Vec::with_capacity(values.len() / STRIDE + 1);
-    let sampled = values.windows(3).step_by(STRIDE);
+    let sampled = values.chunks(STRIDE).filter_map(|part| part.get(..3));
     deviations.extend(sampled.map(off_neighbours).filter(|r| r.is_finite()));
     if deviations.is_empty() {
         return (0.0, f64::NAN);

@@ -61,7 +61,11 @@ impl UpdateRate {
     /// Infers the rate of a channel from its samples, the first of which is sample `first` of the
     /// record. `None` if there are too few values or changes.
     pub fn infer(values: &[f64], first: usize) -> Option<UpdateRate> {
-        let finite = values.iter().filter(|v| v.is_finite()).count();
+        let Changes {
+            finite,
+            pairs,
+            changed,
+        } = Changes::of(values);
         if finite < LEAST_CHANGES {
             return period_of_few(values).map(|period| UpdateRate {
                 period,
@@ -69,7 +73,6 @@ impl UpdateRate {
             });
         }
         // Most channels change so often that no period fits: these need no list of changes.
-        let (pairs, changed) = pairs_and_changes(values);
         let is_full_rate = 2 * pairs + 1 >= finite;
         if !is_full_rate && let Some(period) = period_between_nulls(&distances(values)) {
             return Some(UpdateRate {
@@ -92,33 +95,57 @@ impl UpdateRate {
     /// The recorded values with their places, without the repeated values of a held channel. The
     /// first value is sample `first` of the record.
     pub fn recorded(self, values: &[f64], first: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let is_new = move |k: usize| {
-            self.held_phase
-                .is_none_or(|phase| (first + k) % self.period == phase)
-        };
+        let (ahead, period) = self.held_phase.map_or((0, 1), |phase| {
+            let ahead = (self.period + phase - first % self.period) % self.period;
+            (ahead, self.period)
+        });
         values
             .iter()
             .enumerate()
-            .filter(move |(k, v)| v.is_finite() && is_new(*k))
+            .skip(ahead)
+            .step_by(period)
+            .filter(|(_, v)| v.is_finite())
             .map(|(k, v)| (k, *v))
     }
 }
 
-/// Each value with the one after it.
-pub fn neighbours(values: &[f64]) -> impl Iterator<Item = (&f64, &f64)> {
-    values.iter().zip(values.get(1..).unwrap_or_default())
+/// Numbers of values of a channel by their neighbours.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Changes {
+    /// Finite values.
+    pub finite: usize,
+    /// Finite values after a finite one.
+    pub pairs: usize,
+    /// Finite values that differ from a finite one before.
+    pub changed: usize,
 }
 
-/// Number of neighbours that are both finite, and of those that differ.
-fn pairs_and_changes(values: &[f64]) -> (usize, usize) {
-    Arch::new().dispatch(|| {
-        neighbours(values).fold((0, 0), |(pairs, changed), (before, value)| {
+impl Changes {
+    /// Numbers of some values.
+    pub fn of(values: &[f64]) -> Changes {
+        let first = Changes {
+            finite: usize::from(values.first().is_some_and(|v| v.is_finite())),
+            ..Changes::default()
+        };
+        Arch::new().dispatch(|| {
+            let neighbours = values.iter().zip(values.get(1..).unwrap_or_default());
             // Without branches, for the vectors.
-            let is_pair = before.is_finite() & value.is_finite();
-            let differs = is_pair & (before.to_bits() != value.to_bits());
-            (pairs + usize::from(is_pair), changed + usize::from(differs))
+            neighbours.fold(first, |counts, (before, value)| {
+                let is_pair = before.is_finite() & value.is_finite();
+                let differs = is_pair & (before.to_bits() != value.to_bits());
+                Changes {
+                    finite: counts.finite + usize::from(value.is_finite()),
+                    pairs: counts.pairs + usize::from(is_pair),
+                    changed: counts.changed + usize::from(differs),
+                }
+            })
         })
-    })
+    }
+
+    /// Runs of one value without a gap.
+    pub fn runs(self) -> usize {
+        self.finite - self.pairs + self.changed
+    }
 }
 
 /// Histogram of the distances between finite values.

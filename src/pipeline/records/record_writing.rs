@@ -237,7 +237,9 @@ fn encode(
     end: usize,
     piece: usize,
 ) -> Result<SignalChunk, Refusal> {
-    reader.read_until(opened, end, piece, &mut |series| signal.push(series))?;
+    reader.read_until(opened, end, piece, &mut |values, marks| {
+        signal.push(values, marks)
+    })?;
     signal.close().map_err(|reason| Refusal {
         place: reader.signal().to_owned(),
         reason,

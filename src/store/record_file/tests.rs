@@ -26,10 +26,7 @@ fn write(record: &Record, out: &mut Vec<u8>) -> Result<(), String> {
             let Some((mut signal, series)) = parts.next() else {
                 return Ok(None);
             };
-            signal.push(&Series {
-                values: series.values[from..to].to_vec(),
-                marks: series.marks[from..to].to_vec(),
-            })?;
+            signal.push(&series.values[from..to], &series.marks[from..to])?;
             Ok(Some(vec![signal.close()?]))
         })?;
     }
@@ -198,15 +195,11 @@ fn constants_come_back_in_every_window() {
     let mut out = Vec::new();
     let mut writer = Writer::create(&header, ["obes"].into_iter(), &mut out).expect("a writer");
     let mut parts = writer.group().expect("a group").into_iter();
-    let flag = Series {
-        values: vec![0.0; 3],
-        marks: vec![Mark::Measured; 3],
-    };
     let mut next = || {
         let Some(mut signal) = parts.next() else {
             return Ok(None);
         };
-        signal.push(&flag)?;
+        signal.push(&[0.0; 3], &[Mark::Measured; 3])?;
         Ok(Some(vec![signal.close()?]))
     };
     writer.append(&mut next).expect("appended");
@@ -226,11 +219,8 @@ fn a_series_with_fewer_marks_than_values_is_refused() {
     let header = RecordHeader::default();
     let mut writer = Writer::create(&header, ["obes"].into_iter(), &mut out).expect("a writer");
     let mut signals = writer.group().expect("a group");
-    let short = Series {
-        values: vec![0.0; 3],
-        marks: vec![Mark::Measured; 2],
-    };
-    let refused = signals[0].push(&short).expect_err("refused");
+    let refused = signals[0].push(&[0.0; 3], &[Mark::Measured; 2]);
+    let refused = refused.expect_err("refused");
     assert!(refused.contains("more values than marks"), "{refused}");
 }
 

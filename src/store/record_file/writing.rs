@@ -1,7 +1,6 @@
 //! Writing of a record: row groups of encoded signals, in whole pages.
 
 use std::io::Write;
-use std::ops::Range;
 use std::sync::Arc;
 
 use arrow::array::{Array, ArrayRef, Float64Array, UInt8Array};
@@ -91,10 +90,7 @@ impl<W: Write + Send> Writer<W> {
             signals.push(SignalWriter {
                 values,
                 marks,
-                pending: Series {
-                    values: Vec::new(),
-                    marks: Vec::new(),
-                },
+                page: Series::default(),
             });
         }
         Ok(signals)
@@ -140,7 +136,8 @@ impl<W: Write + Send> Writer<W> {
 pub struct SignalWriter {
     values: ArrowColumnWriter,
     marks: ArrowColumnWriter,
-    pending: Series,
+    /// Samples of the page that is not whole yet.
+    page: Series,
 }
 
 /// Encoded part of one signal in a row group: values and flags.
@@ -152,33 +149,38 @@ impl SignalWriter {
     ///
     /// # Errors
     /// The reason.
-    pub fn push(&mut self, series: &Series) -> Result<(), String> {
-        if series.values.len() != series.marks.len() {
+    pub fn push(&mut self, values: &[f64], marks: &[Mark]) -> Result<(), String> {
+        if values.len() != marks.len() {
             return Err(refused(&"a series with more values than marks, or fewer"));
         }
-        self.pending.values.extend_from_slice(&series.values);
-        self.pending.marks.extend_from_slice(&series.marks);
+        let (mut values, mut marks) = (values, marks);
         // Whole pages make the bytes independent of the pieces.
-        let whole = self.pending.values.len() / PAGE * PAGE;
-        for from in (0..whole).step_by(PAGE) {
-            self.page(from..from + PAGE)?;
+        while !values.is_empty() {
+            let count = values.len().min(PAGE - self.page.values.len());
+            self.page.values.extend_from_slice(&values[..count]);
+            self.page.marks.extend_from_slice(&marks[..count]);
+            (values, marks) = (&values[count..], &marks[count..]);
+            if self.page.values.len() == PAGE {
+                self.write_page()?;
+            }
         }
-        self.pending.values.drain(..whole);
-        self.pending.marks.drain(..whole);
         Ok(())
     }
 
-    fn page(&mut self, range: Range<usize>) -> Result<(), String> {
-        let values = self.pending.values.get(range.clone()).unwrap_or_default();
-        let marks = self.pending.marks.get(range).unwrap_or_default();
-        let values: ArrayRef = Arc::new(Float64Array::from(values.to_vec()));
-        let repaired = |k: usize| marks[k] != Mark::Measured;
-        let repaired = BooleanBuffer::collect_bool(marks.len(), repaired);
-        let marks = if repaired.count_set_bits() == 0 {
+    fn write_page(&mut self) -> Result<(), String> {
+        let whole = Vec::with_capacity(PAGE);
+        let values = std::mem::replace(&mut self.page.values, whole);
+        let marks = &self.page.marks;
+        let values: ArrayRef = Arc::new(Float64Array::from(values));
+        let is_measured = |mark: &Mark| *mark == Mark::Measured;
+        // Without an early exit, for the vectors.
+        let marks = if marks.iter().fold(true, |all, mark| all & is_measured(mark)) {
             UInt8Array::new_null(marks.len())
         } else {
+            let is_marked = |k: usize| !is_measured(&marks[k]);
+            let marked = BooleanBuffer::collect_bool(marks.len(), is_marked);
             let codes: Vec<u8> = marks.iter().map(|mark| *mark as u8).collect();
-            UInt8Array::new(codes.into(), Some(NullBuffer::new(repaired)))
+            UInt8Array::new(codes.into(), Some(NullBuffer::new(marked)))
         };
         let marks: ArrayRef = Arc::new(marks);
         for (writer, array, nullable) in [
@@ -190,6 +192,7 @@ impl SignalWriter {
                 writer.write(&leaf).map_err(|e| refused(&e))?;
             }
         }
+        self.page.marks.clear();
         Ok(())
     }
 
@@ -198,9 +201,8 @@ impl SignalWriter {
     /// # Errors
     /// The reason.
     pub fn close(mut self) -> Result<SignalChunk, String> {
-        let rest = self.pending.values.len();
-        if rest > 0 {
-            self.page(0..rest)?;
+        if !self.page.values.is_empty() {
+            self.write_page()?;
         }
         let close = |writer: ArrowColumnWriter| writer.close().map_err(|e| refused(&e));
         Ok(SignalChunk([close(self.values)?, close(self.marks)?]))
