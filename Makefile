@@ -155,7 +155,7 @@ next-study: ## are the bounds that plans predict kept, how many minutes do they 
 bench: ## run the benchmarks
 	cargo bench --locked --features polars-reader
 
-count: build ## count the instructions of five cases into docs/performance.md
+count: build ## count the instructions of six cases into docs/performance.md
 	bash tests/count.sh "$(or $(CARGO_TARGET_DIR),target)/release/harvest"
 
 lint: ## formatting and lints, as .ci/run has them

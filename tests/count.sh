@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Instructions of five cases, counted by valgrind: unlike times they hardly depend on the machine and its load. Needs valgrind,
+# Instructions of six cases, counted by valgrind: unlike times they hardly depend on the machine and its load. Needs valgrind,
 # which is installed where that is possible. Skipped without it; with CI=true that is a failure.
 #
 #   tests/count.sh HARVEST          write the counts into the table of docs/performance.md
@@ -50,12 +50,15 @@ one_flight() {
     done
 }
 
-# Posterior and trends of the demonstration, whose maneuvers are estimated before.
+# Posterior and trends of the demonstration, whose maneuvers are estimated before, and its report, whose proof of match
+# is made before.
 # shellcheck disable=SC2046
 demonstration() {
     local flights='data/demo/flights/*.parquet'
     run "$harvest" estimate $(campaign demonstration "$flights" estimates)
     count trend "$harvest" trend $(campaign demonstration "$flights" trends)
+    run "$harvest" match $(campaign demonstration "$flights" matches)
+    count report "$harvest" report $(campaign demonstration "$flights" report)
 }
 
 set -f # the pattern of the archive is the program's to expand
