@@ -10,10 +10,9 @@ const FILL_VALUES: [f64; 4] = [999.0, 9_999.0, 99_999.0, 999_999.0];
 #[inline]
 #[must_use]
 pub fn is_usual(recorded: f64) -> bool {
-    let size = recorded.abs();
-    FILL_VALUES
-        .iter()
-        .fold(false, |any, fill| any | (size == *fill))
+    let size = recorded.abs().to_bits();
+    let is = |fill: &f64| size == fill.to_bits();
+    FILL_VALUES.iter().fold(false, |any, fill| any | is(fill))
 }
 
 /// `true` for a fill value that is no measurement of a signal either. `convert` returns the number in the signal's
