@@ -253,9 +253,10 @@ impl Conditioner {
         }
     }
 
-    /// Frees the memory of the samples that left.
+    /// Frees the memory that is not needed until the next samples come.
     pub fn free(&mut self) {
         self.latest = Series::default();
+        self.values.shrink_to_fit();
     }
 
     /// Drops values and characters on which no later sample depends.
