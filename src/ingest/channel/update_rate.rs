@@ -268,6 +268,33 @@ fn held_with_period(period: usize, changes: &[usize]) -> Option<UpdateRate> {
 mod tests {
     use super::*;
 
+    #[test]
+    fn changes_and_runs_are_counted_between_gaps() {
+        let gap = f64::NAN;
+        let changes = Changes::of(&[1.0, 1.0, gap, 2.0, 2.0, 3.0, gap, gap, 3.0]);
+        let expected = Changes {
+            finite: 6,
+            pairs: 3,
+            changed: 1,
+        };
+        assert_eq!((changes, changes.runs()), (expected, 4));
+        assert_eq!(Changes::of(&[]).runs(), 0);
+    }
+
+    #[test]
+    fn a_held_channel_is_recorded_where_its_value_changes() {
+        let rate = UpdateRate {
+            period: 4,
+            held_phase: Some(1),
+        };
+        let values: Vec<f64> = (0..12).map(f64::from).collect();
+        for first in 0..9 {
+            let found: Vec<usize> = rate.recorded(&values, first).map(|(k, _)| k).collect();
+            let expected: Vec<usize> = (0..12).filter(|k| (first + k) % 4 == 1).collect();
+            assert_eq!(found, expected, "{first}");
+        }
+    }
+
     /// Period of a channel with a value every `period` samples, of which some updates are lost.
     fn period(period: usize, updates: usize, is_lost: impl Fn(usize) -> bool) -> Option<usize> {
         let value = |k: usize| {

@@ -200,6 +200,13 @@ mod tests {
     #[test]
     fn quantiles_are_linear_between_values() {
         assert_relative_eq!(quantile(ODD, 0.25).expect("a quantile"), 1.5);
+        let values: Vec<f64> = (0..100).map(|k| f64::from(37 * k % 101)).collect();
+        let mut sorted = values.clone();
+        sorted.sort_by(f64::total_cmp);
+        for share in [0.0, 0.1, 0.333, 0.75, 0.999, 1.0] {
+            let expected = quantile_of_sorted(&sorted, share);
+            assert_eq!(quantile(values.clone(), share), expected, "{share}");
+        }
     }
 
     #[test]

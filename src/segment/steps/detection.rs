@@ -188,7 +188,7 @@ impl LevelChange {
 }
 
 /// The levels before and after each time at which the detector looks, from [`DetectorLengths::reach`] on.
-fn befores_and_afters(levels: &[f64], lengths: DetectorLengths) -> (&[f64], &[f64]) {
+fn level_pairs(levels: &[f64], lengths: DetectorLengths) -> (&[f64], &[f64]) {
     let apart = lengths.reach() + lengths.half_transit;
     let after = levels.get(apart..).unwrap_or_default();
     (&levels[..after.len()], after)
@@ -196,7 +196,7 @@ fn befores_and_afters(levels: &[f64], lengths: DetectorLengths) -> (&[f64], &[f6
 
 /// Sizes of the changes between levels, at each time at which both levels exist.
 fn sizes(levels: &[f64], lengths: DetectorLengths) -> impl Iterator<Item = f64> {
-    let (before, after) = befores_and_afters(levels, lengths);
+    let (before, after) = level_pairs(levels, lengths);
     let changes = before.iter().zip(after);
     changes
         .map(|(before, after)| (after - before).abs())
@@ -209,7 +209,7 @@ fn large_changes(
     smallest: f64,
     lengths: DetectorLengths,
 ) -> impl Iterator<Item = LevelChange> {
-    let (before, after) = befores_and_afters(levels, lengths);
+    let (before, after) = level_pairs(levels, lengths);
     let is_large = move |before: f64, after: f64| {
         let size = (after - before).abs();
         (size >= smallest) & size.is_finite()
@@ -242,7 +242,7 @@ fn large_changes(
 fn steps_of_levels(levels: &[f64], smallest: f64, lengths: DetectorLengths) -> Vec<Step> {
     let mut steps = Vec::new();
     let mut run: Vec<LevelChange> = Vec::new();
-    let (before, after) = befores_and_afters(levels, lengths);
+    let (before, after) = level_pairs(levels, lengths);
     let is_known = |at: usize| {
         let place = at - lengths.reach();
         (after[place] - before[place]).is_finite()
@@ -395,6 +395,18 @@ mod tests {
         assert_eq!(signs, [1.0, -1.0, 1.0]);
         for (step, at) in found.iter().zip([29.5, 54.5, 79.5]) {
             assert_abs_diff_eq!(step.time_s, at, epsilon = 1.0);
+        }
+    }
+
+    #[test]
+    fn steps_to_one_side_are_distinct_where_the_signal_rests_between_them() {
+        // The large changes of the two are five samples apart, less than the detector's reach.
+        for first in [30, 60, 64, 90] {
+            let found = steps(&jumping(160, &[(first, 4.0), (first + 15, 4.0)]));
+            assert_eq!(found.len(), 2, "{first}");
+            for (step, at) in found.iter().zip([first, first + 15]) {
+                assert_abs_diff_eq!(step.time_s, at as f64 - 0.5, epsilon = 1.0);
+            }
         }
     }
 
