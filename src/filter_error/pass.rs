@@ -162,8 +162,7 @@ impl<const NX: usize> RowSink<NX> for NormalSums {
         used: impl Fn(usize) -> &'a [bool; OUTPUTS],
         rows: &mut [f64],
     ) {
-        let residual = |k: usize, o: usize| used(k)[o].then(|| white[k][o]);
-        self.complete_rows(white.len(), rows, residual);
+        self.complete_rows(white.len(), rows, |k| (white[k], used(k)));
         self.add_rows(simd, first, white.len(), rows, &mut Idle);
     }
 }

@@ -29,9 +29,12 @@ pub fn with_half_samples(values: &[f64]) -> Vec<f64> {
 pub fn constant_mean(values: &[f64]) -> Vec<f64> {
     // Several independent sums hide the latency of one.
     let (whole, rest) = values.as_chunks::<8>();
-    let sums = whole
-        .iter()
-        .fold([0.0; 8], |sums, v| std::array::from_fn(|i| sums[i] + v[i]));
+    let mut sums = [0.0; 8];
+    for eight in whole {
+        for (sum, value) in sums.iter_mut().zip(eight) {
+            *sum += value;
+        }
+    }
     let mean = sums.iter().chain(rest).sum::<f64>() / values.len().max(1) as f64;
     vec![mean; (2 * values.len()).saturating_sub(1)]
 }

@@ -237,16 +237,16 @@ impl ManeuverSignals {
 
     /// Signals with all signals linear between samples, as other estimators take them.
     #[must_use]
-    pub fn linear_between_samples(&self) -> ManeuverSignals {
-        let mut signals = self.clone();
-        for points in signals.points.values_mut() {
+    pub fn linear_between_samples(mut self) -> ManeuverSignals {
+        for points in self.points.values_mut() {
+            // No copy, unless other signals share the points.
             let points = Arc::make_mut(points);
             for middle in (1..points.len()).step_by(2) {
                 points[middle] = 0.5 * (points[middle - 1] + points[middle + 1]);
             }
         }
-        signals.flow = Arc::new(signals.flow_at_cg());
-        signals
+        self.flow = Arc::new(self.flow_at_cg());
+        self
     }
 
     /// Signals with a further, constant signal.

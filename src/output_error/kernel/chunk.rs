@@ -102,8 +102,12 @@ pub(crate) fn fill_regressor_rows<const NX: usize, E: Equations<NX>>(
 ) {
     for &(place, column) in &layout.columns {
         let column = &case.columns[column][points.first..][..=points.stride * (POINTS - 1)];
-        for k in 0..POINTS {
-            rows[k * layout.row_length + place] = column[k * points.stride];
+        let rows = rows.chunks_exact_mut(layout.row_length);
+        if points.stride == 1 {
+            rows.zip(column).for_each(|(row, c)| row[place] = *c);
+        } else {
+            let column = column.iter().step_by(points.stride);
+            rows.zip(column).for_each(|(row, c)| row[place] = *c);
         }
     }
 }

@@ -11,6 +11,8 @@
     reason = "compiled into the kernel for the processor at hand"
 )]
 
+use std::array::from_fn;
+
 use nalgebra::{DMatrix, DVector};
 use pulp::{Arch, Simd};
 
@@ -39,14 +41,13 @@ pub(crate) struct NormalSums {
     samples_per_block: usize,
     samples: usize,
     layout: LaneLayout,
-    /// Number of derivatives, which come before the biases; initial states come after them.
-    derivatives: usize,
-    biased_outputs: Vec<usize>,
+    /// Places of the parameters in order.
+    places: Vec<ParameterPlace>,
 }
 
 /// Place of a parameter in the sums: its lane, and for a bias the only output that it shifts. All
 /// biases share the lane of the ones.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct ParameterPlace {
     lane: usize,
     only_output: Option<usize>,
@@ -69,16 +70,15 @@ impl NormalSums {
     ) -> NormalSums {
         let width = layout.width();
         NormalSums {
-            gram: std::array::from_fn(|_| AlignedBuffer::zeros(width * width)),
-            moments: std::array::from_fn(|_| AlignedBuffer::zeros(width)),
+            gram: from_fn(|_| AlignedBuffer::zeros(width * width)),
+            moments: from_fn(|_| AlignedBuffer::zeros(width)),
             counts: [0; OUTPUTS],
             stride: 1,
             blocks: AlignedBuffer::default(),
             samples_per_block: samples_per_block.max(1),
             samples,
             layout: layout.clone(),
-            derivatives,
-            biased_outputs: biased_outputs.to_vec(),
+            places: parameter_places(layout, derivatives, biased_outputs),
         }
     }
 
@@ -120,7 +120,7 @@ impl NormalSums {
                 residual: 0.0,
             };
         };
-        for (to, place) in row.iter_mut().zip(self.parameter_places()) {
+        for (to, place) in row.iter_mut().zip(&self.places) {
             *to = if place.acts_on(output) {
                 sums[place.lane]
             } else {
@@ -145,13 +145,13 @@ impl NormalSums {
 
     /// Gradient Σ_o w_o Σ s v over the outputs o with weights w_o, for all parameters.
     pub fn gradient(&self, weights: &[f64; OUTPUTS]) -> DVector<f64> {
-        let sum_of = |place: ParameterPlace| -> f64 {
+        let sum_of = |place: &ParameterPlace| -> f64 {
             (0..OUTPUTS)
                 .filter(|o| place.acts_on(*o))
                 .map(|o| self.stride as f64 * weights[o] * self.moments[o].slice()[place.lane])
                 .sum()
         };
-        let sums: Vec<f64> = self.parameter_places().map(sum_of).collect();
+        let sums: Vec<f64> = self.places.iter().map(sum_of).collect();
         DVector::from_vec(sums)
     }
 
@@ -190,25 +190,12 @@ impl NormalSums {
         self.stride as f64 * self.gram[output].slice()[entry]
     }
 
-    /// Places of the parameters in order.
-    fn parameter_places(&self) -> impl Iterator<Item = ParameterPlace> {
-        let lanes = &self.layout.parameter_lanes;
-        let (derivatives, initial_states) = lanes.split_at(self.derivatives);
-        let biases = self.biased_outputs.iter().map(|&o| ParameterPlace {
-            lane: self.layout.one_lane,
-            only_output: Some(o),
-        });
-        lane_places(derivatives)
-            .chain(biases)
-            .chain(lane_places(initial_states))
-    }
-
     /// Symmetric matrix of the parameters from its entries.
     fn symmetric_by_parameter(
         &self,
         entry: impl Fn(ParameterPlace, ParameterPlace) -> f64,
     ) -> DMatrix<f64> {
-        let places: Vec<ParameterPlace> = self.parameter_places().collect();
+        let places = &self.places;
         let mut whole = DMatrix::zeros(places.len(), places.len());
         for (column, &b) in places.iter().enumerate() {
             for (row, &a) in places.iter().enumerate().skip(column) {
@@ -220,11 +207,27 @@ impl NormalSums {
     }
 }
 
-fn lane_places(lanes: &[usize]) -> impl Iterator<Item = ParameterPlace> {
-    lanes.iter().map(|&lane| ParameterPlace {
-        lane,
+/// Places of the parameters in order: derivatives, biases, initial states.
+fn parameter_places(
+    layout: &LaneLayout,
+    derivatives: usize,
+    biased_outputs: &[usize],
+) -> Vec<ParameterPlace> {
+    let of_lane = |lane: &usize| ParameterPlace {
+        lane: *lane,
         only_output: None,
-    })
+    };
+    let of_bias = |output: &usize| ParameterPlace {
+        lane: layout.one_lane,
+        only_output: Some(*output),
+    };
+    let (derivatives, initial_states) = layout.parameter_lanes.split_at(derivatives);
+    let first = derivatives.iter().map(of_lane);
+    let then = biased_outputs.iter().map(of_bias);
+    first
+        .chain(then)
+        .chain(initial_states.iter().map(of_lane))
+        .collect()
 }
 
 /// Sink that adds the rows of a pass to the sums.
@@ -244,11 +247,15 @@ impl Sink for NormalAccumulator<'_> {
         interleaved: &mut impl Interleaved,
     ) {
         let Measurements { values, used } = self.measurements;
-        let residual = |k: usize, o: usize| {
+        let residuals = |k: usize| {
             let sample = samples.index(k);
-            used[sample][o].then(|| values[sample][o] - outputs[k][o])
+            let mut residuals = values[sample];
+            for o in 0..OUTPUTS {
+                residuals[o] -= outputs[k][o];
+            }
+            (residuals, &used[sample])
         };
-        self.sums.complete_rows(outputs.len(), rows, residual);
+        self.sums.complete_rows(outputs.len(), rows, residuals);
         self.sums
             .add_rows(simd, samples.first, outputs.len(), rows, interleaved);
     }
@@ -256,23 +263,26 @@ impl Sink for NormalAccumulator<'_> {
 
 impl NormalSums {
     /// Writes the residual and the number 1 into their lanes of every row that counts, and clears
-    /// all other rows. `residual` returns the residual of a sample and output, or `None` if the
-    /// sample does not count.
+    /// all other rows. `residuals` returns the residuals of a sample's outputs, and the outputs that
+    /// count.
     #[inline(always)]
-    pub fn complete_rows(
+    pub fn complete_rows<'u>(
         &mut self,
         samples: usize,
         rows: &mut [f64],
-        residual: impl Fn(usize, usize) -> Option<f64>,
+        residuals: impl Fn(usize) -> ([f64; OUTPUTS], &'u [bool; OUTPUTS]),
     ) {
         let NormalSums { counts, layout, .. } = self;
-        let width = layout.width();
-        for k in 0..samples {
+        let (width, residual_lane, one_lane) =
+            (layout.width(), layout.residual_lane, layout.one_lane);
+        let of_samples = rows.chunks_exact_mut(OUTPUTS * width);
+        for (k, of_sample) in of_samples.take(samples).enumerate() {
+            let (residuals, used) = residuals(k);
             for o in 0..OUTPUTS {
-                let row = &mut rows[(k * OUTPUTS + o) * width..][..width];
-                if let Some(residual) = residual(k, o) {
-                    row[layout.residual_lane] = residual;
-                    row[layout.one_lane] = 1.0;
+                let row = &mut of_sample[o * width..][..width];
+                if used[o] {
+                    row[residual_lane] = residuals[o];
+                    row[one_lane] = 1.0;
                     counts[o] += 1;
                 } else {
                     row.fill(0.0);

@@ -143,17 +143,21 @@ impl<'a, const NX: usize, E: Equations<NX>> Trajectory<'a, NX, E> {
         self.x
     }
 
-    /// Begins a stage at its state. The state is stored while it is in registers. Reading it back
-    /// at once with another width would cause a store-forwarding stall and delay the chain.
+    /// Begins a stage at its state. The state is stored number by number while it is in registers, and
+    /// is read back so. Reading it back at once with another width would cause a store-forwarding
+    /// stall and delay the chain.
     #[inline(always)]
     fn enter_stage(&mut self, at: SVector<f64, NX>) {
-        self.at = at;
+        for i in 0..NX {
+            self.at[i] = at[i];
+        }
         if self.sample < self.end {
+            let factors = &mut self.history.factors[self.stage][self.sample];
             for (slot, &state) in E::REGRESSOR_STATES.iter().enumerate() {
-                self.history.factors[self.stage][self.sample][slot] = at[state];
+                factors[slot] = at[state];
             }
             for &(slot, state) in &self.case.layout.products {
-                self.history.factors[self.stage][self.sample][slot] = at[state];
+                factors[slot] = self.at[state];
             }
         }
     }
@@ -171,8 +175,10 @@ impl<const NX: usize, E: Equations<NX>> Interleaved for Trajectory<'_, NX, E> {
         let c = self.build_up.coefficients::<E>(point, &self.at);
         let inputs = &self.case.motion.rate_inputs[self.points.index(point)];
         let rates = E::rates(inputs, &self.at, &c);
+        let mut next = SVector::zeros();
         for i in 0..NX {
-            self.next[i] = rates.rates[i].mul_add(self.weights_s[stage], self.next[i]);
+            next[i] = rates.rates[i].mul_add(self.weights_s[stage], self.next[i]);
+            self.next[i] = next[i];
         }
         let history = &mut *self.history;
         for &(i, j) in E::RATES_BY_COEFFICIENT {
@@ -198,10 +204,12 @@ impl<const NX: usize, E: Equations<NX>> Interleaved for Trajectory<'_, NX, E> {
             self.stage = stage + 1;
             self.enter_stage(at);
         } else {
-            history.states[sample] = self.x;
-            self.x = self.next;
+            for i in 0..NX {
+                history.states[sample][i] = self.x[i];
+                self.x[i] = next[i];
+            }
             (self.stage, self.sample) = (0, sample + 1);
-            self.enter_stage(self.next);
+            self.enter_stage(next);
         }
     }
 }
