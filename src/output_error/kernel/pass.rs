@@ -305,10 +305,11 @@ impl<S: Simd, const NX: usize, K: MeasurementUpdate<NX>> Propagation<'_, S, NX, 
             let mut r = [[self.simd.splat_f64s(0.0); STAGES]; N];
             let mut y = self.read::<E, N>(k, lane, groups, places, &s, &mut r);
             self.correction.correct(self.simd, k, lanes, &mut s, &mut y);
+            // One slice for a sample, so that its rows share their base.
+            let rows = &mut self.rows[k * OUTPUTS * vectors..][..OUTPUTS * vectors];
             for n in 0..N {
-                let first = k * OUTPUTS * vectors + lanes[n] / S::F64_LANES;
                 for o in 0..OUTPUTS {
-                    self.rows[first + o * vectors] = y[n][o];
+                    rows[o * vectors + lanes[n] / S::F64_LANES] = y[n][o];
                 }
             }
             s = next_sensitivities::<S, NX, E, N>(self.simd, groups, self.propagators, k, &s, &r);
@@ -333,10 +334,18 @@ impl<S: Simd, const NX: usize, K: MeasurementUpdate<NX>> Propagation<'_, S, NX, 
         r: &mut [[S::f64s; STAGES]; N],
     ) -> [[S::f64s; OUTPUTS]; N] {
         let mut y = [[self.simd.splat_f64s(0.0); OUTPUTS]; N];
+        // Regressors at the start, the middle and the end of the step.
+        let row = self.layout.row_length / S::F64_LANES;
+        let of_step = &self.regressors[2 * k * row..][..3 * row];
         for n in 0..N {
             let mut in_outputs = None;
             if groups[n] != COEFFICIENTS {
-                let points = self.points(k, places[n]);
+                let place = places[n];
+                let points = [
+                    of_step[place],
+                    of_step[row + place],
+                    of_step[2 * row + place],
+                ];
                 for stage in 0..STAGES {
                     r[n][stage] = points[POINT[stage]];
                     if lane < VECTOR {
@@ -356,14 +365,6 @@ impl<S: Simd, const NX: usize, K: MeasurementUpdate<NX>> Propagation<'_, S, NX, 
             y[n] = output_sensitivities::<S, NX, E>(self.simd, groups[n], at, k, &s[n], in_outputs);
         }
         y
-    }
-
-    /// Regressors of a vector at the start, the middle and the end of a step.
-    #[inline(always)]
-    fn points(&self, k: usize, place: usize) -> [S::f64s; 3] {
-        let row = self.layout.row_length / S::F64_LANES;
-        let from = &self.regressors[2 * k * row + place..];
-        [from[0], from[row], from[2 * row]]
     }
 }
 
