@@ -31,7 +31,7 @@ use crate::output_error::kernel::chunk::{ChunkBuildUp, fill_regressor_rows};
 use crate::output_error::kernel::normal_equations::NormalSums;
 use crate::output_error::kernel::pass::{Diverged, MeasurementUpdate, Propagation};
 use crate::output_error::kernel::propagators::Propagators;
-use crate::output_error::kernel::trajectory::{STATE_BOUND, StageHistory, Trajectory};
+use crate::output_error::kernel::trajectory::{STATE_BOUND, StageHistory, Trajectory, set_factors};
 
 /// Gain of a pattern with its slopes in the lanes of the parameters.
 pub(super) struct LaneGain<const NX: usize> {
@@ -348,12 +348,7 @@ impl<'a, const NX: usize, E: InGusts<NX>> ChunkUpdates<'a, NX, E> {
         y: &[f64; OUTPUTS],
         measured: &[f64; OUTPUTS],
     ) -> (SVector<f64, NX>, [f64; OUTPUTS]) {
-        for (slot, &state) in E::REGRESSOR_STATES.iter().enumerate() {
-            self.factors[k][slot] = x[state];
-        }
-        for &(slot, state) in self.products {
-            self.factors[k][slot] = x[state];
-        }
+        set_factors::<NX, E>(&mut self.factors[k], x, self.products);
         let pattern = self.corrections.pattern_of[sample];
         let used = &self.corrections.patterns[usize::from(pattern)].used;
         let gain = &self.corrections.gains[usize::from(pattern)];

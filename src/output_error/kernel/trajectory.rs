@@ -12,7 +12,7 @@
 use nalgebra::SVector;
 
 use super::chunk::ChunkBuildUp;
-use crate::dynamics::{COEFFICIENTS, Equations};
+use crate::dynamics::{COEFFICIENTS, Equations, Rates};
 use crate::numerics::runge_kutta::{POINT, STAGES, reaches_s, weights_s};
 use crate::numerics::vectors::row_products::Interleaved;
 use crate::numerics::vectors::simd::VECTOR;
@@ -57,16 +57,13 @@ impl<const NX: usize> StageHistory<NX> {
 
 /// Integration of the states over a chunk, stage by stage.
 pub(crate) struct Trajectory<'a, const NX: usize, E: Equations<NX>> {
-    case: &'a Case<NX, E>,
-    build_up: &'a ChunkBuildUp<NX>,
-    history: &'a mut StageHistory<NX>,
+    stages: Stages<'a, NX, E>,
     /// State at the sample.
     x: SVector<f64, NX>,
     /// State at the stage.
     at: SVector<f64, NX>,
     /// State at the next sample, as far as the stages computed so far determine it.
     next: SVector<f64, NX>,
-    points: Strided,
     sample: usize,
     stage: usize,
     end: usize,
@@ -86,34 +83,39 @@ impl<'a, const NX: usize, E: Equations<NX>> Trajectory<'a, NX, E> {
         samples: usize,
     ) -> Self {
         let step_s = points.stride as f64 * case.step_s;
-        let mut trajectory = Trajectory {
-            case,
-            build_up,
-            history,
+        Trajectory {
+            stages: Stages {
+                case,
+                build_up,
+                history,
+                points,
+            },
             x,
             at: x,
             next: x,
-            points,
             sample: 0,
             stage: 0,
             end: samples,
             reaches_s: reaches_s(step_s),
             weights_s: weights_s(step_s),
-        };
-        trajectory.enter_stage(x);
-        trajectory
+        }
     }
 
     /// Takes the step from the next sample, whose state is corrected to `x`, and returns the state at
     /// its end.
     #[inline(always)]
     pub fn step_from(&mut self, x: SVector<f64, NX>) -> SVector<f64, NX> {
-        (self.x, self.next) = (x, x);
-        self.enter_stage(x);
-        for _ in 0..STAGES {
-            self.advance();
+        let (mut at, mut next) = (x, x);
+        for stage in 0..STAGES {
+            let rates = self.stages.take(self.sample, stage, &at);
+            for i in 0..NX {
+                next[i] = rates[i].mul_add(self.weights_s[stage], next[i]);
+                at[i] = rates[i].mul_add(self.reaches_s[stage], x[i]);
+            }
         }
-        self.x
+        self.stages.history.states[self.sample] = x;
+        self.sample += 1;
+        next
     }
 
     /// Returns the state a step after the sample `k`, whose state is corrected to `x`, and records
@@ -122,10 +124,7 @@ impl<'a, const NX: usize, E: Equations<NX>> Trajectory<'a, NX, E> {
     pub fn state_after(&self, k: usize, x: SVector<f64, NX>) -> SVector<f64, NX> {
         let (mut at, mut next) = (x, x);
         for (stage, place) in POINT.into_iter().enumerate() {
-            let point = 2 * k + place;
-            let c = self.build_up.coefficients::<E>(point, &at);
-            let inputs = &self.case.motion.rate_inputs[self.points.index(point)];
-            let rates = E::rates(inputs, &at, &c).rates;
+            let rates = self.stages.rates(2 * k + place, &at).rates;
             for i in 0..NX {
                 next[i] = rates[i].mul_add(self.weights_s[stage], next[i]);
                 at[i] = rates[i].mul_add(self.reaches_s[stage], x[i]);
@@ -142,74 +141,98 @@ impl<'a, const NX: usize, E: Equations<NX>> Trajectory<'a, NX, E> {
         }
         self.x
     }
-
-    /// Begins a stage at its state. The state is stored number by number while it is in registers, and
-    /// is read back so. Reading it back at once with another width would cause a store-forwarding
-    /// stall and delay the chain.
-    #[inline(always)]
-    fn enter_stage(&mut self, at: SVector<f64, NX>) {
-        for i in 0..NX {
-            self.at[i] = at[i];
-        }
-        if self.sample < self.end {
-            let factors = &mut self.history.factors[self.stage][self.sample];
-            for (slot, &state) in E::REGRESSOR_STATES.iter().enumerate() {
-                factors[slot] = at[state];
-            }
-            for &(slot, state) in &self.case.layout.products {
-                factors[slot] = self.at[state];
-            }
-        }
-    }
 }
 
 impl<const NX: usize, E: Equations<NX>> Interleaved for Trajectory<'_, NX, E> {
-    /// Takes one stage.
+    /// Takes one stage. States are stored and read back number by number. Reading them back at once
+    /// with another width would cause a store-forwarding stall and delay the chain.
     #[inline(always)]
     fn advance(&mut self) {
         if self.sample >= self.end {
             return;
         }
         let (sample, stage) = (self.sample, self.stage);
-        let point = 2 * sample + POINT[stage];
-        let c = self.build_up.coefficients::<E>(point, &self.at);
-        let inputs = &self.case.motion.rate_inputs[self.points.index(point)];
-        let rates = E::rates(inputs, &self.at, &c);
-        let mut next = SVector::zeros();
+        let rates = self.stages.take(sample, stage, &self.at);
         for i in 0..NX {
-            next[i] = rates.rates[i].mul_add(self.weights_s[stage], self.next[i]);
-            self.next[i] = next[i];
+            self.next[i] = rates[i].mul_add(self.weights_s[stage], self.next[i]);
         }
-        let history = &mut *self.history;
-        for &(i, j) in E::RATES_BY_COEFFICIENT {
-            history.b[stage][i][j][sample] = rates.by_coefficient[(i, j)];
+        if stage + 1 < STAGES {
+            for i in 0..NX {
+                self.at[i] = rates[i].mul_add(self.reaches_s[stage], self.x[i]);
+            }
+            self.stage = stage + 1;
+        } else {
+            for i in 0..NX {
+                self.stages.history.states[sample][i] = self.x[i];
+                self.x[i] = self.next[i];
+                self.at[i] = self.next[i];
+            }
+            (self.stage, self.sample) = (0, sample + 1);
         }
+    }
+}
+
+/// Stages of the steps of a chunk.
+struct Stages<'a, const NX: usize, E: Equations<NX>> {
+    case: &'a Case<NX, E>,
+    build_up: &'a ChunkBuildUp<NX>,
+    history: &'a mut StageHistory<NX>,
+    points: Strided,
+}
+
+impl<const NX: usize, E: Equations<NX>> Stages<'_, NX, E> {
+    /// Rates at a point of the chunk and a state.
+    #[inline(always)]
+    fn rates(&self, point: usize, at: &SVector<f64, NX>) -> Rates<NX> {
+        let c = self.build_up.coefficients::<E>(point, at);
+        let inputs = &self.case.motion.rate_inputs[self.points.index(point)];
+        E::rates(inputs, at, &c)
+    }
+
+    /// Rates at the state of a stage. The history receives the stage's slopes and factors.
+    #[inline(always)]
+    fn take(&mut self, sample: usize, stage: usize, at: &SVector<f64, NX>) -> SVector<f64, NX> {
+        let point = 2 * sample + POINT[stage];
+        let rates = self.rates(point, at);
         let a = self.build_up.total_slopes::<E, NX>(
             point,
             rates.by_state,
             &rates.by_coefficient,
             E::RATES_BY_COEFFICIENT,
         );
+        let history = &mut *self.history;
+        for &(i, j) in E::RATES_BY_COEFFICIENT {
+            history.b[stage][i][j][sample] = rates.by_coefficient[(i, j)];
+        }
         // All entries: a list of those that can differ from zero would be read from memory.
         for i in 0..NX {
             for j in 0..NX {
                 history.a[stage][i][j][sample] = a[(i, j)];
             }
         }
-        if stage + 1 < STAGES {
-            let mut at = self.x;
-            for i in 0..NX {
-                at[i] = rates.rates[i].mul_add(self.reaches_s[stage], at[i]);
-            }
-            self.stage = stage + 1;
-            self.enter_stage(at);
-        } else {
-            for i in 0..NX {
-                history.states[sample][i] = self.x[i];
-                self.x[i] = next[i];
-            }
-            (self.stage, self.sample) = (0, sample + 1);
-            self.enter_stage(next);
-        }
+        set_factors::<NX, E>(
+            &mut history.factors[stage][sample],
+            at,
+            &self.case.layout.products,
+        );
+        rates.rates
+    }
+}
+
+/// Sets the factors of the regressors in a group's first vector at a state. `products` are the slots of
+/// products of a state: (slot, state).
+#[inline(always)]
+pub(crate) fn set_factors<const NX: usize, E: Equations<NX>>(
+    factors: &mut [f64; VECTOR],
+    at: &SVector<f64, NX>,
+    products: &[(usize, usize)],
+) {
+    for (slot, &state) in E::REGRESSOR_STATES.iter().enumerate() {
+        factors[slot] = at[state];
+    }
+    // A copy is indexed, so that the state itself can stay in registers.
+    let states: [f64; NX] = at.data.0[0];
+    for &(slot, state) in products {
+        factors[slot] = states[state];
     }
 }
