@@ -10,6 +10,9 @@ use pulp::{Arch, Simd, WithSimd};
 /// Series that are summed side by side, so that their sums fill the vector registers.
 const SIDE_BY_SIDE: usize = 8;
 
+/// Harmonics that are summed together: independent sums hide the latency of each.
+const TOGETHER: usize = 3;
+
 /// Harmonics of a length: frequencies of a whole number of periods over the samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Harmonics {
@@ -51,16 +54,18 @@ impl Harmonics {
             let rows: Vec<[f64; SIDE_BY_SIDE]> = (0..self.turn.len())
                 .map(|n| std::array::from_fn(|i| series.get(i).map_or(0.0, |x| x[n])))
                 .collect();
-            for (row, number) in self.numbers.clone().enumerate() {
-                let [real, imaginary] = Arch::new().dispatch(HarmonicSum {
+            for first in (0..self.len()).step_by(TOGETHER) {
+                let parts = Arch::new().dispatch(HarmonicSums {
                     turn: &self.turn,
                     rows: &rows,
-                    number,
+                    numbers: std::array::from_fn(|k| self.numbers.start + first + k),
                 });
-                for i in 0..series.len() {
-                    let column = block * SIDE_BY_SIDE + i;
-                    sums[(row, column)] = real[i];
-                    sums[(self.len() + row, column)] = imaginary[i];
+                for (row, [real, imaginary]) in (first..self.len()).zip(parts) {
+                    for i in 0..series.len() {
+                        let column = block * SIDE_BY_SIDE + i;
+                        sums[(row, column)] = real[i];
+                        sums[(self.len() + row, column)] = imaginary[i];
+                    }
                 }
             }
         }
@@ -68,33 +73,38 @@ impl Harmonics {
     }
 }
 
-/// Real and imaginary parts of one harmonic of series side by side, compiled for the processor at
-/// hand.
-struct HarmonicSum<'a> {
+/// Real and imaginary parts of successive harmonics of series side by side, compiled for the processor
+/// at hand.
+struct HarmonicSums<'a> {
     turn: &'a [[f64; 2]],
     rows: &'a [[f64; SIDE_BY_SIDE]],
-    number: usize,
+    numbers: [usize; TOGETHER],
 }
 
-impl WithSimd for HarmonicSum<'_> {
-    type Output = [[f64; SIDE_BY_SIDE]; 2];
+impl WithSimd for HarmonicSums<'_> {
+    type Output = [[[f64; SIDE_BY_SIDE]; 2]; TOGETHER];
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> [[f64; SIDE_BY_SIDE]; 2] {
-        let (mut real, mut imaginary) = ([0.0; SIDE_BY_SIDE], [0.0; SIDE_BY_SIDE]);
-        let mut place = 0;
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        let samples = self.rows.len();
+        let steps = self.numbers.map(|number| number % samples.max(1));
+        let mut real = [[0.0; SIDE_BY_SIDE]; TOGETHER];
+        let mut imaginary = real;
+        let mut places = [0; TOGETHER];
         for row in self.rows {
-            let [cosine, sine] = self.turn[place];
-            for i in 0..SIDE_BY_SIDE {
-                real[i] += cosine * row[i];
-                imaginary[i] -= sine * row[i];
-            }
-            place += self.number;
-            if place >= self.rows.len() {
-                place -= self.rows.len();
+            for k in 0..TOGETHER {
+                let [cosine, sine] = self.turn[places[k]];
+                for i in 0..SIDE_BY_SIDE {
+                    real[k][i] += cosine * row[i];
+                    imaginary[k][i] -= sine * row[i];
+                }
+                places[k] += steps[k];
+                if places[k] >= samples {
+                    places[k] -= samples;
+                }
             }
         }
-        [real, imaginary]
+        std::array::from_fn(|k| [real[k], imaginary[k]])
     }
 }
 
@@ -113,9 +123,9 @@ mod tests {
                     .collect()
             })
             .collect();
-        let sums = Harmonics::new(samples, 3..9).sums(&series);
+        let sums = Harmonics::new(samples, 3..10).sums(&series);
         for (column, x) in series.iter().enumerate() {
-            for (row, k) in (3..9).enumerate() {
+            for (row, k) in (3..10).enumerate() {
                 let part = |of: fn(f64) -> f64| -> f64 {
                     let terms = x.iter().enumerate();
                     terms
@@ -123,7 +133,7 @@ mod tests {
                         .sum()
                 };
                 assert_relative_eq!(sums[(row, column)], part(f64::cos), epsilon = 1e-11);
-                assert_relative_eq!(sums[(6 + row, column)], part(f64::sin), epsilon = 1e-11);
+                assert_relative_eq!(sums[(7 + row, column)], part(f64::sin), epsilon = 1e-11);
             }
         }
     }
