@@ -3,10 +3,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::joint_state::JointState;
+use super::joint_state::{JointState, kind_of};
 use super::measured_terms::EARTH_RATE;
 use super::parameters::{
-    INPUTS, Kind, OUTPUTS, PARAMETERS, Parameters, SIGNALS, input, input_factor, output, place,
+    INPUTS, KINDS, Kind, PARAMETERS, Parameters, SIGNALS, input, input_factor, output, place,
 };
 use super::window::Window;
 use super::window_fit::{Squares, squares_about_mean};
@@ -54,7 +54,8 @@ impl JointState<'_> {
             systematic[j] += (MODEL_SCALE * ratio).powi(2);
         }
         let moves = self.moves_by_errors(&inverse);
-        self.add_errors(&self.gust_errors(), &moves, &mut systematic);
+        let gust_errors = std::array::from_fn(|j| self.gust_error(j));
+        self.add_errors(&gust_errors, &moves, &mut systematic);
         self.add_errors(&self.heading_errors(windows), &moves, &mut systematic);
         // The variance of few windows is itself uncertain, so it is enlarged as Student's intervals are.
         let windows = self.windows.len() as f64;
@@ -88,31 +89,32 @@ impl JointState<'_> {
         }
     }
 
-    /// Errors of the outputs' scales and the vanes' delays that gusts cause; zero for the other parameters.
+    /// Error that gusts cause in the scale of an output or the delay of a vane; zero for the other parameters.
     /// The aircraft turns into a gust, so the gusts correlate with the motion, and no number of windows
     /// averages that out.
-    pub fn gust_errors(&self) -> Parameters {
-        let mut errors = [0.0; PARAMETERS];
-        for output in 0..OUTPUTS {
-            let mut all = Squares::default();
-            for window in &self.windows {
-                let own = window.residuals_and_motion(&self.context, output);
-                all.residuals += own.residuals;
-                all.motion += own.motion;
-                all.rate += own.rate;
-            }
-            let mut set = |kind, explained: f64| {
-                if explained > 0.0 {
-                    let j = place(INPUTS + output, kind);
-                    errors[j] = GUST_RESPONSE * (all.residuals / explained).sqrt();
-                }
-            };
-            set(Kind::Scale, all.motion);
-            if VANES.contains(&SIGNALS[INPUTS + output]) {
-                set(Kind::Delay, all.rate);
-            }
+    pub fn gust_error(&self, j: usize) -> f64 {
+        let (instrument, kind) = (j / KINDS, kind_of(j));
+        let Some(output) = instrument.checked_sub(INPUTS) else {
+            return 0.0;
+        };
+        let explained_by: fn(&Squares) -> f64 = match kind {
+            Kind::Scale => |all| all.motion,
+            Kind::Delay if VANES.contains(&SIGNALS[instrument]) => |all| all.rate,
+            _ => return 0.0,
+        };
+        let mut all = Squares::default();
+        for window in &self.windows {
+            let own = window.residuals_and_motion(&self.context, output);
+            all.residuals += own.residuals;
+            all.motion += own.motion;
+            all.rate += own.rate;
         }
-        errors
+        let explained = explained_by(&all);
+        if explained > 0.0 {
+            GUST_RESPONSE * (all.residuals / explained).sqrt()
+        } else {
+            0.0
+        }
     }
 
     /// Errors of the rate gyros' biases without a recorded heading: the part of the earth's rotation along the unknown

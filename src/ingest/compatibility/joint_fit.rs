@@ -173,11 +173,12 @@ fn reweight(state: &mut JointState) -> Option<()> {
 /// √P of each parameter for its present value.
 fn reweighted_prior(state: &JointState) -> Option<Parameters> {
     let Posterior { values, covariance } = state.posterior()?;
-    let gusts = state.gust_errors();
     Some(std::array::from_fn(|j| {
         let ordinary = state.context.settings.ordinary.of_parameter(j);
-        let value = values[j];
-        if value.abs() > SURELY * covariance[(j, j)].sqrt().hypot(gusts[j]) {
+        let (value, bound) = (values[j], covariance[(j, j)].sqrt());
+        // The error by gusts takes a pass over all windows, and few parameters need it.
+        let exceeds = |bound: f64| value.abs() > SURELY * bound;
+        if exceeds(bound) && exceeds(bound.hypot(state.gust_error(j))) {
             ordinary.hypot(value)
         } else {
             ordinary
@@ -202,19 +203,21 @@ fn free_surest(state: &mut JointState) -> Option<()> {
 /// prior.
 fn surest(state: &JointState) -> Option<(usize, f64)> {
     let Posterior { values, covariance } = state.posterior()?;
-    let gusts = state.gust_errors();
     let freed = |j: usize| {
         let ordinary = state.context.settings.ordinary.of_parameter(j);
         let (variance, prior) = (covariance[(j, j)], state.prior[j]);
         let data_share = state.data_share(&covariance, j);
         // Value and bound as they would be without the prior.
         let value = values[j] / data_share;
-        let bound = (variance / data_share).sqrt().hypot(gusts[j]);
-        let is_freed = state.estimated[j]
+        let may_be_freed = state.estimated[j]
             && data_share > LEAST_DATA_SHARE
             && prior <= ordinary
-            && value.abs() > LEAST_FREED * ordinary
-            && value.abs() > FREED * bound;
+            && value.abs() > LEAST_FREED * ordinary;
+        if !may_be_freed {
+            return None;
+        }
+        let bound = (variance / data_share).sqrt().hypot(state.gust_error(j));
+        let is_freed = value.abs() > FREED * bound;
         is_freed.then(|| (j, ordinary.hypot(value), value.abs() / bound))
     };
     (0..PARAMETERS)

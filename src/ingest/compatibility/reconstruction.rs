@@ -215,7 +215,10 @@ impl WithSimd for Linearisation<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> TrajectorySensitivities {
         let nodes = self.window.nodes();
-        let mut s = [[0.0; WIDE]; STATES];
+        // Steps alternate between buffers: copies would take a third of the time.
+        let mut buffers = [const { [[0.0; WIDE]; STATES] }; 4];
+        let [s, end, at, next] = &mut buffers;
+        let (mut s, mut end) = (s, end);
         for i in 0..STATES {
             s[i][i] = 1.0;
         }
@@ -226,14 +229,15 @@ impl WithSimd for Linearisation<'_> {
         };
         let mut start = self.linearised(0);
         for node in 0..nodes {
-            out.rows.push(self.reading_rows(simd, node, &s));
+            out.rows.push(self.reading_rows(simd, node, s));
             out.transitions.push(SMatrix::from_fn(|i, j| s[i][j]));
             out.by_input.push(start.slopes.by_input);
             if node + 1 < nodes {
                 let middle = self.linearised(2 * node + 1);
-                let end = self.linearised(2 * node + 2);
-                s = self.advanced(simd, node, &s, [&start, &middle, &end]);
-                start = end;
+                let later = self.linearised(2 * node + 2);
+                self.advance(simd, node, [&start, &middle, &later], s, end, [at, next]);
+                std::mem::swap(&mut s, &mut end);
+                start = later;
             }
         }
         out
@@ -252,23 +256,24 @@ impl Linearisation<'_> {
         }
     }
 
-    /// Sensitivities one node later, by a Runge-Kutta step of the linearised equations.
+    /// Writes the sensitivities one node later to `end`, by a Runge-Kutta step of the linearised equations
+    /// from `s`. `at` and `next` receive those at the stages.
     #[inline(always)]
-    fn advanced<S: Simd>(
+    fn advance<S: Simd>(
         &self,
         simd: S,
         node: usize,
-        s: &Sensitivities,
         linearised: [&Linearised; 3],
-    ) -> Sensitivities {
+        s: &Sensitivities,
+        end: &mut Sensitivities,
+        [mut at, mut next]: [&mut Sensitivities; 2],
+    ) {
         let h = 2.0 * self.window.point_step_s();
         let (reaches_s, weights_s) = (reaches_s(h), weights_s(h));
         let by_error = self.trajectory.inputs.mean_by_error(2 * node, h);
         let forcing = linearised.map(|at| at.forcing(&by_error));
-        let mut end = *s;
-        // Stages alternate between two buffers: copies would take a third of the time.
-        let (mut at, mut next) = (&mut s.clone(), &mut s.clone());
         for stage in 0..STAGES {
+            let is_first = stage == 0;
             let (reach, weight) = (
                 simd.splat_f64s(reaches_s[stage]),
                 simd.splat_f64s(weights_s[stage]),
@@ -278,11 +283,16 @@ impl Linearisation<'_> {
                 for lane in (0..WIDE).step_by(SIDE_BY_SIDE * S::F64_LANES) {
                     let mut slope = Sum::<S>::of(simd, &forcing[POINT[stage]][i], lane);
                     for &j in equations::RATES_BY_STATE[i] {
-                        slope.add(simd, by_state[(i, j)], &at[j]);
+                        let at = if is_first { &s[j] } else { &at[j] };
+                        slope.add(simd, by_state[(i, j)], at);
                     }
                     slope.each(|lane, slope| {
-                        let so_far = load::<S>(&end[i], lane);
                         let start = load::<S>(&s[i], lane);
+                        let so_far = if is_first {
+                            start
+                        } else {
+                            load::<S>(&end[i], lane)
+                        };
                         store::<S>(&mut end[i], lane, simd.mul_add_f64s(weight, slope, so_far));
                         store::<S>(&mut next[i], lane, simd.mul_add_f64s(reach, slope, start));
                     });
@@ -290,7 +300,6 @@ impl Linearisation<'_> {
             }
             std::mem::swap(&mut at, &mut next);
         }
-        end
     }
 
     /// Sensitivities of the readings at a node. They act through the states and through the body

@@ -273,15 +273,14 @@ impl<'a> WindowFit<'a> {
 
     /// Sums of squares of an output's slow residuals, of its reconstructed motion and of the motion's rate.
     pub fn residuals_and_motion(&self, context: &FitContext, output: usize) -> Squares {
-        let measured = &self.window.outputs[output];
         let samples = context.compared(self.window);
-        let mut residuals = Vec::with_capacity(samples.len());
-        let mut motion = Vec::with_capacity(samples.len());
-        for k in samples.filter(|k| measured[*k].is_finite()) {
-            let residual = self.comparison.residuals[output][k];
-            residuals.push(residual);
-            motion.push(measured[k] - residual);
-        }
+        let [measured, residuals] = [&self.window.outputs, &self.comparison.residuals]
+            .map(|all| all[output].get(samples.clone()).unwrap_or_default());
+        let both = measured.iter().zip(residuals);
+        let (residuals, motion): (Vec<f64>, Vec<f64>) = both
+            .filter(|(measured, _)| measured.is_finite())
+            .map(|(measured, residual)| (*residual, measured - residual))
+            .unzip();
         let rate = |w: &[f64]| (w[1] - w[0]) / self.window.step_s;
         Squares {
             residuals: slow_squares(&residuals),

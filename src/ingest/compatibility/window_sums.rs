@@ -58,12 +58,12 @@ struct NodeDistribution {
 }
 
 impl NodeDistribution {
-    /// Sums over the nodes of values at the samples of an output.
-    fn sums(&self, output: usize, value: impl Fn(usize) -> f64) -> Vec<f64> {
+    /// Sums over the nodes of an output's values at all samples.
+    fn sums(&self, output: usize, all: &[f64]) -> Vec<f64> {
         let (mut sums, mut values) = (vec![0.0; self.nodes], Vec::new());
         for phase in phases(self.samples_per_node, self.late[output], &self.samples) {
             values.clear();
-            values.extend(phase.samples().map(&value));
+            values.extend(phase.of(all));
             phase
                 .kernel
                 .share_out(phase.points.start, &values, &mut sums);
@@ -84,11 +84,21 @@ struct Phase {
 }
 
 impl Phase {
-    fn samples(&self) -> impl Iterator<Item = usize> {
-        let (spacing, offset) = (self.spacing, self.offset);
-        self.points
-            .clone()
-            .map(move |point| point * spacing + offset)
+    /// Index of its first sample.
+    fn first(&self) -> usize {
+        self.points.start * self.spacing + self.offset
+    }
+
+    /// Its samples of values at all samples.
+    fn of<'v>(&self, all: &'v [f64]) -> impl Iterator<Item = &'v f64> + use<'v> {
+        let own = all.get(self.first()..).unwrap_or_default();
+        own.iter().step_by(self.spacing).take(self.points.len())
+    }
+
+    /// Its samples of values at all samples, to be written.
+    fn of_mut<'v>(&self, all: &'v mut [f64]) -> impl Iterator<Item = &'v mut f64> + use<'v> {
+        let own = all.get_mut(self.first()..).unwrap_or_default();
+        own.iter_mut().step_by(self.spacing).take(self.points.len())
     }
 }
 
@@ -149,32 +159,28 @@ impl Comparison {
             phase
                 .kernel
                 .interpolate_from(phase.points.start, readings, read);
-            for (k, reading) in phase.samples().zip(read) {
-                residuals[k] = measured[k] - ((1.0 + scale) * *reading + bias);
+            let both = phase.of(measured).zip(read);
+            for (residual, (measured, reading)) in phase.of_mut(residuals).zip(both) {
+                *residual = measured - ((1.0 + scale) * *reading + bias);
             }
         }
     }
 
     /// Distributes the residuals of an output over the nodes.
     fn share_out(&mut self, output: usize) {
-        let residuals = &self.residuals[output];
-        let counted = |k: usize| {
-            if residuals[k].is_finite() {
-                residuals[k]
-            } else {
-                0.0
-            }
-        };
-        let samples = self.distribution.samples.clone();
-        self.squares[output] = samples.map(|k| counted(k).powi(2)).sum();
-        self.sums[output] = self.distribution.sums(output, counted);
+        let counted = |v: &f64| if v.is_finite() { *v } else { 0.0 };
+        let counted: Vec<f64> = self.residuals[output].iter().map(counted).collect();
+        let compared = counted.get(self.distribution.samples.clone());
+        let compared = compared.unwrap_or_default();
+        self.squares[output] = compared.iter().map(|v| v * v).sum();
+        self.sums[output] = self.distribution.sums(output, &counted);
     }
 
     /// Numbers of an output's samples that count, distributed over the nodes.
     fn counts(&self, output: usize) -> Vec<f64> {
-        let residuals = &self.residuals[output];
-        self.distribution
-            .sums(output, |k| f64::from(u8::from(residuals[k].is_finite())))
+        let counted = |v: &f64| f64::from(u8::from(v.is_finite()));
+        let counted: Vec<f64> = self.residuals[output].iter().map(counted).collect();
+        self.distribution.sums(output, &counted)
     }
 
     /// Σ s v of each output, s its sensitivities.
