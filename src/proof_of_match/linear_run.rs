@@ -56,7 +56,7 @@ impl Simulation<'_> {
         let run = self.fly_with(start, (samples, stride), &mut slopes);
         RunWithSensitivities {
             run,
-            slopes: slopes.histories,
+            slopes: slopes.histories(),
         }
     }
 }
@@ -78,7 +78,8 @@ struct RunSlopes<'a> {
     outputs: AlignedBuffer,
     /// Number of the parameters, padded to whole vectors.
     width: usize,
-    histories: Vec<Histories>,
+    /// Slopes of the outputs, sample by sample.
+    recorded: Vec<f64>,
 }
 
 /// Slopes of the equations at a stage.
@@ -118,11 +119,29 @@ impl<'a> RunSlopes<'a> {
             states,
             outputs: AlignedBuffer::zeros(COUNT * width),
             width,
-            histories: parameters
-                .iter()
-                .map(|_| from_fn(|_| Vec::with_capacity(steps)))
-                .collect(),
+            recorded: Vec::with_capacity(steps * COUNT * width),
         }
+    }
+
+    /// Histories of each parameter's slopes. A vector of parameters at a time: writing all histories side by
+    /// side at each sample would exceed the processor's first cache.
+    fn histories(&self) -> Vec<Histories> {
+        let row = COUNT * self.width;
+        let samples = self.recorded.len() / row.max(1);
+        let empty = |_| from_fn(|_| Vec::with_capacity(samples));
+        let mut histories: Vec<Histories> = self.parameters.iter().map(empty).collect();
+        for (group, histories) in histories.chunks_mut(VECTOR).enumerate() {
+            for output in 0..COUNT {
+                let first = output * self.width + group * VECTOR;
+                for sample in 0..samples {
+                    let values = &self.recorded[sample * row + first..][..VECTOR];
+                    for (history, value) in histories.iter_mut().zip(values) {
+                        history[output].push(*value);
+                    }
+                }
+            }
+        }
+        histories
     }
 }
 
@@ -165,11 +184,7 @@ impl StageObserver for RunSlopes<'_> {
             width: self.width,
             outputs: self.outputs.slice_mut(),
         });
-        for (column, histories) in self.histories.iter_mut().enumerate() {
-            for (output, history) in histories.iter_mut().enumerate() {
-                history.push(self.outputs.slice()[output * self.width + column]);
-            }
-        }
+        self.recorded.extend_from_slice(self.outputs.slice());
     }
 
     fn after_step(&mut self, end: &BodyState) {
