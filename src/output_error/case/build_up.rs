@@ -64,15 +64,21 @@ impl<const NX: usize> BuildUp<NX> {
     /// Build-up at one point.
     #[inline(always)]
     pub fn at(&self, point: usize) -> PointBuildUp<NX> {
-        PointBuildUp {
-            offset: std::array::from_fn(|k| value_at(&self.offset[k], point)),
-            slope: std::array::from_fn(|k| {
-                std::array::from_fn(|i| value_at(&self.slope[k][i], point))
-            }),
+        let mut at = PointBuildUp {
+            offset: [0.0; COEFFICIENTS],
+            slope: [[0.0; NX]; COEFFICIENTS],
+        };
+        for k in 0..COEFFICIENTS {
+            at.offset[k] = value_at(&self.offset[k], point);
+            for i in 0..NX {
+                at.slope[k][i] = value_at(&self.slope[k][i], point);
+            }
         }
+        at
     }
 }
 
+#[inline(always)]
 fn value_at(column: &[f64], point: usize) -> f64 {
     column.get(point).copied().unwrap_or(0.0)
 }
