@@ -21,10 +21,10 @@
 //! and τ predict, which matters with few data.
 
 use nalgebra::{DMatrix, DVector};
-use pulp::Arch;
 
 use super::scatter::{HUBER, total_variances};
 use crate::numerics::linear_algebra::symmetric;
+use crate::numerics::vectors::simd::vectorised;
 
 /// Largest number of steps of the iteration between coefficients, τ² and Huber's weights; about ten
 /// suffice.
@@ -158,9 +158,9 @@ fn residual_freedom(
 fn quadratic_forms(design: &DMatrix<f64>, matrix: &DMatrix<f64>) -> Vec<f64> {
     let mut forms = vec![0.0; design.nrows()];
     let mut image = forms.clone();
-    Arch::new().dispatch(
+    vectorised(
         #[inline(always)]
-        move || {
+        || {
             for (own, elements) in design.column_iter().zip(matrix.column_iter()) {
                 image.fill(0.0);
                 for (values, element) in design.column_iter().zip(&elements) {
@@ -172,9 +172,9 @@ fn quadratic_forms(design: &DMatrix<f64>, matrix: &DMatrix<f64>) -> Vec<f64> {
                     *form += image * value;
                 }
             }
-            forms
         },
-    )
+    );
+    forms
 }
 
 /// Coefficients and their covariance for given weights.

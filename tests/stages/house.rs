@@ -423,6 +423,18 @@ fn every_file_has_a_header() {
     }
 }
 
+#[test]
+fn closures_are_compiled_for_the_processor_by_vectorised_and_always_inlined() {
+    for file in rust_files(&["src"]) {
+        let text: String = fs::read_to_string(&file).unwrap();
+        let text: String = text.split_whitespace().collect();
+        let place = file.display();
+        assert!(!text.contains("dispatch(|"), "{place}");
+        assert!(!text.contains("dispatch(#"), "{place}");
+        assert!(!text.contains("vectorised(|"), "{place}");
+    }
+}
+
 /// First lines of the doc comments of all sources, with their places.
 fn openings() -> Vec<(String, String)> {
     let mut openings = Vec::new();

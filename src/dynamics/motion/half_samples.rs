@@ -1,6 +1,6 @@
 //! Signals at samples and halfway between them.
 
-use pulp::Arch;
+use crate::numerics::vectors::simd::vectorised;
 
 /// Interleaves samples with the values half-way between them, of the cubic through the two samples
 /// on either side. Linear interpolation would attenuate a sine of angular frequency ω by (ω
@@ -11,15 +11,18 @@ pub fn with_half_samples(values: &[f64]) -> Vec<f64> {
         return vec![];
     };
     let mut pairs = Vec::with_capacity(values.len());
-    Arch::new().dispatch(|| {
-        let pair = |pair: &[f64]| [pair[0], 0.5 * (pair[0] + pair[1])];
-        pairs.extend(values.windows(2).map(pair));
-        let inner = pairs.get_mut(1..).unwrap_or_default();
-        for ([_, point], four) in inner.iter_mut().zip(values.windows(4)) {
-            let middle = *point + ((four[1] - four[0]) - (four[3] - four[2])) / 16.0;
-            *point = if middle.is_finite() { middle } else { *point };
-        }
-    });
+    vectorised(
+        #[inline(always)]
+        || {
+            let pair = |pair: &[f64]| [pair[0], 0.5 * (pair[0] + pair[1])];
+            pairs.extend(values.windows(2).map(pair));
+            let inner = pairs.get_mut(1..).unwrap_or_default();
+            for ([_, point], four) in inner.iter_mut().zip(values.windows(4)) {
+                let middle = *point + ((four[1] - four[0]) - (four[3] - four[2])) / 16.0;
+                *point = if middle.is_finite() { middle } else { *point };
+            }
+        },
+    );
     let mut points = pairs.into_flattened();
     points.push(*last);
     points

@@ -13,6 +13,7 @@ use super::vane_inversion::{FLOW_SIGNALS, VaneInversion};
 use crate::aircraft::{Aircraft, Sensors};
 use crate::earth::gravity_at;
 use crate::flight::{Record, signal};
+use crate::numerics::vectors::simd::vectorised;
 
 /// Mass, c.g. and inertias: sample by sample, or their means over the maneuver (the paper's
 /// choice).
@@ -329,9 +330,12 @@ pub fn slope_name(name: &str) -> String {
 
 /// `true` if a value is missing. One pass over all values vectorises; a search does not.
 fn has_missing(values: &[f64]) -> bool {
-    Arch::new().dispatch(|| {
-        values
-            .iter()
-            .fold(false, |missing, v| missing | !v.is_finite())
-    })
+    vectorised(
+        #[inline(always)]
+        || {
+            values
+                .iter()
+                .fold(false, |missing, v| missing | !v.is_finite())
+        },
+    )
 }

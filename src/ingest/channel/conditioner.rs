@@ -8,8 +8,6 @@
 
 use std::ops::Range;
 
-use pulp::Arch;
-
 use super::channel_statistics::{ChannelStatistics, LARGEST};
 use super::character::{Character, SPELL};
 use super::gaps::{Bridge, BridgedGaps, bridge_gaps};
@@ -25,6 +23,7 @@ use crate::ingest::settings::Settings;
 use crate::numerics::statistics::order_statistics::{
     upper_median_in_place, upper_median_of_counts,
 };
+use crate::numerics::vectors::simd::vectorised;
 use crate::units::Conversion;
 
 /// Unit of a 0/1 channel, whose values are never smoothed or interpolated.
@@ -143,10 +142,13 @@ impl Conditioner {
         let is_beyond = |value: f64| value.is_finite() & (conversion.of(value).abs() > LARGEST);
         let is_fill = |value: f64| is_fill_value(value, signal, |value| conversion.of(value));
         // Without an early exit, for the vectors.
-        let is_any_suspect = Arch::new().dispatch(|| {
-            let suspect = |v: &f64| is_usual(*v) | is_beyond(*v);
-            recorded.iter().fold(false, |any, v| any | suspect(v))
-        });
+        let is_any_suspect = vectorised(
+            #[inline(always)]
+            || {
+                let suspect = |v: &f64| is_usual(*v) | is_beyond(*v);
+                recorded.iter().fold(false, |any, v| any | suspect(v))
+            },
+        );
         if !is_any_suspect {
             return None;
         }
@@ -171,7 +173,7 @@ impl Conditioner {
     /// Appends recorded values, unwrapped and in the signal's unit.
     fn convert(&mut self, recorded: &[f64]) {
         let conversion = self.conversion;
-        let converted = |value: f64| {
+        let converted = move |value: f64| {
             if value.is_finite() {
                 conversion.of(value)
             } else {
@@ -180,7 +182,14 @@ impl Conditioner {
         };
         let Some(unwrapper) = &mut self.unwrapper else {
             let values = &mut self.values;
-            Arch::new().dispatch(|| values.extend(recorded.iter().map(|v| converted(*v))));
+            vectorised(
+                #[inline(always)]
+                || {
+                    // A copy, which no written value can change.
+                    let convert = converted;
+                    values.extend(recorded.iter().map(|v| convert(*v)));
+                },
+            );
             return;
         };
         for part in recorded.chunks(UNWRAPPED_AT_ONCE) {

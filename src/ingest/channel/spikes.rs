@@ -8,11 +8,10 @@
 
 use std::ops::Range;
 
-use pulp::Arch;
-
 use crate::ingest::settings::Spikes;
 use crate::numerics::series::sample_count::whole_steps;
 use crate::numerics::statistics::order_statistics::{SIGMA_PER_MAD, lower_quantile_in_place};
+use crate::numerics::vectors::simd::vectorised;
 
 /// Variance of a sample minus its neighbours' mean, in variances of white noise: 1 + 1/4 + 1/4.
 const MEAN_VARIANCE: f64 = 1.5;
@@ -114,10 +113,13 @@ fn off_neighbours(three: &[f64]) -> f64 {
 
 /// `true` if some sample between the first and the last is a candidate.
 fn has_candidate(values: &[f64], level: f64) -> bool {
-    Arch::new().dispatch(|| {
-        let threes = values.windows(3);
-        threes.fold(false, |any, three| any | is_candidate(three, level))
-    })
+    vectorised(
+        #[inline(always)]
+        || {
+            let threes = values.windows(3);
+            threes.fold(false, |any, three| any | is_candidate(three, level))
+        },
+    )
 }
 
 /// `true` if a sample that exceeds the spell's noise differs from its surroundings as only a spike

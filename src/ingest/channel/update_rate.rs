@@ -1,6 +1,6 @@
 //! Update rate of a channel: how many samples of the record lie between two recorded values.
 
-use pulp::Arch;
+use crate::numerics::vectors::simd::vectorised;
 
 /// Longest period of a slow channel, in samples of the record: a channel at 1 Hz in a record at
 /// 40 Hz.
@@ -127,19 +127,22 @@ impl Changes {
             finite: usize::from(values.first().is_some_and(|v| v.is_finite())),
             ..Changes::default()
         };
-        Arch::new().dispatch(|| {
-            let neighbours = values.iter().zip(values.get(1..).unwrap_or_default());
-            // Without branches, for the vectors.
-            neighbours.fold(first, |counts, (before, value)| {
-                let is_pair = before.is_finite() & value.is_finite();
-                let differs = is_pair & (before.to_bits() != value.to_bits());
-                Changes {
-                    finite: counts.finite + usize::from(value.is_finite()),
-                    pairs: counts.pairs + usize::from(is_pair),
-                    changed: counts.changed + usize::from(differs),
-                }
-            })
-        })
+        vectorised(
+            #[inline(always)]
+            || {
+                let neighbours = values.iter().zip(values.get(1..).unwrap_or_default());
+                // Without branches, for the vectors.
+                neighbours.fold(first, |counts, (before, value)| {
+                    let is_pair = before.is_finite() & value.is_finite();
+                    let differs = is_pair & (before.to_bits() != value.to_bits());
+                    Changes {
+                        finite: counts.finite + usize::from(value.is_finite()),
+                        pairs: counts.pairs + usize::from(is_pair),
+                        changed: counts.changed + usize::from(differs),
+                    }
+                })
+            },
+        )
     }
 
     /// Runs of one value without a gap.

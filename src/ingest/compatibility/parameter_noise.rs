@@ -42,7 +42,6 @@
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use nalgebra::{DMatrix, DMatrixViewMut, DVector, Dyn, U1};
-use pulp::Arch;
 
 use super::equations::STATES;
 use super::parameters::{
@@ -52,6 +51,7 @@ use super::reconstruction::{DRIVING, LOCAL, ROW, Row};
 use super::window::Window;
 use super::window_sums::{ALL, LinearisedWindow, ReducedInformation, place_among_all};
 use crate::numerics::linear_algebra::symmetric;
+use crate::numerics::vectors::simd::vectorised;
 
 /// Length of the blocks of samples that share one g, s: short against the periods of an aircraft's
 /// motion, 1 s and more.
@@ -160,17 +160,20 @@ fn block_products(
     let (length, spacing) = (block_length(window), window.samples_per_node());
     let mut products = DMatrix::zeros(ALL, STATES * window.samples.div_ceil(length));
     let sums = products.as_mut_slice();
-    Arch::new().dispatch(|| {
-        for (node, rows) in linearised.sensitivities.rows.iter().enumerate() {
-            let block = &mut sums[node * spacing / length * ALL * STATES..][..ALL * STATES];
-            for (output, row) in rows.iter().enumerate() {
-                let count = linearised.counts[output][node];
-                if count > 0.0 {
-                    add_products(block, row, output, count * weights[output]);
+    vectorised(
+        #[inline(always)]
+        || {
+            for (node, rows) in linearised.sensitivities.rows.iter().enumerate() {
+                let block = &mut sums[node * spacing / length * ALL * STATES..][..ALL * STATES];
+                for (output, row) in rows.iter().enumerate() {
+                    let count = linearised.counts[output][node];
+                    if count > 0.0 {
+                        add_products(block, row, output, count * weights[output]);
+                    }
                 }
             }
-        }
-    });
+        },
+    );
     products
 }
 

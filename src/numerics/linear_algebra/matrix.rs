@@ -12,7 +12,7 @@ use nalgebra::DMatrix;
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::numerics::vectors::row_products::StridedRows;
-use crate::numerics::vectors::simd::{AlignedBuffer, VECTOR, load, store};
+use crate::numerics::vectors::simd::{AlignedBuffer, VECTOR, load, store, vectorised};
 
 /// Rows and lags that a loop computes side by side: enough independent sums to hide the latency of
 /// one.
@@ -153,16 +153,22 @@ impl AlignedMatrix {
     /// Adds `factor` times another matrix.
     pub fn add_scaled(&mut self, other: &AlignedMatrix, factor: f64) {
         let (sums, values) = (self.values_mut(), other.values());
-        Arch::new().dispatch(|| {
-            sums.iter_mut()
-                .zip(values)
-                .for_each(|(sum, v)| *sum += factor * v);
-        });
+        vectorised(
+            #[inline(always)]
+            || {
+                sums.iter_mut()
+                    .zip(values)
+                    .for_each(|(sum, v)| *sum += factor * v);
+            },
+        );
     }
 
     pub fn scaled_by(mut self, factor: f64) -> AlignedMatrix {
         let values = self.values_mut();
-        Arch::new().dispatch(|| values.iter_mut().for_each(|v| *v *= factor));
+        vectorised(
+            #[inline(always)]
+            || values.iter_mut().for_each(|v| *v *= factor),
+        );
         self
     }
 
@@ -215,13 +221,16 @@ impl AlignedMatrix {
     /// Σ_k a_k b_{k+lag} over rows, column by column.
     pub fn lagged_products_by_column(&self, later: &AlignedMatrix, lag: usize) -> Vec<f64> {
         let mut sums = vec![0.0; self.width()];
-        Arch::new().dispatch(|| {
-            for (a, b) in self.rows().zip(later.rows().skip(lag)) {
-                sums.iter_mut()
-                    .zip(a.iter().zip(b))
-                    .for_each(|(sum, (a, b))| *sum += a * b);
-            }
-        });
+        vectorised(
+            #[inline(always)]
+            || {
+                for (a, b) in self.rows().zip(later.rows().skip(lag)) {
+                    for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
+                        *sum += a * b;
+                    }
+                }
+            },
+        );
         sums
     }
 

@@ -4,9 +4,9 @@
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use nalgebra::{Cholesky, DMatrix, DMatrixView, DMatrixViewMut, Matrix};
-use pulp::Arch;
 
 use super::BLOCK;
+use crate::numerics::vectors::simd::vectorised;
 
 /// Size up to which the plain methods are as fast.
 const PLAIN: usize = 48;
@@ -55,9 +55,9 @@ fn subtract_square(lower: &DMatrix<f64>, above: &DMatrix<f64>, from: &mut DMatri
 pub fn solve_lower(lower: DMatrixView<f64>, mut right: DMatrixViewMut<f64>) {
     let n = lower.nrows();
     if n <= PLAIN {
-        Arch::new().dispatch(
+        vectorised(
             #[inline(always)]
-            move || solve_plain(lower, right),
+            || solve_plain(lower, right.as_view_mut()),
         );
         return;
     }

@@ -4,7 +4,26 @@
     reason = "compiled into the loops that use them"
 )]
 
-use pulp::Simd;
+use pulp::{Arch, Simd, WithSimd};
+
+/// Calls a closure compiled for the processor at hand. The closure is marked `#[inline(always)]`: one that the
+/// compiler does not inline is compiled without the processor's vectors.
+pub(crate) fn vectorised<R>(closure: impl FnMut() -> R) -> R {
+    Arch::new().dispatch(Vectorised(closure))
+}
+
+/// Closure that is called where it is compiled. As a `FnOnce` it would be called through a function that is
+/// never inlined by force.
+struct Vectorised<F>(F);
+
+impl<R, F: FnMut() -> R> WithSimd for Vectorised<F> {
+    type Output = R;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, _: S) -> R {
+        (self.0)()
+    }
+}
 
 /// Lanes of the widest vector of doubles (512 bit). Rows are padded to a multiple of it.
 pub(crate) const VECTOR: usize = 8;

@@ -1,7 +1,5 @@
 //! White noise of the measured surfaces, and the coefficients that it reaches.
 
-use pulp::Arch;
-
 use super::model::Model;
 use crate::aero::{Derivative, Regressor};
 use crate::aircraft::Aircraft;
@@ -9,6 +7,7 @@ use crate::dynamics::motion::ManeuverSignals;
 use crate::flight::signal;
 use crate::numerics::series::differences;
 use crate::numerics::statistics::order_statistics::upper_median_of_magnitudes;
+use crate::numerics::vectors::simd::vectorised;
 
 /// Surface with noise on its measured deflection.
 #[derive(Clone, Debug, PartialEq)]
@@ -99,7 +98,10 @@ impl DeflectionEffect {
 #[must_use]
 pub fn white_variance(samples: &[f64]) -> f64 {
     let size = |u: &[f64; 4]| differences::third(u).abs().to_bits();
-    let mut sizes: Vec<u64> = Arch::new().dispatch(|| samples.array_windows().map(size).collect());
+    let mut sizes: Vec<u64> = vectorised(
+        #[inline(always)]
+        || samples.array_windows().map(size).collect(),
+    );
     let median = upper_median_of_magnitudes(&mut sizes).unwrap_or(0.0);
     differences::noise_of_third(median).powi(2)
 }

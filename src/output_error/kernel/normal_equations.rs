@@ -14,12 +14,12 @@
 use std::array::from_fn;
 
 use nalgebra::{DMatrix, DVector};
-use pulp::{Arch, Simd};
+use pulp::Simd;
 
 use super::pass::Sink;
 use crate::dynamics::OUTPUTS;
 use crate::numerics::vectors::row_products::{Interleaved, StridedRows};
-use crate::numerics::vectors::simd::AlignedBuffer;
+use crate::numerics::vectors::simd::{AlignedBuffer, vectorised};
 use crate::output_error::case::Measurements;
 use crate::output_error::case::blocks::BlockSums;
 use crate::output_error::case::chunking::{CHUNK, Strided};
@@ -172,11 +172,14 @@ impl NormalSums {
         let mut sum = vec![0.0; width * width];
         for (gram, w) in self.gram.iter().zip(weights) {
             let factor = w * self.stride as f64;
-            Arch::new().dispatch(|| {
-                sum.iter_mut()
-                    .zip(gram.slice())
-                    .for_each(|(sum, s)| *sum += factor * s);
-            });
+            vectorised(
+                #[inline(always)]
+                || {
+                    sum.iter_mut()
+                        .zip(gram.slice())
+                        .for_each(|(sum, s)| *sum += factor * s);
+                },
+            );
         }
         self.symmetric_by_parameter(|a, b| match (a.only_output, b.only_output) {
             (None, None) => sum[a.lane.max(b.lane) * width + a.lane.min(b.lane)],

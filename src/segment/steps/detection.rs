@@ -12,6 +12,7 @@
 //! - A level leaves out its largest and smallest sample, so a spike that ingest missed makes no step.
 //! - NaN samples are skipped. A level of fewer than half its samples does not exist, and neither does
 //!   a step there.
+#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use super::step::{SignalSteps, Step, Steps};
 use crate::flight::Record;
@@ -19,6 +20,7 @@ use crate::numerics::series::differences::white_noise;
 use crate::numerics::statistics::order_statistics::{
     SIGMA_PER_MAD, lower_quantile_in_place, upper_median_in_place,
 };
+use crate::numerics::vectors::simd::vectorised;
 use crate::segment::settings::Settings;
 
 /// Share of a recording that is the maneuver in which its inputs rest.
@@ -220,7 +222,13 @@ fn large_changes(
     // Few parts contain one. Without an early exit, for the vectors.
     let with_large = parts.enumerate().filter(move |(_, (before, after))| {
         let changes = before.iter().zip(*after);
-        pulp::Arch::new().dispatch(|| changes.fold(false, |any, (b, a)| any | is_large(*b, *a)))
+        vectorised(
+            #[inline(always)]
+            || {
+                let changes = changes.clone();
+                changes.fold(false, |any, (b, a)| any | is_large(*b, *a))
+            },
+        )
     });
     with_large.flat_map(move |(part, (before, after))| {
         let first = part * LOOKED_AT_ONCE + lengths.reach();
@@ -306,17 +314,19 @@ fn levels(values: &[f64], length: usize) -> Vec<f64> {
     // Samples of the last levels, and missing ones up to a full side.
     let mut last = values[count / SIDE * SIDE..].to_vec();
     last.resize(SIDE + length - 1, f64::NAN);
-    pulp::Arch::new().dispatch(|| {
-        let side_by_side = values.windows(SIDE + length - 1).step_by(SIDE);
-        for samples in side_by_side.take(count / SIDE).chain([&last[..]]) {
-            levels.extend(average_levels(samples, length));
-        }
-    });
+    vectorised(
+        #[inline(always)]
+        || {
+            let side_by_side = values.windows(SIDE + length - 1).step_by(SIDE);
+            for samples in side_by_side.take(count / SIDE).chain([&last[..]]) {
+                levels.extend_from_slice(&average_levels(samples, length));
+            }
+        },
+    );
     levels.truncate(count);
     levels
 }
 
-#[expect(clippy::inline_always, reason = "compiled for each width of vectors")]
 #[inline(always)]
 fn average_levels(samples: &[f64], length: usize) -> [f64; SIDE] {
     let (mut known, mut sum) = ([0.0; SIDE], [0.0; SIDE]);
