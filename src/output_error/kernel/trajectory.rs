@@ -13,7 +13,7 @@ use nalgebra::SVector;
 
 use super::chunk::ChunkBuildUp;
 use crate::dynamics::{COEFFICIENTS, Equations, Rates};
-use crate::numerics::runge_kutta::{POINT, STAGES, reaches_s, weights_s};
+use crate::numerics::runge_kutta::{self, POINT, STAGES, reaches_s, weights_s};
 use crate::numerics::vectors::row_products::Interleaved;
 use crate::numerics::vectors::simd::VECTOR;
 use crate::output_error::case::Case;
@@ -67,6 +67,7 @@ pub(crate) struct Trajectory<'a, const NX: usize, E: Equations<NX>> {
     sample: usize,
     stage: usize,
     end: usize,
+    step_s: f64,
     reaches_s: [f64; STAGES],
     weights_s: [f64; STAGES],
 }
@@ -96,6 +97,7 @@ impl<'a, const NX: usize, E: Equations<NX>> Trajectory<'a, NX, E> {
             sample: 0,
             stage: 0,
             end: samples,
+            step_s,
             reaches_s: reaches_s(step_s),
             weights_s: weights_s(step_s),
         }
@@ -105,14 +107,12 @@ impl<'a, const NX: usize, E: Equations<NX>> Trajectory<'a, NX, E> {
     /// its end.
     #[inline(always)]
     pub fn step_from(&mut self, x: SVector<f64, NX>) -> SVector<f64, NX> {
-        let (mut at, mut next) = (x, x);
-        for stage in 0..STAGES {
-            let rates = self.stages.take(self.sample, stage, &at);
-            for i in 0..NX {
-                next[i] = rates[i].mul_add(self.weights_s[stage], next[i]);
-                at[i] = rates[i].mul_add(self.reaches_s[stage], x[i]);
-            }
-        }
+        let next = step(
+            &x,
+            self.step_s,
+            #[inline(always)]
+            |stage, at| self.stages.take(self.sample, stage, at),
+        );
         self.stages.history.states[self.sample] = x;
         self.sample += 1;
         next
@@ -122,15 +122,12 @@ impl<'a, const NX: usize, E: Equations<NX>> Trajectory<'a, NX, E> {
     /// nothing.
     #[inline(always)]
     pub fn state_after(&self, k: usize, x: SVector<f64, NX>) -> SVector<f64, NX> {
-        let (mut at, mut next) = (x, x);
-        for (stage, place) in POINT.into_iter().enumerate() {
-            let rates = self.stages.rates(2 * k + place, &at).rates;
-            for i in 0..NX {
-                next[i] = rates[i].mul_add(self.weights_s[stage], next[i]);
-                at[i] = rates[i].mul_add(self.reaches_s[stage], x[i]);
-            }
-        }
-        next
+        step(
+            &x,
+            self.step_s,
+            #[inline(always)]
+            |stage, at| self.stages.rates(2 * k + POINT[stage], at).rates,
+        )
     }
 
     /// Integrates to the end of the chunk and returns the state there.
@@ -170,6 +167,28 @@ impl<const NX: usize, E: Equations<NX>> Interleaved for Trajectory<'_, NX, E> {
             (self.stage, self.sample) = (0, sample + 1);
         }
     }
+}
+
+/// State a step after `x`; `rates` returns the rates at a stage and a state.
+#[inline(always)]
+fn step<const NX: usize>(
+    x: &SVector<f64, NX>,
+    step_s: f64,
+    rates: impl FnMut(usize, &SVector<f64, NX>) -> SVector<f64, NX>,
+) -> SVector<f64, NX> {
+    runge_kutta::step(
+        x,
+        step_s,
+        rates,
+        #[inline(always)]
+        |x, rates, time_s| {
+            let mut later = *x;
+            for i in 0..NX {
+                later[i] = rates[i].mul_add(time_s, x[i]);
+            }
+            later
+        },
+    )
 }
 
 /// Stages of the steps of a chunk.
