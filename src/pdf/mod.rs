@@ -33,16 +33,17 @@
 //! …)`), with the attributes `fill`, `stroke`, `stroke-width`, `stroke-dasharray`, `opacity`,
 //! `fill-opacity`, `font-size`, `font-weight` and `text-anchor`.
 //!
-//! In the order of use: `fonts`, `svg` and `svg_path` (drawings as operators), `item` (what pages
-//! are filled with), `elements` (questions about an element), `inline_text` and `table`, `blocks`
-//! (elements as items), `pagination` (items on pages), `page_content` (a page as operators),
-//! `writer` (the objects of the file).
+//! In the order of use: `fonts`, `operand` (numbers and colours), `svg` and `svg_path` (drawings as
+//! operators), `item` (what pages are filled with), `elements` (questions about an element),
+//! `inline_text` and `table`, `blocks` (elements as items), `pagination` (items on pages),
+//! `page_content` (a page as operators), `writer` (the objects of the file).
 
 mod blocks;
 mod elements;
 mod fonts;
 mod inline_text;
 mod item;
+mod operand;
 mod page_content;
 mod pagination;
 mod svg;

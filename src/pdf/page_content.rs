@@ -5,9 +5,9 @@ use std::fmt::Write;
 
 use super::fonts::Fonts;
 use super::item::{Colour, PlacedMark, RULE, SOFT, Style};
+use super::operand::{Number, Rgb};
 use super::pagination::{HEIGHT, MARGIN, PagedDocument, WIDTH};
 use super::svg::Drawing;
-use super::svg_path::number;
 
 /// Operators and resources of one page.
 pub struct PageContent<'a> {
@@ -95,9 +95,9 @@ impl<'a> PageContent<'a> {
 
     fn text(&mut self, x: f32, y: f32, style: Style, text: &str) {
         let slant = if style.slanted { "0.2" } else { "0" };
-        let [x, y, size] = [x, HEIGHT - y, style.size].map(number);
+        let [x, y, size] = [x, HEIGHT - y, style.size].map(Number);
         let encoded = self.fonts.glyph_numbers(style.weight, text);
-        let (colour, font) = (rgb(style.colour), style.weight.resource());
+        let (colour, font) = (Rgb(style.colour), style.weight.resource());
         let _ = writeln!(
             self.operators,
             "{colour} rg BT /{font} {size} Tf 1 0 {slant} 1 {x} {y} Tm <{encoded}> Tj ET"
@@ -110,7 +110,7 @@ impl<'a> PageContent<'a> {
     }
 
     fn drawing(&mut self, x: f32, y: f32, scale: f32, drawing: &Drawing) {
-        let [x, y] = [x, HEIGHT - y].map(number);
+        let [x, y] = [x, HEIGHT - y].map(Number);
         // Four decimals: the scale of a drawing is multiplied by its width.
         // Writing into a String cannot fail.
         let _ = writeln!(self.operators, "q {scale:.4} 0 0 -{scale:.4} {x} {y} cm");
@@ -131,11 +131,11 @@ impl<'a> PageContent<'a> {
     }
 
     fn fill(&mut self, [x, y, width, height]: [f32; 4], colour: Colour) {
-        let [x, y, width, height] = [x, HEIGHT - y - height, width, height].map(number);
+        let [x, y, width, height] = [x, HEIGHT - y - height, width, height].map(Number);
         let _ = writeln!(
             self.operators,
             "{} rg {x} {y} {width} {height} re f",
-            rgb(colour)
+            Rgb(colour)
         );
     }
 
@@ -151,8 +151,4 @@ impl<'a> PageContent<'a> {
         let page = format!("page {number} of {pages}");
         self.text_ending_at(WIDTH - MARGIN, y, style, &page);
     }
-}
-
-fn rgb(colour: Colour) -> String {
-    colour.map(|v| number(f32::from(v) / 255.0)).join(" ")
 }

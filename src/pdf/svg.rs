@@ -8,7 +8,8 @@ use std::fmt::Write;
 use roxmltree::Node;
 
 use super::fonts::{Fonts, Weight};
-use super::svg_path::{number, path_operators};
+use super::operand::{Number, Rgb};
+use super::svg_path::path_operators;
 
 /// A drawing as operators.
 #[derive(Clone, Debug, PartialEq)]
@@ -85,17 +86,11 @@ fn colour(value: &str) -> Option<[u8; 3]> {
 fn matrix(transform: &str) -> Option<String> {
     let (name, rest) = transform.split_once('(')?;
     let by: Vec<f32> = numbers(rest.strip_suffix(')')?).collect();
-    let at = |i: usize| by.get(i).copied().map(number);
+    let at = |i: usize| by.get(i).copied().map(Number);
     let first = at(0)?;
     match name {
-        "translate" => Some(format!(
-            "1 0 0 1 {first} {}",
-            at(1).unwrap_or("0".to_owned())
-        )),
-        "scale" => Some(format!(
-            "{first} 0 0 {} 0 0",
-            at(1).unwrap_or(first.clone())
-        )),
+        "translate" => Some(format!("1 0 0 1 {first} {}", at(1).unwrap_or(Number(0.0)))),
+        "scale" => Some(format!("{first} 0 0 {} 0 0", at(1).unwrap_or(first))),
         _ => None,
     }
 }
@@ -104,7 +99,7 @@ fn dashes(value: &str) -> String {
     let numbers: Vec<f32> = numbers(value).collect();
     numbers
         .iter()
-        .map(|n| number(*n))
+        .map(|n| Number(*n).to_string())
         .collect::<Vec<_>>()
         .join(" ")
 }
@@ -201,7 +196,7 @@ impl SvgReader<'_> {
                 self.paint(&outline, style);
             }
             "line" => {
-                let [x1, y1, x2, y2] = ["x1", "y1", "x2", "y2"].map(|name| number(of(name)));
+                let [x1, y1, x2, y2] = ["x1", "y1", "x2", "y2"].map(|name| Number(of(name)));
                 self.paint(
                     &format!("{x1} {y1} m {x2} {y2} l"),
                     &Style {
@@ -268,7 +263,7 @@ impl SvgReader<'_> {
             ("width", self.size[0]),
             ("height", self.size[1]),
         ];
-        let [x, y, width, height] = sides.map(|(name, whole)| number(of(name, whole)));
+        let [x, y, width, height] = sides.map(|(name, whole)| Number(of(name, whole)));
         format!("{x} {y} {width} {height} re")
     }
 
@@ -287,18 +282,17 @@ impl SvgReader<'_> {
     }
 
     fn state(&mut self, style: &Style) {
-        let rgb = |c: [u8; 3]| c.map(|v| number(f32::from(v) / 255.0)).join(" ");
         let mut state = format!("/A{} gs\n", style.opacity);
         self.opacities.insert(style.opacity);
         if let Some(fill) = style.fill {
-            let _ = writeln!(state, "{} rg", rgb(fill));
+            let _ = writeln!(state, "{} rg", Rgb(fill));
         }
         if let Some(stroke) = style.stroke {
             let _ = writeln!(
                 state,
                 "{} RG {} w [{}] 0 d",
-                rgb(stroke),
-                number(style.width),
+                Rgb(stroke),
+                Number(style.width),
                 style.dash
             );
         }
@@ -319,15 +313,15 @@ impl SvgReader<'_> {
             .attribute("transform")
             .is_some_and(|t| t.starts_with("rotate(-90"));
         let place = if is_upright {
-            format!("0 -1 -1 0 {} {}", number(x), number(y + back))
+            format!("0 -1 -1 0 {} {}", Number(x), Number(y + back))
         } else {
-            format!("1 0 0 -1 {} {}", number(x - back), number(y))
+            format!("1 0 0 -1 {} {}", Number(x - back), Number(y))
         };
         self.state(&Style {
             stroke: None,
             ..style.clone()
         });
-        let (font, size) = (style.weight.resource(), number(style.size));
+        let (font, size) = (style.weight.resource(), Number(style.size));
         let encoded = self.fonts.glyph_numbers(style.weight, &text);
         let _ = writeln!(
             self.out,

@@ -10,6 +10,9 @@ use ttf_parser::Face;
 const REGULAR: &[u8] = include_bytes!("Arimo-Regular.ttf");
 const BOLD: &[u8] = include_bytes!("Arimo-Bold.ttf");
 
+/// Hexadecimal digits.
+const DIGITS: &[u8; 16] = b"0123456789abcdef";
+
 /// Weight of a text.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Weight {
@@ -78,12 +81,14 @@ impl Fonts {
     /// Numbers of a text's glyphs, hexadecimal.
     pub fn glyph_numbers(&self, weight: Weight, text: &str) -> String {
         let face = self.face(weight);
-        let digits = |c: char| {
-            let glyph = u32::from(face.glyph(c).0);
-            let digit = move |shift: u32| char::from_digit((glyph >> shift) & 0xf, 16);
-            [12, 8, 4, 0].into_iter().filter_map(digit)
-        };
-        text.chars().flat_map(digits).collect()
+        let mut digits = String::with_capacity(4 * text.len());
+        for c in text.chars() {
+            let (glyph, _) = face.glyph(c);
+            for shift in [12, 8, 4, 0] {
+                digits.push(char::from(DIGITS[usize::from(glyph >> shift) % 16]));
+            }
+        }
+        digits
     }
 
     /// Writes a face as five objects from `first` on.
