@@ -183,12 +183,9 @@ impl Conditioner {
         let Some(unwrapper) = &mut self.unwrapper else {
             let values = &mut self.values;
             vectorised(
+                // `move` for a copy of the conversion, which no written value can change.
                 #[inline(always)]
-                || {
-                    // A copy, which no written value can change.
-                    let convert = converted;
-                    values.extend(recorded.iter().map(|v| convert(*v)));
-                },
+                move || values.extend(recorded.iter().map(|v| converted(*v))),
             );
             return;
         };
