@@ -333,13 +333,12 @@ impl JudgedFlight<'_> {
     /// paired at random.
     fn level_rows(&self, axes: &[AxisAnalysis], specification: &Specification) -> Vec<LevelRow> {
         let draws = axes.iter().map(|a| a.draws.len()).min().unwrap_or(0);
-        let mean = levels_of(
-            specification,
-            &all_values(axes.iter().map(AxisAnalysis::values)),
-        );
+        let means: Vec<BTreeMap<FlyingQuality, f64>> =
+            axes.iter().map(AxisAnalysis::values).collect();
+        let mean = levels_of(specification, &all_values(&means));
         let mut counts = vec![[0_usize; 4]; mean.len()];
         for draw in 0..draws {
-            let values = all_values(axes.iter().map(|a| a.draws[draw].clone()));
+            let values = all_values(axes.iter().map(|a| &a.draws[draw]));
             for (counts, level) in counts.iter_mut().zip(levels_of(specification, &values)) {
                 counts[level as usize] += 1;
             }
@@ -367,10 +366,13 @@ impl JudgedFlight<'_> {
     }
 }
 
-fn all_values(
-    axes: impl Iterator<Item = BTreeMap<FlyingQuality, f64>>,
+fn all_values<'a>(
+    axes: impl IntoIterator<Item = &'a BTreeMap<FlyingQuality, f64>>,
 ) -> Vec<(FlyingQuality, f64)> {
-    axes.flatten().collect()
+    let values = axes.into_iter().flatten();
+    values
+        .map(|(quantity, value)| (*quantity, *value))
+        .collect()
 }
 
 /// Level of each requirement, then the worst level.
