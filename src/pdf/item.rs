@@ -5,10 +5,8 @@
 use std::sync::Arc;
 
 use super::fonts::Weight;
+use super::operand::Colour;
 use super::svg::Drawing;
-
-/// Red, green and blue.
-pub type Colour = [u8; 3];
 
 pub const INK: Colour = [22, 24, 28];
 pub const SOFT: Colour = [85, 91, 102];

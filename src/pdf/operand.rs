@@ -2,7 +2,8 @@
 
 use std::fmt::{Display, Formatter, Result, Write};
 
-use super::item::Colour;
+/// Red, green and blue.
+pub type Colour = [u8; 3];
 
 /// A number with at most two decimals, as short as possible.
 #[derive(Clone, Copy)]
@@ -67,7 +68,7 @@ fn decimal(hundredths: i64, characters: &mut [u8; LONGEST]) -> &str {
     str::from_utf8(&characters[first..]).unwrap_or_default()
 }
 
-/// Red, green and blue of a colour.
+/// A colour as three numbers from 0 to 1.
 pub struct Rgb(pub Colour);
 
 impl Display for Rgb {

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use super::fonts::Fonts;
-use super::item::{Colour, PlacedMark, RULE, SOFT, Style};
-use super::operand::{Number, Rgb};
+use super::item::{PlacedMark, RULE, SOFT, Style};
+use super::operand::{Colour, Number, Rgb};
 use super::pagination::{HEIGHT, MARGIN, PagedDocument, WIDTH};
 use super::svg::Drawing;
 

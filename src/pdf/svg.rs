@@ -8,7 +8,7 @@ use std::fmt::Write;
 use roxmltree::Node;
 
 use super::fonts::{Fonts, Weight};
-use super::operand::{Number, Rgb};
+use super::operand::{Colour, Number, Rgb};
 use super::svg_path::path_operators;
 
 /// A drawing as operators.
@@ -24,8 +24,8 @@ pub struct Drawing {
 /// Inherited attributes.
 #[derive(Clone, Debug, PartialEq)]
 struct Style {
-    fill: Option<[u8; 3]>,
-    stroke: Option<[u8; 3]>,
+    fill: Option<Colour>,
+    stroke: Option<Colour>,
     width: f32,
     dash: String,
     opacity: u8,
@@ -69,7 +69,7 @@ impl Style {
 }
 
 /// Colour of an attribute; `None` for `none`, black for an unsupported notation.
-fn colour(value: &str) -> Option<[u8; 3]> {
+fn colour(value: &str) -> Option<Colour> {
     let hex = |digits: &str| u8::from_str_radix(digits, 16).unwrap_or(0);
     match value.strip_prefix('#') {
         Some(d) if d.len() == 6 && d.is_ascii() => {

@@ -10,7 +10,8 @@ use roxmltree::Node;
 use super::elements::{has_class, is_screen_only};
 use super::fonts::Fonts;
 use super::inline_text::{InlineReader, LineLayout, Word, lines, widths};
-use super::item::{Colour, INK, Item, PlacedMark, RULE, Style};
+use super::item::{INK, Item, PlacedMark, RULE, Style};
+use super::operand::Colour;
 
 /// Sizes of type, tried in turn, pt.
 const SIZES: [f32; 5] = [7.5, 7.0, 6.5, 6.0, 5.5];
