@@ -12,7 +12,7 @@ use super::quantities::AxisQuantities;
 use super::specification::Specification;
 use super::trim::Trim;
 use crate::aero::Axis;
-use crate::model::LocalPosterior;
+use crate::model::{LocalPosterior, Model};
 use crate::numerics::dual::Dual;
 use crate::numerics::linear_algebra::root::continuous_root;
 use crate::numerics::statistics::normal::NORMAL_95;
@@ -23,8 +23,7 @@ use crate::tables::{
 };
 use crate::units::DEG;
 
-/// Seed of the draws. All angles of attack use the same random numbers, so that probabilities vary
-/// as smoothly over α as the posterior.
+/// Seed of the draws.
 const SEED: u64 = 21;
 
 /// Share of draws with another pattern of modes, above which the standard deviation is taken from
@@ -53,6 +52,40 @@ pub struct Analysis {
     pub roots: Vec<RootRow>,
 }
 
+/// Standard normal deviates of the draws of each axis. All angles of attack share them, so that
+/// probabilities vary as smoothly over α as the posterior.
+#[derive(Clone, Debug)]
+pub struct SharedDraws {
+    longitudinal: Vec<DVector<f64>>,
+    lateral: Vec<DVector<f64>>,
+}
+
+impl SharedDraws {
+    #[must_use]
+    pub fn new(model: &Model, draws: usize) -> SharedDraws {
+        let of = |axis: Axis| standard_draws(axis, model.local_values(axis), draws);
+        SharedDraws {
+            longitudinal: of(Axis::Longitudinal),
+            lateral: of(Axis::Lateral),
+        }
+    }
+
+    fn of_axis(&self, axis: Axis) -> &[DVector<f64>] {
+        match axis {
+            Axis::Longitudinal => &self.longitudinal,
+            Axis::Lateral => &self.lateral,
+        }
+    }
+}
+
+/// Draws of independent standard normal deviates, one for each of an axis's values.
+#[must_use]
+pub fn standard_draws(axis: Axis, values: usize, draws: usize) -> Vec<DVector<f64>> {
+    let mut stream = RandomStream::new(SEED, axis.name());
+    let draw = |_| DVector::from_fn(values, |_, _| stream.normal());
+    (0..draws).map(draw).collect()
+}
+
 /// An axis at one angle of attack, at the mean of the posterior and at draws from it.
 #[derive(Clone, Debug)]
 pub struct AxisAnalysis {
@@ -66,19 +99,19 @@ pub struct AxisAnalysis {
 }
 
 impl AxisAnalysis {
-    /// Analyses linear equations over a posterior; `None` if it is not finite.
+    /// Analyses linear equations over a posterior, with [`standard_draws`]; `None` if the posterior is
+    /// not finite.
     #[must_use]
     pub fn of(
         axis: Axis,
         linear: &LinearModel,
         posterior: &LocalPosterior,
-        draws: usize,
+        draws: &[DVector<f64>],
     ) -> Option<AxisAnalysis> {
         let mean = linear.quantities(axis, &posterior.mean, Differentiation::Slopes)?;
         let root = continuous_root(&posterior.covariance);
-        let mut stream = RandomStream::new(SEED, axis.name());
-        let drawn = (0..draws).map(|_| {
-            let values = &posterior.mean + stream.deviations(&root);
+        let drawn = draws.iter().map(|deviates| {
+            let values = &posterior.mean + &root * deviates;
             linear.quantities(axis, &values, Differentiation::ValuesAlone)
         });
         let drawn: Vec<Option<AxisQuantities>> = drawn.collect();
@@ -233,11 +266,16 @@ impl Drawn {
 impl Analysis {
     /// Analyses an airframe in steady flight; `None` if the posterior is not finite.
     #[must_use]
-    pub fn of(basis: &JudgedAircraft, airframe: Airframe, trim: &Trim) -> Option<Analysis> {
+    pub fn of(
+        basis: &JudgedAircraft,
+        draws: &SharedDraws,
+        airframe: Airframe,
+        trim: &Trim,
+    ) -> Option<Analysis> {
         let specification = basis.specification;
         let of_axis = |axis: Axis| {
             let (linear, posterior) = linearised(basis, airframe, trim, axis);
-            AxisAnalysis::of(axis, &linear, &posterior, specification.draws)
+            AxisAnalysis::of(axis, &linear, &posterior, draws.of_axis(axis))
         };
         let axes = [Axis::Longitudinal, Axis::Lateral].map(of_axis);
         let axes: Vec<AxisAnalysis> = axes.into_iter().flatten().collect();

@@ -31,7 +31,7 @@ use crate::aero::Axis;
 use crate::maneuver::{Maneuver, Means};
 use crate::model::Model;
 use crate::tables::{LevelRow, QualityRow, RootRow};
-use analysis::Analysis;
+use analysis::{Analysis, SharedDraws};
 
 pub use judged_aircraft::JudgedAircraft;
 pub use judged_quantity::judged_quantity;
@@ -72,6 +72,7 @@ pub struct Qualities {
 pub fn qualities(basis: &JudgedAircraft, flown: &[(&Maneuver, &Means)]) -> Qualities {
     let conditions = FlownConditions::new(flown, basis.tunnel);
     let alphas = angles_deg(basis.model);
+    let draws = SharedDraws::new(basis.model, basis.specification.draws);
     let analyses: Vec<Analysis> = basis
         .specification
         .airframes()
@@ -81,7 +82,7 @@ pub fn qualities(basis: &JudgedAircraft, flown: &[(&Maneuver, &Means)]) -> Quali
         .into_par_iter()
         .filter_map(|(airframe, alpha)| {
             let trim = conditions.trim(alpha, basis.aircraft)?;
-            Analysis::of(basis, airframe, &trim)
+            Analysis::of(basis, &draws, airframe, &trim)
         })
         .collect();
     let mut found = Qualities::default();

@@ -42,6 +42,13 @@ pub struct LocalPosterior {
 }
 
 impl Model {
+    /// Number of values of an axis's posterior at each flight condition.
+    #[must_use]
+    pub fn local_values(&self, axis: Axis) -> usize {
+        let of_axis = self.coefficients.iter().filter(|(c, _)| c.axis() == axis);
+        of_axis.map(|(_, posterior)| posterior.local_values()).sum()
+    }
+
     /// Posterior of an axis's derivatives at a flight condition, and of their slopes along Mach number
     /// where the tunnel's tables depend on it. Coefficients are independent of each other.
     #[must_use]
@@ -73,6 +80,13 @@ impl Model {
 }
 
 impl CoefficientPosterior {
+    /// Number of values at each condition.
+    fn local_values(&self) -> usize {
+        let has_machs = |term: &PosteriorTerm| !term.prior.grid.machs.is_empty();
+        let slopes = self.terms.iter().filter(|term| has_machs(term)).count();
+        self.terms.len() + slopes
+    }
+
     fn coefficient_at_condition(
         &self,
         coefficient: Coefficient,

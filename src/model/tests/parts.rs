@@ -4,8 +4,8 @@ use approx::assert_relative_eq;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::fixture::{Flown, NAMES, aero_model, diagonal, exact, maneuver, posterior, tunnel};
-use crate::aero::wind_tunnel::{self, Third};
-use crate::aero::{Coefficient, Condition, WindTunnel};
+use crate::aero::wind_tunnel::{self, Third, TunnelPoint};
+use crate::aero::{Axis, Coefficient, Condition, WindTunnel};
 use crate::maneuver::Maneuver;
 use crate::model::fusion::coefficient::Data;
 use crate::model::fusion::observed_differences::ObservedDifferences;
@@ -369,6 +369,34 @@ fn between_the_points_the_prior_s_variance_is_kept() {
         expected,
         max_relative = 1e-9
     );
+}
+
+#[test]
+fn each_condition_has_the_same_number_of_local_values() {
+    let mut at_two_machs = tunnel(None);
+    for (mach, value) in [(0.2, 4.0), (0.8, 6.0)] {
+        let point = TunnelPoint {
+            mach: Some(mach),
+            ..TunnelPoint::new(10.0, value)
+        };
+        at_two_machs.insert("CN_q", point);
+    }
+    let values = [tunnel(None), at_two_machs].map(|tunnel| {
+        let model = posterior(&campaign(), &tunnel, &exact());
+        let values = model.local_values(Axis::Longitudinal);
+        for alpha_deg in [-5.0, 17.0, 50.0] {
+            let condition = Condition {
+                alpha_deg,
+                mach: 0.3,
+                third: None,
+            };
+            let local = model.posterior_at_condition(Axis::Longitudinal, &condition);
+            assert_eq!(local.values.len(), values);
+            assert_eq!(local.mean.len(), values);
+        }
+        values
+    });
+    assert_eq!(values[1], values[0] + 1);
 }
 
 #[test]

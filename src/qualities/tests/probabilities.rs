@@ -12,7 +12,7 @@ use crate::numerics::dual::Dual;
 use crate::numerics::linear_algebra::root::{EXACT, root};
 use crate::numerics::statistics::forecasts::reliability;
 use crate::numerics::statistics::random::RandomStream;
-use crate::qualities::analysis::{AxisAnalysis, Drawn};
+use crate::qualities::analysis::{AxisAnalysis, Drawn, standard_draws};
 use crate::qualities::levels::level;
 use crate::qualities::linear::Differentiation;
 use crate::tables::{DeviationBasis, FlyingQuality, Level};
@@ -58,7 +58,7 @@ fn the_95_percent_intervals_of_all_quantities_hold_in_1000_campaigns() {
                 mean: drawn(&truth.mean, &root, &mut stream),
                 ..truth.clone()
             };
-            let found = AxisAnalysis::of(axis, &linear, &estimated, 0).unwrap();
+            let found = AxisAnalysis::of(axis, &linear, &estimated, &[]).unwrap();
             for (quantity, dual) in &found.mean.quantities {
                 let uncertainty = found.uncertainty(*quantity, dual);
                 let holds = (uncertainty.lower..=uncertainty.upper).contains(&of_truth[quantity]);
@@ -78,7 +78,8 @@ fn the_95_percent_intervals_of_all_quantities_hold_in_1000_campaigns() {
 fn modes_that_coalesce_have_the_standard_deviation_of_draws() {
     let axis = Axis::Lateral;
     let sure = posterior(axis, 0.01);
-    let found = AxisAnalysis::of(axis, &linear(axis, &sure), &sure, 400).unwrap();
+    let draws = standard_draws(axis, sure.values.len(), 400);
+    let found = AxisAnalysis::of(axis, &linear(axis, &sure), &sure, &draws).unwrap();
     let basis = |found: &AxisAnalysis| {
         let (quantity, dual) = &found.mean.quantities[0];
         found.uncertainty(*quantity, dual)
@@ -93,7 +94,7 @@ fn modes_that_coalesce_have_the_standard_deviation_of_draws() {
         .unwrap();
     unsure.mean[place] = -0.0002;
     unsure.covariance[(place, place)] = 0.0006 * 0.0006;
-    let found = AxisAnalysis::of(axis, &linear(axis, &unsure), &unsure, 400).unwrap();
+    let found = AxisAnalysis::of(axis, &linear(axis, &unsure), &unsure, &draws).unwrap();
     assert!(found.coalesced > 0.05, "{}", found.coalesced);
     let drawn = basis(&found);
     assert_eq!(drawn.basis, DeviationBasis::Draws);
@@ -194,7 +195,8 @@ fn control_anticipation_beside_a_load_factor_of_zero_has_the_interval_of_its_dis
     };
     unsure.mean[place] = mean;
     unsure.covariance[(place, place)] = deviation * deviation;
-    let found = AxisAnalysis::of(axis, &linear, &unsure, 20_000).unwrap();
+    let draws = standard_draws(axis, unsure.values.len(), 20_000);
+    let found = AxisAnalysis::of(axis, &linear, &unsure, &draws).unwrap();
     let mut quantities = found.mean.quantities.iter();
     let (_, dual) = quantities.find(|(q, _)| *q == quantity).unwrap();
     let own = found.uncertainty(quantity, dual);
@@ -222,6 +224,7 @@ fn the_probability_of_level_1_comes_true() {
     // Estimates as sure as half of the prior: the posterior is their mean.
     let posterior_covariance = &prior.covariance * 0.2;
     let noise_root = root(&(&prior.covariance * 0.25), EXACT);
+    let draws = standard_draws(axis, prior.values.len(), 200);
     let mut stream = RandomStream::new(11, "forecasts");
     let level_1 =
         |values: &[(FlyingQuality, f64)]| level(&specification, &damping, values) == Level::One;
@@ -234,7 +237,7 @@ fn the_probability_of_level_1_comes_true() {
             covariance: posterior_covariance.clone(),
             values: prior.values.clone(),
         };
-        let found = AxisAnalysis::of(axis, &linear, &estimated, 200).unwrap();
+        let found = AxisAnalysis::of(axis, &linear, &estimated, &draws).unwrap();
         let is_level_1 = |draw: &&BTreeMap<FlyingQuality, f64>| {
             level_1(&draw.iter().map(|(q, v)| (*q, *v)).collect::<Vec<_>>())
         };
