@@ -43,6 +43,12 @@ impl Grid {
         }
     }
 
+    /// `true` if the values depend on Mach number.
+    #[must_use]
+    pub fn depends_on_mach(&self) -> bool {
+        !self.machs.is_empty()
+    }
+
     #[must_use]
     pub fn len(&self) -> usize {
         self.alphas_deg.len() * self.machs.len().max(1) * self.thirds.len().max(1)

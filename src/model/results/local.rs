@@ -45,16 +45,16 @@ impl Model {
     /// Number of values of an axis's posterior at each flight condition.
     #[must_use]
     pub fn local_values(&self, axis: Axis) -> usize {
-        let of_axis = self.coefficients.iter().filter(|(c, _)| c.axis() == axis);
-        of_axis.map(|(_, posterior)| posterior.local_values()).sum()
+        let posteriors = self.of_axis(axis);
+        posteriors.map(|(_, own)| own.local_values()).sum()
     }
 
     /// Posterior of an axis's derivatives at a flight condition, and of their slopes along Mach number
     /// where the tunnel's tables depend on it. Coefficients are independent of each other.
     #[must_use]
     pub fn posterior_at_condition(&self, axis: Axis, condition: &Condition) -> LocalPosterior {
-        let of_axis = self.coefficients.iter().filter(|(c, _)| c.axis() == axis);
-        let parts: Vec<_> = of_axis
+        let parts: Vec<_> = self
+            .of_axis(axis)
             .map(|(coefficient, posterior)| {
                 posterior.coefficient_at_condition(*coefficient, condition)
             })
@@ -77,14 +77,19 @@ impl Model {
         }
         joined
     }
+
+    fn of_axis(&self, axis: Axis) -> impl Iterator<Item = &(Coefficient, CoefficientPosterior)> {
+        let coefficients = self.coefficients.iter();
+        coefficients.filter(move |(coefficient, _)| coefficient.axis() == axis)
+    }
 }
 
 impl CoefficientPosterior {
     /// Number of values at each condition.
     fn local_values(&self) -> usize {
-        let has_machs = |term: &PosteriorTerm| !term.prior.grid.machs.is_empty();
-        let slopes = self.terms.iter().filter(|term| has_machs(term)).count();
-        self.terms.len() + slopes
+        let terms = self.terms.iter();
+        let slopes = terms.filter(|term| term.prior.grid.depends_on_mach());
+        self.terms.len() + slopes.count()
     }
 
     fn coefficient_at_condition(
@@ -140,7 +145,7 @@ pub fn local_shares(
     if !is_mach_slope {
         return Some(grid.shares(condition));
     }
-    if grid.machs.is_empty() {
+    if !grid.depends_on_mach() {
         return None;
     }
     let per_mach = 0.5 / MACH_STEP;
