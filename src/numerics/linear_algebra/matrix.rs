@@ -58,16 +58,6 @@ impl AlignedMatrix {
         rows
     }
 
-    /// Matrix of one column.
-    pub fn from_column(values: &[f64]) -> AlignedMatrix {
-        let mut column = AlignedMatrix::zeros(values.len(), 1);
-        column
-            .rows_mut()
-            .zip(values)
-            .for_each(|(row, value)| row[0] = *value);
-        column
-    }
-
     /// Copy of a symmetric matrix.
     pub fn from_symmetric(matrix: &DMatrix<f64>) -> AlignedMatrix {
         let mut padded = AlignedMatrix::zeros(matrix.nrows(), matrix.ncols());

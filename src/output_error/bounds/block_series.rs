@@ -10,29 +10,22 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 use super::autoregression::Autoregression;
+use super::block_means::{BlockMeans, HIGHEST_ORDER};
 use crate::numerics::linear_algebra::matrix::{AlignedMatrix, LONGEST_LAG};
 use crate::output_error::case::blocks::{BlockSums, samples_per_block};
 
-/// Highest order of a process.
-pub(super) const HIGHEST_ORDER: usize = 12;
 const _: () = assert!(HIGHEST_ORDER <= LONGEST_LAG);
-/// Least number of blocks per coefficient of a process.
-const BLOCKS_PER_COEFFICIENT: usize = 10;
 
 /// One output of one maneuver in blocks of samples.
 #[derive(Clone, Debug)]
 pub struct BlockSeries {
     /// Weight of a sample in the cost.
     pub(super) weight: f64,
-    /// Number of samples in a whole block.
-    pub(super) block_length: f64,
     /// Mean residual of each block.
-    residuals: AlignedMatrix,
+    pub(crate) means: BlockMeans,
     /// Variance of the samples about their block's mean.
     pub(super) fast_variance: f64,
     pub(super) fast_degrees_of_freedom: f64,
-    /// Number of samples that count in each block.
-    pub(crate) counts: Vec<f64>,
     /// Summed sensitivities of each block.
     pub(crate) sensitivities: AlignedMatrix,
     /// Sum Σ s sᵀ over the blocks, with s the summed sensitivities of a block.
@@ -55,28 +48,25 @@ impl BlockSeries {
         mut sums_of: impl FnMut(Range<usize>, &mut [f64]) -> BlockSums,
     ) -> BlockSeries {
         let (length, parameters) = (samples_per_block(step_s), squares.nrows());
-        let (blocks, block_length) = (samples.div_ceil(length), length as f64);
-        let mut sensitivities = AlignedMatrix::zeros(blocks, parameters);
-        let (mut counts, mut residuals) = (Vec::with_capacity(blocks), Vec::with_capacity(blocks));
+        let mut sensitivities = AlignedMatrix::zeros(samples.div_ceil(length), parameters);
+        let mut means = BlockMeans::with_room(step_s, samples);
         let (mut square, mut degrees_of_freedom) = (square, 0.0);
         // Sensitivities of incomplete blocks, scaled to the excess of their means' squares.
         let mut excess = Vec::new();
         for (k, row) in sensitivities.rows_mut().enumerate() {
             let within = k * length..samples.min((k + 1) * length);
-            let BlockSums { count, residual } = sums_of(within, row);
-            let mean = residual / count.max(1.0);
-            counts.push(count);
-            residuals.push(mean);
-            square -= residual * mean;
+            let sums = sums_of(within, row);
+            let (count, mean) = (sums.count, means.push(sums));
+            square -= sums.residual * mean;
             degrees_of_freedom += (count - 1.0).max(0.0);
-            if count > 0.0 && count < block_length {
-                let factor = (1.0 / count - 1.0 / block_length).sqrt();
+            if count > 0.0 && count < means.length {
+                let factor = (1.0 / count - 1.0 / means.length).sqrt();
                 excess.extend(row.iter().map(|s| factor * s));
             }
         }
         let between = sensitivities.gram();
         let mut within = AlignedMatrix::from_symmetric(squares);
-        within.add_scaled(&between, -1.0 / block_length);
+        within.add_scaled(&between, -1.0 / means.length);
         if !excess.is_empty() {
             let excess = AlignedMatrix::from_padded_rows(&excess, parameters);
             within.add_scaled(&excess.gram(), -1.0);
@@ -84,11 +74,9 @@ impl BlockSeries {
         let fast_degrees_of_freedom = f64::max(degrees_of_freedom, 1.0);
         BlockSeries {
             weight,
-            block_length,
-            residuals: AlignedMatrix::from_column(&residuals),
+            means,
             fast_variance: square.max(0.0) / fast_degrees_of_freedom,
             fast_degrees_of_freedom,
-            counts,
             sensitivities,
             between,
             within,
@@ -99,7 +87,7 @@ impl BlockSeries {
     /// to column `places[j]`, and the other columns are zero.
     #[must_use]
     pub fn with_parameters(&self, places: &[usize], parameters: usize) -> BlockSeries {
-        let mut sensitivities = AlignedMatrix::zeros(self.blocks(), parameters);
+        let mut sensitivities = AlignedMatrix::zeros(self.means.blocks(), parameters);
         let rows = self.sensitivities.rows().zip(sensitivities.rows_mut());
         for (row, wide) in rows {
             widen_row(row, places, wide);
@@ -112,35 +100,9 @@ impl BlockSeries {
         }
     }
 
-    fn blocks(&self) -> usize {
-        self.counts.len()
-    }
-
-    /// Number of lags of the autocovariances, lag 0 included.
-    pub(super) fn lags(&self) -> usize {
-        1 + HIGHEST_ORDER.min(self.blocks() / BLOCKS_PER_COEFFICIENT)
-    }
-
-    /// Number of pairs of blocks that count, at lags 0, 1, …, at least one.
-    pub(super) fn pairs(&self) -> Vec<f64> {
-        let used: Vec<f64> = self.counts.iter().map(|count| count.min(1.0)).collect();
-        let used = AlignedMatrix::from_column(&used);
-        let pairs = used.lagged_products(&used, self.lags());
-        pairs.iter().map(|pairs| pairs.max(1.0)).collect()
-    }
-
-    /// Autocovariances of the mean residuals at lags 0, 1, …
-    pub(super) fn autocovariances(&self, pairs: &[f64]) -> Vec<f64> {
-        let sums = self.residuals.lagged_products(&self.residuals, self.lags());
-        sums.iter()
-            .zip(pairs)
-            .map(|(sum, pairs)| sum / pairs)
-            .collect()
-    }
-
     /// Filters rows of the blocks by a process, until the filter has decayed.
     pub(super) fn filtered(&self, rows: &AlignedMatrix, process: &Autoregression) -> AlignedMatrix {
-        let mut filtered = rows.with_zero_rows(process.memory(self.blocks()));
+        let mut filtered = rows.with_zero_rows(process.memory(self.means.blocks()));
         filtered.filter_columns(&process.coefficients);
         filtered
     }
@@ -153,8 +115,8 @@ impl BlockSeries {
         process: &Autoregression,
     ) -> AlignedMatrix {
         filtered.filter_columns_backwards(&process.coefficients);
-        filtered.truncate(self.blocks());
-        for (row, count) in filtered.rows_mut().zip(&self.counts) {
+        filtered.truncate(self.means.blocks());
+        for (row, count) in filtered.rows_mut().zip(&self.means.counts) {
             if *count <= 0.0 {
                 row.fill(0.0);
             }

@@ -32,16 +32,16 @@
 //! R C Sᵀ is S H⁻¹ Sᵀ times a number, and nothing is filtered. White noise that has settled is not
 //! computed again while other outputs are iterated.
 
-use std::ops::Range;
-
 use nalgebra::DMatrix;
 
 use super::autoregression::Autoregression;
-use super::block_series::{BlockSeries, HIGHEST_ORDER};
+use super::block_means::{BlockMeans, HIGHEST_ORDER};
+use super::block_series::BlockSeries;
 use super::degrees_of_freedom::{ColouredPart, VarianceEstimates};
 use crate::numerics::linear_algebra::matrix::AlignedMatrix;
+use crate::numerics::series::lagged_products::lagged_products;
 use crate::numerics::statistics::student;
-use crate::output_error::case::blocks::BlockSums;
+use crate::output_error::case::blocks::{BlockSums, samples_per_block};
 
 /// Largest number of rounds in which the absorbed part is added back.
 const MOST_ROUNDS: usize = 30;
@@ -118,12 +118,13 @@ pub fn residual_noise(inverse: &DMatrix<f64>, outputs: &[BlockSeries]) -> Residu
 pub fn slow_noise_level(values: &[f64], step_s: f64) -> f64 {
     let counted = || values.iter().filter(|v| v.is_finite());
     let square = counted().map(|v| v * v).sum::<f64>();
-    let sums_of = |samples: Range<usize>, _: &mut [f64]| finite_sums(&values[samples]);
-    let no_parameter = DMatrix::zeros(1, 1);
-    let series = BlockSeries::new(step_s, 1.0, values.len(), square, &no_parameter, sums_of);
-    let pairs = series.pairs();
-    let slow = Autoregression::fitted(&series.autocovariances(&pairs), pairs[0]);
-    let level = slow.long_run_variance() * series.block_length;
+    let mut means = BlockMeans::with_room(step_s, values.len());
+    for block in values.chunks(samples_per_block(step_s)) {
+        means.push(finite_sums(block));
+    }
+    let pairs = means.pairs();
+    let slow = Autoregression::fitted(&means.autocovariances(&pairs), pairs[0]);
+    let level = slow.long_run_variance() * means.length;
     level.max(square / (counted().count() as f64).max(1.0))
 }
 
@@ -136,12 +137,8 @@ pub fn likelihood_gain(values: &[f64]) -> f64 {
         .map(|v| if v.is_finite() { *v } else { 0.0 })
         .collect();
     let counts: Vec<f64> = values.iter().map(|v| f64::from(v.is_finite())).collect();
-    let products = |values: &[f64]| {
-        let column = AlignedMatrix::from_column(values);
-        column.lagged_products(&column, 1 + HIGHEST_ORDER)
-    };
-    let pairs = products(&counts);
-    let sums = products(&finite);
+    let pairs = lagged_products(&counts, 1 + HIGHEST_ORDER);
+    let sums = lagged_products(&finite, 1 + HIGHEST_ORDER);
     let autocovariances: Vec<f64> = sums
         .iter()
         .zip(&pairs)
@@ -245,8 +242,8 @@ impl<'a> NoiseIteration<'a> {
         let square = series.weight.powi(2);
         let by_white = inverse.sandwich(&series.between).scaled_by(square);
         let by_fast = inverse.sandwich(&series.within);
-        let pairs = series.pairs();
-        let observed = series.autocovariances(&pairs);
+        let pairs = series.means.pairs();
+        let observed = series.means.autocovariances(&pairs);
         let mut iteration = NoiseIteration {
             series,
             inverse,
@@ -296,7 +293,7 @@ impl<'a> NoiseIteration<'a> {
     /// residuals keep most is solved for directly, so only other outputs can change its variance
     /// later.
     fn iterate(&mut self, covariance: &AlignedMatrix) {
-        let (pairs, length) = (self.pairs[0], self.series.block_length);
+        let (pairs, length) = (self.pairs[0], self.series.means.length);
         let absorbed_variance = covariance.dot(&self.series.between) / (length * length * pairs);
         let change = (absorbed_variance - self.absorbed_variance).abs();
         if self.settled && change <= UNCHANGED * self.variance && self.slow.is_white() {
@@ -325,8 +322,8 @@ impl<'a> NoiseIteration<'a> {
     /// With X = R C − ½ S K the part is X Sᵀ + S Xᵀ. For white noise R is a number, and the two
     /// products are equal.
     fn absorbed_autocovariance(&mut self, covariance: &AlignedMatrix) -> Vec<f64> {
-        let (series, lags) = (self.series, self.series.lags());
-        let (sums, length) = (&series.sensitivities, series.block_length);
+        let (series, lags) = (self.series, self.series.means.lags());
+        let (sums, length) = (&series.sensitivities, series.means.length);
         let factor = self.slow.innovation / length;
         let mut inner = covariance.clone().scaled_by(-0.5 / (length * length));
         if let Some(mut x) = self.process_times_changes.take() {
@@ -352,7 +349,7 @@ impl<'a> NoiseIteration<'a> {
             series.fast_degrees_of_freedom,
         );
         let absorbed_blocks =
-            series.weight / series.block_length * self.inverse.dot(&series.between);
+            series.weight / series.means.length * self.inverse.dot(&series.between);
         let degrees_of_freedom = self.pairs[0] - absorbed_blocks;
         match &self.changes {
             Some(changes) if !self.slow.is_white() => estimates.add_coloured(&ColouredPart {

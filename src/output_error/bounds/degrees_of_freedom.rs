@@ -146,7 +146,10 @@ mod tests {
 
     /// Variance of a mean, with its degrees of freedom.
     fn variance_of_mean(noise: &Autoregression, values: usize) -> (f64, f64) {
-        let changes = AlignedMatrix::from_column(&vec![1.0 / values as f64; values]);
+        let mut changes = AlignedMatrix::zeros(values, 1);
+        changes
+            .rows_mut()
+            .for_each(|row| row[0] = 1.0 / values as f64);
         let mut filtered = changes.with_zero_rows(noise.memory(values));
         filtered.filter_columns(&noise.coefficients);
         let mut estimates = VarianceEstimates::zero(1);

@@ -108,7 +108,7 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Adjoint<'_, NX, E> {
             // root of their number.
             let mut share = [0.0; OUTPUTS];
             for (share, series) in share.iter_mut().zip(self.series) {
-                *share = 1.0 / (series.counts[b].max(1.0) * samples as f64).sqrt();
+                *share = 1.0 / (series.means.counts[b].max(1.0) * samples as f64).sqrt();
             }
             let root_of_samples = (samples as f64).sqrt();
             let row = b % CHUNK * COEFFICIENTS * width;

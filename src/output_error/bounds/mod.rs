@@ -3,6 +3,7 @@
 //! ([`consider`]).
 
 mod autoregression;
+pub(crate) mod block_means;
 pub(crate) mod block_series;
 pub mod bounded;
 pub mod calibration_errors;
