@@ -6,6 +6,9 @@
 //! The process is fitted to autocovariances by the recursion of Levinson and Durbin. Its order has
 //! the least information criterion (Akaike's, corrected for few samples). White noise has order 0.
 
+/// Highest order of a process.
+pub(super) const HIGHEST_ORDER: usize = 12;
+
 /// Autoregressive process.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Autoregression {

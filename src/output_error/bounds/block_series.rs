@@ -9,8 +9,8 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
-use super::autoregression::Autoregression;
-use super::block_means::{BlockMeans, HIGHEST_ORDER};
+use super::autoregression::{Autoregression, HIGHEST_ORDER};
+use super::residual_means::ResidualMeans;
 use crate::numerics::linear_algebra::matrix::{AlignedMatrix, LONGEST_LAG};
 use crate::output_error::case::blocks::{BlockSums, samples_per_block};
 
@@ -22,7 +22,7 @@ pub struct BlockSeries {
     /// Weight of a sample in the cost.
     pub(super) weight: f64,
     /// Mean residual of each block.
-    pub(crate) means: BlockMeans,
+    pub(super) means: ResidualMeans,
     /// Variance of the samples about their block's mean.
     pub(super) fast_variance: f64,
     pub(super) fast_degrees_of_freedom: f64,
@@ -48,8 +48,9 @@ impl BlockSeries {
         mut sums_of: impl FnMut(Range<usize>, &mut [f64]) -> BlockSums,
     ) -> BlockSeries {
         let (length, parameters) = (samples_per_block(step_s), squares.nrows());
-        let mut sensitivities = AlignedMatrix::zeros(samples.div_ceil(length), parameters);
-        let mut means = BlockMeans::with_room(step_s, samples);
+        let blocks = samples.div_ceil(length);
+        let mut sensitivities = AlignedMatrix::zeros(blocks, parameters);
+        let mut means = ResidualMeans::with_room(length, blocks);
         let (mut square, mut degrees_of_freedom) = (square, 0.0);
         // Sensitivities of incomplete blocks, scaled to the excess of their means' squares.
         let mut excess = Vec::new();
@@ -93,10 +94,13 @@ impl BlockSeries {
             widen_row(row, places, wide);
         }
         BlockSeries {
+            weight: self.weight,
+            means: self.means.clone(),
+            fast_variance: self.fast_variance,
+            fast_degrees_of_freedom: self.fast_degrees_of_freedom,
             sensitivities,
             between: widen_square(&self.between, places, parameters),
             within: widen_square(&self.within, places, parameters),
-            ..self.clone()
         }
     }
 

@@ -34,10 +34,10 @@
 
 use nalgebra::DMatrix;
 
-use super::autoregression::Autoregression;
-use super::block_means::{BlockMeans, HIGHEST_ORDER};
+use super::autoregression::{Autoregression, HIGHEST_ORDER};
 use super::block_series::BlockSeries;
 use super::degrees_of_freedom::{ColouredPart, VarianceEstimates};
+use super::residual_means::ResidualMeans;
 use crate::numerics::linear_algebra::matrix::AlignedMatrix;
 use crate::numerics::series::lagged_products::lagged_products;
 use crate::numerics::statistics::student;
@@ -118,8 +118,10 @@ pub fn residual_noise(inverse: &DMatrix<f64>, outputs: &[BlockSeries]) -> Residu
 pub fn slow_noise_level(values: &[f64], step_s: f64) -> f64 {
     let counted = || values.iter().filter(|v| v.is_finite());
     let square = counted().map(|v| v * v).sum::<f64>();
-    let mut means = BlockMeans::with_room(step_s, values.len());
-    for block in values.chunks(samples_per_block(step_s)) {
+    let length = samples_per_block(step_s);
+    let blocks = values.chunks(length);
+    let mut means = ResidualMeans::with_room(length, blocks.len());
+    for block in blocks {
         means.push(finite_sums(block));
     }
     let pairs = means.pairs();

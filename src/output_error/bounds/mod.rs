@@ -3,7 +3,6 @@
 //! ([`consider`]).
 
 mod autoregression;
-pub(crate) mod block_means;
 pub(crate) mod block_series;
 pub mod bounded;
 pub mod calibration_errors;
@@ -12,3 +11,4 @@ pub mod consider;
 pub mod cramer_rao;
 mod degrees_of_freedom;
 mod input_noise;
+mod residual_means;

@@ -1,17 +1,17 @@
 //! Means of one output's residuals over blocks of samples.
 
+use super::autoregression::HIGHEST_ORDER;
 use crate::numerics::series::lagged_products::{MOST_LAGS, lagged_products};
-use crate::output_error::case::blocks::{BlockSums, samples_per_block};
+use crate::output_error::case::blocks::BlockSums;
 
-/// Highest order of a process.
-pub(super) const HIGHEST_ORDER: usize = 12;
 const _: () = assert!(HIGHEST_ORDER < MOST_LAGS);
+
 /// Least number of blocks per coefficient of a process.
 const BLOCKS_PER_COEFFICIENT: usize = 10;
 
 /// Means of one output's residuals over the blocks of a maneuver.
 #[derive(Clone, Debug)]
-pub(crate) struct BlockMeans {
+pub(super) struct ResidualMeans {
     /// Number of samples in a whole block.
     pub length: f64,
     /// Number of samples that count in each block.
@@ -20,12 +20,10 @@ pub(crate) struct BlockMeans {
     means: Vec<f64>,
 }
 
-impl BlockMeans {
-    /// No blocks yet, with room for those of `samples`.
-    pub fn with_room(step_s: f64, samples: usize) -> BlockMeans {
-        let length = samples_per_block(step_s);
-        let blocks = samples.div_ceil(length);
-        BlockMeans {
+impl ResidualMeans {
+    /// No blocks yet, with room for as many `blocks` of `length` samples each.
+    pub fn with_room(length: usize, blocks: usize) -> ResidualMeans {
+        ResidualMeans {
             length: length as f64,
             counts: Vec::with_capacity(blocks),
             means: Vec::with_capacity(blocks),
