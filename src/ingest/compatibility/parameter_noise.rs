@@ -44,12 +44,10 @@
 use nalgebra::{DMatrix, DMatrixViewMut, DVector, Dyn, U1};
 
 use super::equations::STATES;
-use super::parameters::{
-    INPUTS, KINDS, Kind, OUTPUTS, PARAMETERS, Parameters, input_factor, place,
-};
-use super::reconstruction::{DRIVING, LOCAL, ROW, Row};
+use super::parameters::{INPUTS, Kind, OUTPUTS, PARAMETERS, Parameters, input_factor, place};
+use super::reconstruction::{LOCAL, ROW, Row};
 use super::window::Window;
-use super::window_sums::{ALL, LinearisedWindow, ReducedInformation, place_among_all};
+use super::window_sums::{ALL, LinearisedWindow, ReducedInformation, add_row};
 use crate::numerics::linear_algebra::symmetric;
 use crate::numerics::vectors::simd::vectorised;
 
@@ -180,19 +178,8 @@ fn block_products(
 /// Adds the products of a row with its slopes along the initial state.
 #[inline(always)]
 fn add_products(block: &mut [f64], row: &Row, output: usize, weight: f64) {
-    // Parameters of the states stand alike in a row and among all; those of the output do not.
-    let own = place_among_all(DRIVING, output);
     for (column, by_start) in block.chunks_exact_mut(ALL).zip(&row[..STATES]) {
-        let factor = weight * by_start;
-        add_scaled(&mut column[..DRIVING], &row[..DRIVING], factor);
-        add_scaled(&mut column[own..own + KINDS], &row[DRIVING..ROW], factor);
-    }
-}
-
-#[inline(always)]
-fn add_scaled(sums: &mut [f64], values: &[f64], factor: f64) {
-    for (sum, value) in sums.iter_mut().zip(values) {
-        *sum += factor * value;
+        add_row(column, &row[..ROW], output, weight * by_start);
     }
 }
 

@@ -216,26 +216,26 @@ impl WithSimd for Linearisation<'_> {
     fn with_simd<S: Simd>(self, simd: S) -> TrajectorySensitivities {
         let nodes = self.window.nodes();
         // Steps alternate between buffers: copies would take a third of the time.
-        let mut buffers = [const { [[0.0; WIDE]; STATES] }; 4];
-        let [s, end, at, next] = &mut buffers;
-        let (mut s, mut end) = (s, end);
+        let mut ends = [const { [[0.0; WIDE]; STATES] }; 2];
+        let [mut s, mut end] = ends.each_mut();
+        let mut within = StepBuffers::zeros();
         for i in 0..STATES {
             s[i][i] = 1.0;
         }
         let mut out = TrajectorySensitivities {
-            rows: Vec::with_capacity(nodes),
+            rows: vec![[[0.0; WIDE]; OUTPUTS]; nodes],
             transitions: Vec::with_capacity(nodes),
             by_input: Vec::with_capacity(nodes),
         };
         let mut start = self.linearised(0);
         for node in 0..nodes {
-            out.rows.push(self.reading_rows(simd, node, s));
+            self.write_reading_rows(simd, node, s, &mut out.rows[node]);
             out.transitions.push(SMatrix::from_fn(|i, j| s[i][j]));
             out.by_input.push(start.slopes.by_input);
             if node + 1 < nodes {
                 let middle = self.linearised(2 * node + 1);
                 let later = self.linearised(2 * node + 2);
-                self.advance(simd, node, [&start, &middle, &later], s, end, [at, next]);
+                self.advance(simd, node, [&start, &middle, &later], [s, end], &mut within);
                 std::mem::swap(&mut s, &mut end);
                 start = later;
             }
@@ -257,21 +257,23 @@ impl Linearisation<'_> {
     }
 
     /// Writes the sensitivities one node later to `end`, by a Runge-Kutta step of the linearised equations
-    /// from `s`. `at` and `next` receive those at the stages.
+    /// from `s`.
     #[inline(always)]
     fn advance<S: Simd>(
         &self,
         simd: S,
         node: usize,
         linearised: [&Linearised; 3],
-        s: &Sensitivities,
-        end: &mut Sensitivities,
-        [mut at, mut next]: [&mut Sensitivities; 2],
+        [s, end]: [&mut Sensitivities; 2],
+        StepBuffers { forcing, stages }: &mut StepBuffers,
     ) {
         let h = 2.0 * self.window.point_step_s();
         let (reaches_s, weights_s) = (reaches_s(h), weights_s(h));
         let by_error = self.trajectory.inputs.mean_by_error(2 * node, h);
-        let forcing = linearised.map(|at| at.forcing(&by_error));
+        for n in 0..forcing.len() {
+            linearised[n].write_forcing(&by_error, &mut forcing[n]);
+        }
+        let [mut at, mut next] = stages.each_mut();
         for stage in 0..STAGES {
             let is_first = stage == 0;
             let (reach, weight) = (
@@ -302,10 +304,16 @@ impl Linearisation<'_> {
         }
     }
 
-    /// Sensitivities of the readings at a node. They act through the states and through the body
-    /// rates in a reading, and are to bias, scale and delay of the output.
+    /// Writes the sensitivities of the readings at a node to rows of zeros. They act through the states
+    /// and through the body rates in a reading, and are to bias, scale and delay of the output.
     #[inline(always)]
-    fn reading_rows<S: Simd>(&self, simd: S, node: usize, s: &Sensitivities) -> [Row; OUTPUTS] {
+    fn write_reading_rows<S: Simd>(
+        &self,
+        simd: S,
+        node: usize,
+        s: &Sensitivities,
+        rows: &mut [Row; OUTPUTS],
+    ) {
         let Trajectory {
             inputs,
             states,
@@ -315,7 +323,6 @@ impl Linearisation<'_> {
         let (x, input) = (&states[point], &inputs.values[2 * point]);
         let at = equations::reading_slopes(self.aircraft, x, input, &self.window.terms[point]);
         let by_error = inputs.by_error(point);
-        let mut rows = [[0.0; WIDE]; OUTPUTS];
         for o in 0..OUTPUTS {
             let gain = 1.0 + self.shared[place(INPUTS + o, Kind::Scale)];
             for &rate in equations::READINGS_BY_RATES[o] {
@@ -334,7 +341,6 @@ impl Linearisation<'_> {
             let rate = slope_at(&readings[o], point) / self.window.point_step_s();
             rows[o][DRIVING..ROW].copy_from_slice(&[1.0, readings[o][point], -gain * rate]);
         }
-        rows
     }
 }
 
@@ -347,6 +353,24 @@ fn slope_at(values: &[f64], k: usize) -> f64 {
     (8.0 * difference(1) - difference(2)) / 12.0
 }
 
+/// Buffers of a step between nodes.
+struct StepBuffers {
+    /// Forcing at the start, the middle and the end. Only columns with a slope are ever written.
+    forcing: [Sensitivities; 3],
+    /// Sensitivities at the stages, in turn.
+    stages: [Sensitivities; 2],
+}
+
+impl StepBuffers {
+    #[inline(always)]
+    fn zeros() -> StepBuffers {
+        StepBuffers {
+            forcing: [[[0.0; WIDE]; STATES]; 3],
+            stages: [[[0.0; WIDE]; STATES]; 2],
+        }
+    }
+}
+
 /// Slopes of the equations at one instant along states, inputs and the wind's change.
 struct Linearised {
     slopes: RateSlopes,
@@ -354,10 +378,9 @@ struct Linearised {
 }
 
 impl Linearised {
-    /// Slopes of the states' rates along the wind's change and the inputs' errors, as rows.
+    /// Writes the slopes of the states' rates along the wind's change and the inputs' errors to rows.
     #[inline(always)]
-    fn forcing(&self, by_error: &ByError) -> Sensitivities {
-        let mut rows = [[0.0; WIDE]; STATES];
+    fn write_forcing(&self, by_error: &ByError, rows: &mut Sensitivities) {
         for i in 0..STATES {
             for &input in equations::RATES_BY_INPUT[i] {
                 let errors = &mut rows[i][error_columns(input)];
@@ -371,7 +394,6 @@ impl Linearised {
                 rows[i][STATES + j] = self.by_wind[(i, j)];
             }
         }
-        rows
     }
 }
 

@@ -19,7 +19,7 @@ use super::reconstruction::{
 use super::window::{Window, margin};
 use super::window_choice::choose_windows;
 use super::window_fit::{FitContext, WindowFit};
-use super::window_sums::{Comparison, LinearisedWindow};
+use super::window_sums::{Comparison, LinearisedWindow, place_among_all};
 use super::*;
 use crate::aircraft::{Position, Sensors, Vane, VaneModel};
 use crate::flight::record::Series;
@@ -549,6 +549,8 @@ fn the_gradient_of_each_output_is_that_of_finite_differences_of_its_squares() {
     let gradients = at.gradients(&slopes);
     let linearised = LinearisedWindow::of(slopes, &at);
     for o in 0..OUTPUTS {
+        let alone = std::array::from_fn(|own| f64::from(u8::from(own == o)));
+        let information = linearised.information(&alone);
         for (column, gradient) in gradients[o].iter().enumerate().take(ROW) {
             let h = 1e-5 * local.get(column).map_or(1.0, |l| l.abs().max(1.0));
             let squares = |change| {
@@ -557,7 +559,8 @@ fn the_gradient_of_each_output_is_that_of_finite_differences_of_its_squares() {
             };
             let numeric = -(squares(h) - squares(-h)) / (4.0 * h);
             let least = samples.len() as f64 * NOISE[INPUTS + o].powi(2);
-            let information = linearised.product(o, column, column).max(least);
+            let place = place_among_all(column, o);
+            let information = information[(place, place)].max(least);
             let size = (information * at.squares[o]).sqrt();
             assert!(
                 (gradient - numeric).abs() <= SENSITIVITY_TOLERANCE * size,

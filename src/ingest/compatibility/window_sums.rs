@@ -13,12 +13,12 @@ use pulp::{Arch, Simd, WithSimd};
 
 use super::parameters::{ALL_KINDS, INPUTS, KINDS, Kind, OUTPUTS, PARAMETERS, Parameters, place};
 use super::reconstruction::{
-    LOCAL, ROW, Row, Trajectory, TrajectorySensitivities, WIDE, shared_place,
+    DRIVING, LOCAL, ROW, Row, Trajectory, TrajectorySensitivities, WIDE, shared_place,
 };
 use super::window::Window;
 use crate::flight::interpolation_kernel::InterpolationKernel;
 use crate::numerics::vectors::row_products::StridedRows;
-use crate::numerics::vectors::simd::{AlignedBuffer, VECTOR, load, store};
+use crate::numerics::vectors::simd::{AlignedBuffer, VECTOR, load, store, vectorised};
 
 /// Rows of an output that are summed together: they stay in the processor's first cache.
 const CHUNK: usize = 16;
@@ -32,6 +32,26 @@ pub fn place_among_all(column: usize, output: usize) -> usize {
         column
     } else {
         LOCAL + shared_place(column, output)
+    }
+}
+
+/// Adds a multiple of a row of an output, or of its beginning, to values of all parameters.
+#[inline(always)]
+pub fn add_row(all: &mut [f64], row: &[f64], output: usize, factor: f64) {
+    // Parameters of the states stand alike in a row and among all; those of the output do not.
+    let (of_states, of_output) = row.split_at(row.len().min(DRIVING));
+    add_scaled(all, of_states, factor);
+    add_scaled(
+        &mut all[place_among_all(DRIVING, output)..],
+        of_output,
+        factor,
+    );
+}
+
+#[inline(always)]
+fn add_scaled(sums: &mut [f64], values: &[f64], factor: f64) {
+    for (sum, value) in sums.iter_mut().zip(values) {
+        *sum += factor * value;
     }
 }
 
@@ -264,24 +284,24 @@ impl LinearisedWindow {
         }
     }
 
-    /// Σ of the products of two sensitivities of an output.
-    pub fn product(&self, output: usize, i: usize, j: usize) -> f64 {
-        self.products[output].slice()[i.max(j) * WIDE + i.min(j)]
-    }
-
     /// Information on all parameters for the weights 1/R of the outputs.
     pub fn information(&self, weights: &[f64; OUTPUTS]) -> DMatrix<f64> {
         let mut information = DMatrix::zeros(ALL, ALL);
-        for (output, weight) in weights.iter().enumerate() {
-            for i in 0..ROW {
-                let row = place_among_all(i, output);
-                for j in 0..=i {
-                    let column = place_among_all(j, output);
-                    information[(row, column)] += weight * self.product(output, i, j);
+        let columns = information.as_mut_slice();
+        vectorised(
+            #[inline(always)]
+            || {
+                for output in 0..OUTPUTS {
+                    let products = self.products[output].slice();
+                    for i in 0..ROW {
+                        let column = &mut columns[place_among_all(i, output) * ALL..][..ALL];
+                        let row = &products[i * WIDE..][..=i];
+                        add_row(column, row, output, weights[output]);
+                    }
                 }
-            }
-        }
-        information.fill_upper_triangle_with_lower_triangle();
+            },
+        );
+        information.fill_lower_triangle_with_upper_triangle();
         information
     }
 }
@@ -290,9 +310,7 @@ impl LinearisedWindow {
 pub fn weighted_gradient(gradients: &[Row; OUTPUTS], weights: &[f64; OUTPUTS]) -> DVector<f64> {
     let mut gradient = DVector::zeros(ALL);
     for (output, (own, weight)) in gradients.iter().zip(weights).enumerate() {
-        for (column, slope) in own[..ROW].iter().enumerate() {
-            gradient[place_among_all(column, output)] += weight * slope;
-        }
+        add_row(gradient.as_mut_slice(), &own[..ROW], output, *weight);
     }
     gradient
 }
