@@ -83,7 +83,7 @@ impl NodeDistribution {
         let (mut sums, mut values) = (vec![0.0; self.nodes], Vec::new());
         for phase in phases(self.samples_per_node, self.late[output], &self.samples) {
             values.clear();
-            values.extend(phase.of(all));
+            values.extend(phase.samples().map(|k| all[k]));
             phase
                 .kernel
                 .share_out(phase.points.start, &values, &mut sums);
@@ -104,21 +104,10 @@ struct Phase {
 }
 
 impl Phase {
-    /// Index of its first sample.
-    fn first(&self) -> usize {
-        self.points.start * self.spacing + self.offset
-    }
-
-    /// Its samples of values at all samples.
-    fn of<'v>(&self, all: &'v [f64]) -> impl Iterator<Item = &'v f64> + use<'v> {
-        let own = all.get(self.first()..).unwrap_or_default();
-        own.iter().step_by(self.spacing).take(self.points.len())
-    }
-
-    /// Its samples of values at all samples, to be written.
-    fn of_mut<'v>(&self, all: &'v mut [f64]) -> impl Iterator<Item = &'v mut f64> + use<'v> {
-        let own = all.get_mut(self.first()..).unwrap_or_default();
-        own.iter_mut().step_by(self.spacing).take(self.points.len())
+    /// Its samples.
+    fn samples(&self) -> impl Iterator<Item = usize> + use<> {
+        let (first, spacing) = (self.points.start * self.spacing + self.offset, self.spacing);
+        (0..self.points.len()).map(move |k| first + k * spacing)
     }
 }
 
@@ -179,9 +168,8 @@ impl Comparison {
             phase
                 .kernel
                 .interpolate_from(phase.points.start, readings, read);
-            let both = phase.of(measured).zip(read);
-            for (residual, (measured, reading)) in phase.of_mut(residuals).zip(both) {
-                *residual = measured - ((1.0 + scale) * *reading + bias);
+            for (k, reading) in phase.samples().zip(read) {
+                residuals[k] = measured[k] - ((1.0 + scale) * *reading + bias);
             }
         }
     }
