@@ -16,10 +16,15 @@
 //! f and y at a sample depend on the signals at this sample alone. Their slopes along a signal
 //! therefore serve all errors of the signal: its bias, its scale and its delay.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
+#![expect(
+    clippy::needless_range_loop,
+    reason = "plain indices become straight code for the vectors"
+)]
 
 use std::collections::BTreeMap;
+use std::marker::PhantomData;
 
-use nalgebra::{DVector, SMatrix, SVector};
+use nalgebra::{DVector, SMatrix};
 use pulp::{Arch, Simd, WithSimd};
 
 use super::filter::Filter;
@@ -31,6 +36,8 @@ use crate::aircraft::Aircraft;
 use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
 use crate::numerics::linear_algebra::matrix::AlignedMatrix;
+use crate::numerics::vectors::lanes::Lanes;
+use crate::numerics::vectors::simd::{AlignedBuffer, VECTOR};
 use crate::output_error::calibration_errors::{SignalChange, SignalError};
 use crate::output_error::{Case, Diverged, InitialState, Measurements, Model};
 
@@ -63,21 +70,24 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         let samples = SampleEquations::new(&self.case, recorded, &values);
         let changes = samples.signal_changes(recorded, errors);
         let slopes = samples.slopes_along(recorded, &changes, &pass.steps);
-        let mut white = AlignedMatrix::zeros(errors.len(), OUTPUTS * self.samples());
-        for ((error, changes), white) in errors.iter().zip(&changes).zip(white.rows_mut()) {
-            Arch::new().dispatch(ErrorPropagation::<NX, E, _> {
+        let mut white = AlignedMatrix::zeros(OUTPUTS * self.samples(), errors.len());
+        for first in (0..errors.len()).step_by(ABREAST) {
+            let group = first..errors.len().min(first + ABREAST);
+            Arch::new().dispatch(ErrorPropagation::<NX, E> {
                 steps: &pass.steps,
                 gains: &gains,
                 patterns: self.patterns(),
                 decay: self.noise(parameters).decay(self.case.step_s),
                 half_step_s: 0.5 * self.case.step_s,
-                inputs: inputs_in_error(&slopes, changes),
-                measured: output_errors::<NX, E>(&self.case.measurements, error),
-                white,
-                equations: std::marker::PhantomData,
+                inputs: inputs_in_error(&slopes, &changes[group.clone()], self.samples()),
+                outputs: OutputErrors::of::<NX, E>(&errors[group]),
+                measured: &self.case.measurements.values,
+                white: &mut white,
+                first,
+                equations: PhantomData,
             });
         }
-        let lanes = white.product(&pass.rows);
+        let lanes = white.transposed_product(&pass.rows);
         if lanes.values().iter().all(|change| change.is_finite()) {
             Ok(lanes
                 .rows()
@@ -95,32 +105,66 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     }
 }
 
-/// Slopes of rates and outputs along the signals that change, with the changes.
-fn inputs_in_error<'s, const NX: usize>(
-    slopes: &'s BTreeMap<String, Vec<SampleValues<NX>>>,
-    changes: &'s [SignalChange],
-) -> Vec<(&'s [SampleValues<NX>], &'s [f64])> {
-    let along = |change: &'s SignalChange| {
-        let slopes = slopes.get(&change.signal)?;
-        Some((&slopes[..], &change.samples[..]))
-    };
-    changes.iter().filter_map(along).collect()
+/// Number of errors that are propagated side by side, in the lanes of a vector.
+const ABREAST: usize = VECTOR;
+
+/// One signal that some of the errors of a group change.
+struct SignalInError<'a, const NX: usize> {
+    name: &'a str,
+    /// Slopes of rates and outputs along the signal.
+    slopes: &'a [SampleValues<NX>],
+    /// Changes of the signal: sample by sample, error by error.
+    changes: AlignedBuffer,
 }
 
-/// Changes of the measured outputs by an error.
-fn output_errors<'a, const NX: usize, E: Equations<NX>>(
-    measurements: &'a Measurements,
-    error: &SignalError,
-) -> impl Fn(usize) -> [f64; OUTPUTS] + use<'a, NX, E> {
-    let outputs = E::AXIS.outputs();
-    let in_error = outputs.iter().position(|o| o.signal() == error.signal);
-    let (scale, bias) = (error.scale, error.bias);
-    move |sample| {
-        let mut change = [0.0; OUTPUTS];
-        if let Some(o) = in_error {
-            change[o] = scale * measurements.values[sample][o] + bias;
+/// Signals that the errors of a group change.
+fn inputs_in_error<'a, const NX: usize>(
+    slopes: &'a BTreeMap<String, Vec<SampleValues<NX>>>,
+    errors: &'a [Vec<SignalChange>],
+    samples: usize,
+) -> Vec<SignalInError<'a, NX>> {
+    let mut inputs: Vec<SignalInError<NX>> = vec![];
+    for (error, changes) in errors.iter().enumerate() {
+        for change in changes {
+            let Some(slopes) = slopes.get(&change.signal) else {
+                continue;
+            };
+            let known = inputs.iter().position(|own| own.name == change.signal);
+            let place = known.unwrap_or(inputs.len());
+            if known.is_none() {
+                inputs.push(SignalInError {
+                    name: &change.signal,
+                    slopes,
+                    changes: AlignedBuffer::zeros(ABREAST * samples),
+                });
+            }
+            let rows = inputs[place].changes.slice_mut().chunks_exact_mut(ABREAST);
+            for (row, value) in rows.zip(&change.samples) {
+                row[error] = *value;
+            }
         }
-        change
+    }
+    inputs
+}
+
+/// Errors of the measured outputs: output by output, error by error.
+struct OutputErrors {
+    scales: AlignedBuffer,
+    biases: AlignedBuffer,
+}
+
+impl OutputErrors {
+    fn of<const NX: usize, E: Equations<NX>>(errors: &[SignalError]) -> OutputErrors {
+        let outputs = E::AXIS.outputs();
+        let zeros = || AlignedBuffer::zeros(ABREAST * OUTPUTS);
+        let (mut scales, mut biases) = (zeros(), zeros());
+        for (error, own) in errors.iter().enumerate() {
+            if let Some(o) = outputs.iter().position(|o| o.signal() == own.signal) {
+                scales.slice_mut()[o * ABREAST + error] = own.scale;
+                biases.slice_mut()[o * ABREAST + error] = own.bias;
+            }
+        }
+        OutputErrors { scales, biases }
     }
 }
 
@@ -263,90 +307,124 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Evaluation<'_, NX, E> {
     }
 }
 
-/// Linear response of a filter to one error.
-struct ErrorPropagation<'a, const NX: usize, E: InGusts<NX>, M: Fn(usize) -> [f64; OUTPUTS]> {
+/// Linear response of a filter to a group of errors side by side.
+struct ErrorPropagation<'a, const NX: usize, E: InGusts<NX>> {
     steps: &'a [RecordedStep<NX>],
     gains: &'a [PatternGain<NX>],
     /// Patterns, and the pattern of each sample.
     patterns: (&'a [Pattern], &'a [u8]),
     decay: f64,
     half_step_s: f64,
-    /// Slopes of rates and outputs along the signals in error, and the changes of the signals.
-    inputs: Vec<(&'a [SampleValues<NX>], &'a [f64])>,
-    /// Change of the measured outputs at a sample.
-    measured: M,
-    /// Changes of the whitened innovations: sample by sample, output by output.
-    white: &'a mut [f64],
-    equations: std::marker::PhantomData<E>,
+    inputs: Vec<SignalInError<'a, NX>>,
+    outputs: OutputErrors,
+    /// Measured outputs at each sample.
+    measured: &'a [[f64; OUTPUTS]],
+    /// Changes of the whitened innovations: sample by sample, output by output a row; each error a
+    /// column.
+    white: &'a mut AlignedMatrix,
+    /// Column of the first error.
+    first: usize,
+    equations: PhantomData<E>,
 }
 
-impl<const NX: usize, E: InGusts<NX>, M: Fn(usize) -> [f64; OUTPUTS]>
-    ErrorPropagation<'_, NX, E, M>
-{
+impl<const NX: usize, E: InGusts<NX>> ErrorPropagation<'_, NX, E> {
+    /// Propagates the errors in the lanes of one vector, from a lane on.
+    #[inline(always)]
+    fn propagate<S: Simd>(&mut self, simd: S, lane: usize) {
+        let (patterns, pattern_of) = self.patterns;
+        let (zero, width) = (Lanes::zero(simd), self.white.width());
+        let mut state = [zero; NX];
+        for (k, step) in self.steps.iter().enumerate() {
+            let pattern = usize::from(pattern_of[k]);
+            let (used, gain) = (&patterns[pattern].used, &self.gains[pattern]);
+            let (rates, outputs) = self.input_changes(simd, k, lane);
+            if k > 0 {
+                add_scaled(&mut state, self.half_step_s, &rates);
+            }
+            let predicted = times(&step.outputs, &state, zero);
+            let mut innovations = [zero; OUTPUTS];
+            for o in 0..OUTPUTS {
+                if used[o] {
+                    let row = o * ABREAST + lane;
+                    let scale = Lanes::load(simd, self.outputs.scales.slice(), row);
+                    let bias = Lanes::load(simd, self.outputs.biases.slice(), row);
+                    let measured = scale * self.measured[k][o] + bias;
+                    innovations[o] = measured - outputs[o] - predicted[o];
+                }
+            }
+            let white = times(&gain.whitening, &innovations, zero);
+            for o in 0..OUTPUTS {
+                let row = (k * OUTPUTS + o) * width;
+                white[o].store(self.white.values_mut(), row + self.first + lane);
+            }
+            add_scaled(&mut state, 1.0, &times(&gain.gain, &innovations, zero));
+            for &(rate, relative) in E::AIR_RELATIVE_RATES {
+                state[relative] = state[rate] + (state[relative] - state[rate]) * self.decay;
+            }
+            add_scaled(&mut state, self.half_step_s, &rates);
+            state = times(&step.transition, &state, zero);
+        }
+    }
+
     /// Changes of rates and outputs at a sample.
     #[inline(always)]
-    fn input_changes(&self, k: usize) -> ([f64; NX], [f64; OUTPUTS]) {
-        let (mut rates, mut outputs) = ([0.0; NX], [0.0; OUTPUTS]);
-        for (slopes, changes) in &self.inputs {
-            add_scaled(&mut rates, changes[k], &slopes[k].rates);
-            add_scaled(&mut outputs, changes[k], &slopes[k].outputs);
+    fn input_changes<S: Simd>(
+        &self,
+        simd: S,
+        k: usize,
+        lane: usize,
+    ) -> ([Lanes<S>; NX], [Lanes<S>; OUTPUTS]) {
+        let zero = Lanes::zero(simd);
+        let (mut rates, mut outputs) = ([zero; NX], [zero; OUTPUTS]);
+        for input in &self.inputs {
+            let change = Lanes::load(simd, input.changes.slice(), k * ABREAST + lane);
+            let slopes = &input.slopes[k];
+            for i in 0..NX {
+                rates[i] = rates[i].plus(slopes.rates[i], change);
+            }
+            for o in 0..OUTPUTS {
+                outputs[o] = outputs[o].plus(slopes.outputs[o], change);
+            }
         }
         (rates, outputs)
     }
 }
 
-impl<const NX: usize, E: InGusts<NX>, M: Fn(usize) -> [f64; OUTPUTS]> WithSimd
-    for ErrorPropagation<'_, NX, E, M>
-{
+impl<const NX: usize, E: InGusts<NX>> WithSimd for ErrorPropagation<'_, NX, E> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let (patterns, pattern_of) = self.patterns;
-        let mut state = [0.0; NX];
-        for (k, step) in self.steps.iter().enumerate() {
-            let pattern = usize::from(pattern_of[k]);
-            let (used, gain) = (&patterns[pattern].used, &self.gains[pattern]);
-            let (rates, outputs) = self.input_changes(k);
-            if k > 0 {
-                add_scaled(&mut state, self.half_step_s, &rates);
-            }
-            let mut innovations = [0.0; OUTPUTS];
-            let predicted = times(&step.outputs, &state);
-            let measured = (self.measured)(k);
-            for o in (0..OUTPUTS).filter(|o| used[*o]) {
-                innovations[o] = measured[o] - outputs[o] - predicted[o];
-            }
-            let white = times(&gain.whitening, &innovations);
-            self.white[k * OUTPUTS..][..OUTPUTS].copy_from_slice(&white);
-            add_scaled(&mut state, 1.0, &times(&gain.gain, &innovations));
-            let decayed = E::decayed(SVector::from(state), self.decay);
-            state = decayed.data.0[0];
-            add_scaled(&mut state, self.half_step_s, &rates);
-            state = times(&step.transition, &state);
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        for lane in (0..ABREAST).step_by(S::F64_LANES) {
+            self.propagate(simd, lane);
         }
     }
 }
 
-/// Product of a matrix and a vector.
+/// Product of a matrix and a vector of each error.
 #[inline(always)]
-fn times<const N: usize, const M: usize>(
+fn times<S: Simd, const N: usize, const M: usize>(
     matrix: &SMatrix<f64, N, M>,
-    vector: &[f64; M],
-) -> [f64; N] {
-    let mut product = [0.0; N];
-    for (column, entry) in matrix.data.0.iter().zip(vector) {
+    vector: &[Lanes<S>; M],
+    zero: Lanes<S>,
+) -> [Lanes<S>; N] {
+    let mut product = [zero; N];
+    for j in 0..M {
         for i in 0..N {
-            product[i] = column[i].mul_add(*entry, product[i]);
+            product[i] = product[i].plus(matrix[(i, j)], vector[j]);
         }
     }
     product
 }
 
-/// Adds a vector times a factor.
+/// Adds a vector of each error times a factor.
 #[inline(always)]
-fn add_scaled<const N: usize>(sum: &mut [f64; N], factor: f64, vector: &[f64; N]) {
+fn add_scaled<S: Simd, const N: usize>(
+    sum: &mut [Lanes<S>; N],
+    factor: f64,
+    vector: &[Lanes<S>; N],
+) {
     for i in 0..N {
-        sum[i] = vector[i].mul_add(factor, sum[i]);
+        sum[i] = sum[i].plus(factor, vector[i]);
     }
 }

@@ -8,6 +8,8 @@
     reason = "plain indices become straight code for the vectors"
 )]
 
+use std::ops::Range;
+
 use nalgebra::DMatrix;
 use pulp::{Arch, Simd, WithSimd};
 
@@ -20,6 +22,9 @@ const ROWS_AT_ONCE: usize = 8;
 /// Vectors and rows of a tile of a product: one load of a factor serves several vectors.
 const WIDE_TILE: usize = 3;
 const ROWS_OF_WIDE_TILE: usize = 4;
+/// Rows of the second matrix of a product that all tiles read before the next rows: they stay in the
+/// processor's first cache.
+const ROWS_IN_CACHE: usize = 64;
 const LAGGED_ROWS_AT_ONCE: usize = 4;
 const LAGS_AT_ONCE: usize = 7;
 const ROWS_REACHED: usize = LAGGED_ROWS_AT_ONCE + LAGS_AT_ONCE - 1;
@@ -171,11 +176,22 @@ impl AlignedMatrix {
 
     /// Adds the product of two matrices.
     pub fn add_product(&mut self, rows: &AlignedMatrix, matrix: &AlignedMatrix) {
-        Arch::new().dispatch(Product {
+        Arch::new().dispatch(Product::<false> {
             from: rows,
             matrix,
             to: self.values.slice_mut(),
         });
+    }
+
+    /// Product of the transpose with another matrix.
+    pub fn transposed_product(&self, matrix: &AlignedMatrix) -> AlignedMatrix {
+        let mut to = AlignedMatrix::zeros(self.columns, matrix.columns);
+        Arch::new().dispatch(Product::<true> {
+            from: self,
+            matrix,
+            to: to.values.slice_mut(),
+        });
+        to
     }
 
     /// self · inner · self, both symmetric.
@@ -271,54 +287,73 @@ impl WithSimd for Gram<'_> {
     }
 }
 
-struct Product<'a> {
+/// Product of one matrix, or of its transpose, with another.
+struct Product<'a, const TRANSPOSED: bool> {
     from: &'a AlignedMatrix,
     matrix: &'a AlignedMatrix,
     to: &'a mut [f64],
 }
 
-impl WithSimd for Product<'_> {
+impl<const TRANSPOSED: bool> WithSimd for Product<'_, TRANSPOSED> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
-        let (rows, width) = (self.from.rows, self.matrix.width());
+        for first in (0..self.matrix.rows).step_by(ROWS_IN_CACHE) {
+            let last = self.matrix.rows.min(first + ROWS_IN_CACHE);
+            self.add_rows(simd, first..last);
+        }
+    }
+}
+
+impl<const TRANSPOSED: bool> Product<'_, TRANSPOSED> {
+    /// Adds the products with some rows of the second matrix.
+    #[inline(always)]
+    fn add_rows<S: Simd>(&mut self, simd: S, of: Range<usize>) {
+        let (from, width) = (self.from, self.matrix.width());
+        let rows = if TRANSPOSED { from.columns } else { from.rows };
         let mut lane = 0;
         while lane + WIDE_TILE * S::F64_LANES <= width {
             for row in (0..rows).step_by(ROWS_OF_WIDE_TILE) {
-                self.add_tile::<S, ROWS_OF_WIDE_TILE, WIDE_TILE>(simd, row, lane);
+                self.add_tile::<S, ROWS_OF_WIDE_TILE, WIDE_TILE>(simd, &of, row, lane);
             }
             lane += WIDE_TILE * S::F64_LANES;
         }
         for lane in (lane..width).step_by(S::F64_LANES) {
             for row in (0..rows).step_by(ROWS_AT_ONCE) {
-                self.add_tile::<S, ROWS_AT_ONCE, 1>(simd, row, lane);
+                self.add_tile::<S, ROWS_AT_ONCE, 1>(simd, &of, row, lane);
             }
         }
     }
-}
 
-impl Product<'_> {
     /// Adds to a tile of `T` rows and `C` vectors.
     #[inline(always)]
     fn add_tile<S: Simd, const T: usize, const C: usize>(
         &mut self,
         simd: S,
+        of: &Range<usize>,
         row: usize,
         lane: usize,
     ) {
         let (from, width) = (self.from.width(), self.matrix.width());
-        let rows = &self.from.values.slice()[row * from..(row + T) * from];
+        let values = self.from.values.slice();
         let mut sums = [[simd.splat_f64s(0.0); C]; T];
         for t in 0..T {
             for c in 0..C {
                 sums[t][c] = load::<S>(self.to, (row + t) * width + lane + c * S::F64_LANES);
             }
         }
-        for (i, entries) in self.matrix.rows().enumerate() {
-            let entries = S::as_simd_f64s(&entries[lane..lane + C * S::F64_LANES]).0;
+        for i in of.start..of.end {
+            let entries = &self.matrix.values()[i * width + lane..][..C * S::F64_LANES];
+            let entries = S::as_simd_f64s(entries).0;
+            // Factors of the row `i`, at equal distances.
+            let (factors, distance) = if TRANSPOSED {
+                (&values[i * from + row..][..T], 1)
+            } else {
+                (&values[row * from + i..][..=(T - 1) * from], from)
+            };
             for t in 0..T {
-                let factor = simd.splat_f64s(rows[t * from + i]);
+                let factor = simd.splat_f64s(factors[t * distance]);
                 for c in 0..C {
                     sums[t][c] = simd.mul_add_f64s(factor, entries[c], sums[t][c]);
                 }
@@ -457,6 +492,17 @@ mod tests {
             &plain * square,
             epsilon = 1e-12
         );
+        let (long, tall) = (sample_matrix(11, 150), sample_matrix(150, 13));
+        assert_relative_eq!(
+            long.product(&tall).to_dense(),
+            long.to_dense() * tall.to_dense(),
+            epsilon = 1e-12
+        );
+        assert_relative_eq!(
+            tall.transposed_product(&sample_matrix(150, 29)).to_dense(),
+            tall.to_dense().tr_mul(&sample_matrix(150, 29).to_dense()),
+            epsilon = 1e-12
+        );
         assert_relative_eq!(
             a.gram().to_dense(),
             plain.transpose() * &plain,
@@ -482,7 +528,7 @@ mod tests {
             AlignedMatrix::zeros(11, 11),
             sample_matrix(29, 11),
         );
-        simd.vectorize(Product {
+        simd.vectorize(Product::<false> {
             from: &a,
             matrix: &matrix,
             to: product.values.slice_mut(),

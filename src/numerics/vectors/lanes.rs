@@ -18,6 +18,15 @@ pub(crate) struct Lanes<S: Simd> {
 }
 
 impl<S: Simd> Lanes<S> {
+    /// Zero in every lane.
+    #[inline(always)]
+    pub fn zero(simd: S) -> Lanes<S> {
+        Lanes {
+            simd,
+            values: simd.splat_f64s(0.0),
+        }
+    }
+
     /// Loads the numbers that begin at an index of a slice.
     #[inline(always)]
     pub fn load(simd: S, from: &[f64], at: usize) -> Lanes<S> {
