@@ -14,17 +14,19 @@
 //! would integrate the whole maneuver again, from inputs at twice as many points.
 //!
 //! f and y at a sample depend on the signals at this sample alone. Their slopes along a signal
-//! therefore serve all errors of the signal: its bias, its scale and its delay.
+//! therefore serve all errors of the signal: its bias, its scale and its delay. The slopes change as
+//! slowly as the aircraft moves: they are computed at *nodes* and interpolated between them.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 #![expect(
     clippy::needless_range_loop,
     reason = "plain indices become straight code for the vectors"
 )]
 
+use std::array::from_fn;
 use std::collections::BTreeMap;
 use std::marker::PhantomData;
 
-use nalgebra::{DVector, SMatrix};
+use nalgebra::{DVector, SMatrix, SVector};
 use pulp::{Arch, Simd, WithSimd};
 
 use super::filter::Filter;
@@ -36,6 +38,7 @@ use crate::aircraft::Aircraft;
 use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
 use crate::numerics::linear_algebra::matrix::AlignedMatrix;
+use crate::numerics::series::sample_count::whole_steps;
 use crate::numerics::vectors::lanes::Lanes;
 use crate::numerics::vectors::simd::{AlignedBuffer, VECTOR};
 use crate::output_error::calibration_errors::{SignalChange, SignalError};
@@ -67,9 +70,12 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         self.run(parameters, &gains, &mut response, Some(&mut pass))?;
         let names = self.names().iter().map(String::as_str);
         let values: BTreeMap<&str, f64> = names.zip(parameters.iter().copied()).collect();
-        let samples = SampleEquations::new(&self.case, recorded, &values);
-        let changes = samples.signal_changes(recorded, errors);
-        let slopes = samples.slopes_along(recorded, &changes, &pass.steps);
+        let stride = whole_steps(SLOPE_STEP_S, self.case.step_s).max(1);
+        let nodes = NodeEquations::new(&self.case, recorded, &values, stride);
+        let changes = nodes.signal_changes(recorded, errors);
+        let at_nodes = pass.steps.iter().step_by(stride);
+        let states: Vec<_> = at_nodes.map(|step| step.corrected).collect();
+        let slopes = nodes.slopes_along(recorded, &changes, &states);
         let mut white = AlignedMatrix::zeros(OUTPUTS * self.samples(), errors.len());
         for first in (0..errors.len()).step_by(ABREAST) {
             let group = first..errors.len().min(first + ABREAST);
@@ -105,21 +111,24 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     }
 }
 
+/// Longest distance between nodes, s.
+const SLOPE_STEP_S: f64 = 0.1;
+
 /// Number of errors that are propagated side by side, in the lanes of a vector.
 const ABREAST: usize = VECTOR;
 
 /// One signal that some of the errors of a group change.
 struct SignalInError<'a, const NX: usize> {
     name: &'a str,
-    /// Slopes of rates and outputs along the signal.
-    slopes: &'a [SampleValues<NX>],
+    /// Slopes of rates and outputs along the signal at the samples.
+    slopes: &'a [RatesAndOutputs<NX>],
     /// Changes of the signal: sample by sample, error by error.
     changes: AlignedBuffer,
 }
 
 /// Signals that the errors of a group change.
 fn inputs_in_error<'a, const NX: usize>(
-    slopes: &'a BTreeMap<String, Vec<SampleValues<NX>>>,
+    slopes: &'a BTreeMap<String, Vec<RatesAndOutputs<NX>>>,
     errors: &'a [Vec<SignalChange>],
     samples: usize,
 ) -> Vec<SignalInError<'a, NX>> {
@@ -168,33 +177,66 @@ impl OutputErrors {
     }
 }
 
-/// Rates and outputs at a sample, or their slopes along a signal.
-struct SampleValues<const NX: usize> {
+/// Rates and outputs at an instant, or their slopes along a signal.
+struct RatesAndOutputs<const NX: usize> {
     rates: [f64; NX],
     outputs: [f64; OUTPUTS],
 }
 
-impl<const NX: usize> SampleValues<NX> {
+impl<const NX: usize> RatesAndOutputs<NX> {
     /// Replaces values after a step of a signal by the slopes along the signal.
-    fn become_slope_from(&mut self, before: &SampleValues<NX>, step: f64) {
+    fn become_slope_from(&mut self, before: &RatesAndOutputs<NX>, step: f64) {
         let rates = self.rates.iter_mut().zip(&before.rates);
         let outputs = self.outputs.iter_mut().zip(&before.outputs);
         rates
             .chain(outputs)
             .for_each(|(value, before)| *value = (*value - before) / step);
     }
+
+    /// Values at a share of the way to others.
+    fn towards(&self, others: &RatesAndOutputs<NX>, share: f64) -> RatesAndOutputs<NX> {
+        let between = |from: f64, to: f64| from + share * (to - from);
+        RatesAndOutputs {
+            rates: from_fn(|i| between(self.rates[i], others.rates[i])),
+            outputs: from_fn(|o| between(self.outputs[o], others.outputs[o])),
+        }
+    }
 }
 
-/// Equations of a maneuver at its samples, with all derivatives held at their values.
-struct SampleEquations<'a, const NX: usize, E: Equations<NX>> {
+/// Values at all samples, from those at every `stride`-th one.
+fn at_samples<const NX: usize>(
+    nodes: &[RatesAndOutputs<NX>],
+    stride: usize,
+    samples: usize,
+) -> Vec<RatesAndOutputs<NX>> {
+    let mut values = Vec::with_capacity(samples);
+    for (node, from) in nodes.iter().enumerate() {
+        let to = nodes.get(node + 1).unwrap_or(from);
+        for after in 0..stride.min(samples - values.len()) {
+            values.push(from.towards(to, after as f64 / stride as f64));
+        }
+    }
+    values
+}
+
+/// Equations of a maneuver at its nodes, with all derivatives held at their values.
+struct NodeEquations<'a, const NX: usize, E: Equations<NX>> {
+    /// Samples from one node to the next.
+    stride: usize,
     signals: ManeuverSignals,
     model: Model<'a>,
     /// Maneuver as recorded.
     exact: Case<NX, E>,
 }
 
-impl<'a, const NX: usize, E: Equations<NX>> SampleEquations<'a, NX, E> {
-    fn new(case: &Case<NX, E>, recorded: &Recorded<'a>, values: &BTreeMap<&str, f64>) -> Self {
+impl<'a, const NX: usize, E: Equations<NX>> NodeEquations<'a, NX, E> {
+    /// Every `stride`-th sample is a node.
+    fn new(
+        case: &Case<NX, E>,
+        recorded: &Recorded<'a>,
+        values: &BTreeMap<&str, f64>,
+        stride: usize,
+    ) -> Self {
         let value = |name: &str| values.get(name).copied().unwrap_or(0.0);
         let free = recorded.model.free.iter().map(|d| (*d, value(&d.name)));
         let model = Model {
@@ -202,10 +244,11 @@ impl<'a, const NX: usize, E: Equations<NX>> SampleEquations<'a, NX, E> {
             initial_state: InitialState::Measured,
             ..Model::default()
         };
-        let signals = recorded.signals.at_samples();
+        let signals = recorded.signals.at_every(stride);
         let windows = [recorded.signals, &signals];
         let nothing = Measurements::default();
-        SampleEquations {
+        NodeEquations {
+            stride,
             exact: case.as_recorded(recorded.aircraft, windows, nothing, &model),
             signals,
             model,
@@ -229,26 +272,27 @@ impl<'a, const NX: usize, E: Equations<NX>> SampleEquations<'a, NX, E> {
         errors.iter().map(changes).collect()
     }
 
-    /// Slopes of rates and outputs at the corrected states along each signal that changes, from a
-    /// constant change as large as the largest one.
+    /// Slopes of rates and outputs along each signal that changes, at all samples. `states` are those of
+    /// the nodes. The step of a signal is its largest change.
     fn slopes_along(
         &self,
         recorded: &Recorded,
         changes: &[Vec<SignalChange>],
-        steps: &[RecordedStep<NX>],
-    ) -> BTreeMap<String, Vec<SampleValues<NX>>> {
+        states: &[SVector<f64, NX>],
+    ) -> BTreeMap<String, Vec<RatesAndOutputs<NX>>> {
         let mut largest: BTreeMap<&String, f64> = BTreeMap::new();
         for change in changes.iter().flatten() {
             let size = largest.entry(&change.signal).or_default();
             *size = size.max(change.largest());
         }
-        let exact = evaluate(&self.exact, steps);
+        let exact = evaluate(&self.exact, states);
         let slopes = |(signal, size): (&String, f64)| {
-            let mut values = evaluate(&self.case_with_bias(recorded, signal, size), steps);
+            let mut values = evaluate(&self.case_with_bias(recorded, signal, size), states);
             for (values, exact) in values.iter_mut().zip(&exact) {
                 values.become_slope_from(exact, size);
             }
-            (signal.clone(), values)
+            let samples = recorded.signals.samples;
+            (signal.clone(), at_samples(&values, self.stride, samples))
         };
         largest.into_iter().map(slopes).collect()
     }
@@ -272,33 +316,32 @@ impl<'a, const NX: usize, E: Equations<NX>> SampleEquations<'a, NX, E> {
     }
 }
 
-/// Rates and outputs of a case at the corrected states.
+/// Rates and outputs of a case at states.
 fn evaluate<const NX: usize, E: Equations<NX>>(
     case: &Case<NX, E>,
-    steps: &[RecordedStep<NX>],
-) -> Vec<SampleValues<NX>> {
-    Arch::new().dispatch(Evaluation { case, steps })
+    states: &[SVector<f64, NX>],
+) -> Vec<RatesAndOutputs<NX>> {
+    Arch::new().dispatch(Evaluation { case, states })
 }
 
-/// Rates and outputs along a trajectory, compiled for the processor at hand.
+/// Rates and outputs along states, compiled for the processor at hand.
 struct Evaluation<'a, const NX: usize, E: Equations<NX>> {
     case: &'a Case<NX, E>,
-    steps: &'a [RecordedStep<NX>],
+    states: &'a [SVector<f64, NX>],
 }
 
 impl<const NX: usize, E: Equations<NX>> WithSimd for Evaluation<'_, NX, E> {
-    type Output = Vec<SampleValues<NX>>;
+    type Output = Vec<RatesAndOutputs<NX>>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> Vec<SampleValues<NX>> {
+    fn with_simd<S: Simd>(self, _: S) -> Vec<RatesAndOutputs<NX>> {
         let motion = &self.case.motion;
-        let mut values = Vec::with_capacity(self.steps.len());
-        for (k, step) in self.steps.iter().enumerate() {
-            let x = &step.corrected;
+        let mut values = Vec::with_capacity(self.states.len());
+        for (k, x) in self.states.iter().enumerate() {
             let c = self.case.held.at(k).coefficients(x);
             let inputs = &motion.rate_inputs[k];
             let outputs = E::outputs(inputs, &motion.sensor_inputs[k], x, &c).outputs;
-            values.push(SampleValues {
+            values.push(RatesAndOutputs {
                 rates: E::rates(inputs, x, &c).rates.data.0[0],
                 outputs: outputs.data.0[0],
             });
@@ -352,10 +395,14 @@ impl<const NX: usize, E: InGusts<NX>> ErrorPropagation<'_, NX, E> {
                     innovations[o] = measured - outputs[o] - predicted[o];
                 }
             }
-            let white = times(&gain.whitening, &innovations, zero);
+            let rows = &mut self.white.values_mut()[k * OUTPUTS * width..][..OUTPUTS * width];
             for o in 0..OUTPUTS {
-                let row = (k * OUTPUTS + o) * width;
-                white[o].store(self.white.values_mut(), row + self.first + lane);
+                // L⁻¹ is a lower triangle.
+                let mut white = zero;
+                for p in 0..=o {
+                    white = white.plus(gain.whitening[(o, p)], innovations[p]);
+                }
+                white.store(rows, o * width + self.first + lane);
             }
             add_scaled(&mut state, 1.0, &times(&gain.gain, &innovations, zero));
             for &(rate, relative) in E::AIR_RELATIVE_RATES {

@@ -131,20 +131,22 @@ impl ManeuverSignals {
         self.points_per_sample > 1
     }
 
-    /// Signals without the points between samples, for equations at the samples alone.
+    /// Signals at every `stride`-th sample without the points between, for equations at these instants
+    /// alone.
     #[must_use]
-    pub fn at_samples(&self) -> ManeuverSignals {
-        let stride = self.points_per_sample;
-        let every = |points: &Vec<f64>| points.iter().step_by(stride).copied().collect();
+    pub fn at_every(&self, stride: usize) -> ManeuverSignals {
+        let distance = self.points_per_sample * stride;
+        let every = |points: &Vec<f64>| points.iter().step_by(distance).copied().collect();
         let points = self.points.iter();
         ManeuverSignals {
             points: points
                 .map(|(name, points)| (Arc::clone(name), Arc::new(every(points))))
                 .collect(),
             sensors: self.sensors.clone(),
-            flow: Arc::new(self.flow.iter().step_by(stride).copied().collect()),
+            flow: Arc::new(self.flow.iter().step_by(distance).copied().collect()),
+            step_s: self.step_s * stride as f64,
+            samples: self.samples.div_ceil(stride),
             points_per_sample: 1,
-            ..*self
         }
     }
 

@@ -77,7 +77,7 @@ impl<'a> Step for JointStep<'a> {
     type Artefact = Joined;
 
     const KIND: Kind = Kind::Joint;
-    const VERSION: u32 = 14;
+    const VERSION: u32 = 15;
 
     fn item(&self) -> &str {
         &self.bin.joint_id
