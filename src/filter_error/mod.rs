@@ -31,12 +31,15 @@
 //! | [`filter`] | a maneuver prepared |
 //! | [`joint_filter`] | several maneuvers that share derivatives, or one |
 //! | [`scoring`] | the iteration |
+//! | [`signal_slopes`] | slopes of rates and outputs along the recorded signals |
+//! | `error_propagation` | innovations' changes by errors of the instruments |
 //! | [`calibration_gradients`] | effects of the instruments' errors on the gradient |
 //! | [`bounds`] | covariance of the estimates, and the effects of held values and calibration |
 //! | [`slopes`] | slopes of the derivatives over α, and their effect on the estimates |
 
 pub mod bounds;
 pub mod calibration_gradients;
+mod error_propagation;
 pub mod filter;
 mod gain_computation;
 mod gains;
@@ -50,6 +53,7 @@ mod reference;
 pub mod response;
 mod riccati;
 pub mod scoring;
+pub mod signal_slopes;
 pub mod slopes;
 
 #[cfg(test)]

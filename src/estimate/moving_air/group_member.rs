@@ -10,9 +10,9 @@ use crate::estimate::slopes::alpha_slopes::AlphaSlopes;
 use crate::estimate::slopes::held_slopes::HeldSlopes;
 use crate::estimate::task::{Task, values_by_name};
 use crate::filter_error::bounds::WidePass;
-use crate::filter_error::calibration_gradients::Recorded;
 use crate::filter_error::filter::Filter;
 use crate::filter_error::noise::Noise;
+use crate::filter_error::signal_slopes::Recorded;
 use crate::output_error::calibration_errors::SignalError;
 use crate::output_error::{Case, Diverged, Model, equation_error};
 

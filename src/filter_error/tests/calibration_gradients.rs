@@ -3,9 +3,9 @@
 use nalgebra::DVector;
 
 use super::*;
-use crate::filter_error::calibration_gradients::Recorded;
 use crate::filter_error::pass::RecordedPass;
 use crate::filter_error::response::FilterResponse;
+use crate::filter_error::signal_slopes::Recorded;
 use crate::flight::signal;
 use crate::output_error::calibration_errors::SignalError;
 use crate::output_error::kernel::normal_equations::NormalSums;
