@@ -202,3 +202,33 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Evaluation<'_, NX, E> {
         values
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_abs_diff_eq;
+
+    use super::*;
+
+    #[test]
+    fn between_nodes_values_lie_on_straight_lines_and_beyond_the_last_they_stay() {
+        let node = |value: f64| RatesAndOutputs {
+            rates: [value, -2.0 * value],
+            outputs: [0.5 * value; OUTPUTS],
+        };
+        let values = at_samples(&[node(1.0), node(3.0), node(-1.0)], 4, 11);
+        let expected = [1.0, 1.5, 2.0, 2.5, 3.0, 2.0, 1.0, 0.0, -1.0, -1.0, -1.0];
+        assert_eq!(values.len(), expected.len());
+        for (values, expected) in values.iter().zip(expected) {
+            let own = [
+                values.rates[0],
+                values.rates[1],
+                values.outputs[OUTPUTS - 1],
+            ];
+            for (value, factor) in own.into_iter().zip([1.0, -2.0, 0.5]) {
+                assert_abs_diff_eq!(value, factor * expected, epsilon = 1e-12);
+            }
+        }
+        let every = at_samples(&[node(1.0), node(3.0)], 1, 2);
+        assert_abs_diff_eq!(every[1].rates[0], 3.0);
+    }
+}
