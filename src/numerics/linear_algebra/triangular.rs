@@ -2,11 +2,17 @@
 //! which run several times as fast as the columns of the plain methods.
 
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
+#![expect(
+    clippy::needless_range_loop,
+    reason = "plain indices become straight code for the vectors"
+)]
 
-use nalgebra::{Cholesky, DMatrix, DMatrixView, DMatrixViewMut, Matrix};
+use nalgebra::{Cholesky, DMatrix, DMatrixView, DMatrixViewMut};
+use pulp::{Arch, Simd, WithSimd};
 
 use super::BLOCK;
-use crate::numerics::vectors::simd::vectorised;
+use crate::numerics::vectors::lanes::Lanes;
+use crate::numerics::vectors::simd::VECTOR;
 
 /// Size up to which the plain methods are as fast.
 const PLAIN: usize = 48;
@@ -41,7 +47,7 @@ fn factorise(mut matrix: DMatrixViewMut<f64>) -> bool {
 }
 
 /// Subtracts L Lᵀ on and below the diagonal, by blocks of columns; `above` is Lᵀ.
-fn subtract_square(lower: &DMatrix<f64>, above: &DMatrix<f64>, from: &mut DMatrixViewMut<f64>) {
+pub fn subtract_square(lower: &DMatrix<f64>, above: &DMatrix<f64>, from: &mut DMatrixViewMut<f64>) {
     let n = lower.nrows();
     for start in (0..n).step_by(BLOCK) {
         let width = BLOCK.min(n - start);
@@ -55,10 +61,10 @@ fn subtract_square(lower: &DMatrix<f64>, above: &DMatrix<f64>, from: &mut DMatri
 pub fn solve_lower(lower: DMatrixView<f64>, mut right: DMatrixViewMut<f64>) {
     let n = lower.nrows();
     if n <= PLAIN {
-        vectorised(
-            #[inline(always)]
-            || solve_plain(lower, right.as_view_mut()),
-        );
+        Arch::new().dispatch(PlainSolution {
+            upper: lower.transpose(),
+            right,
+        });
         return;
     }
     let half = n / 2;
@@ -83,44 +89,68 @@ pub fn solve_staircase(lower: &DMatrix<f64>, right: &mut DMatrix<f64>, first_row
     }
 }
 
-/// Columns that the plain method solves together; a single column would wait for its own divisions.
-const SIDE_BY_SIDE: usize = 4;
+/// Vectors of columns that the plain method solves together; one alone would wait for its own sums.
+const TOGETHER: usize = 4;
 
-/// [`solve_lower`] column by column.
-#[inline(always)]
-fn solve_plain(lower: DMatrixView<f64>, mut right: DMatrixViewMut<f64>) {
-    let mut columns = right.column_iter_mut();
-    loop {
-        let mut own: [_; SIDE_BY_SIDE] = std::array::from_fn(|_| columns.next());
-        let whole = own.each_mut().map(|c| c.as_mut().map(Matrix::as_mut_slice));
-        match whole {
-            [Some(a), Some(b), Some(c), Some(d)] => solve_columns(lower, [a, b, c, d]),
-            rest => {
-                rest.into_iter()
-                    .flatten()
-                    .for_each(|column| solve_columns(lower, [column]));
-                return;
-            }
+/// [`solve_lower`] row by row, with columns side by side in the lanes of vectors.
+struct PlainSolution<'a> {
+    /// Lᵀ, so that a row of L is contiguous.
+    upper: DMatrix<f64>,
+    right: DMatrixViewMut<'a, f64>,
+}
+
+impl WithSimd for PlainSolution<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let mut rows = [0.0; PLAIN * TOGETHER * VECTOR];
+        let mut column = 0;
+        while column + (TOGETHER - 1) * S::F64_LANES < self.right.ncols() {
+            self.solve_columns::<S, TOGETHER>(simd, column, &mut rows);
+            column += TOGETHER * S::F64_LANES;
+        }
+        while column < self.right.ncols() {
+            self.solve_columns::<S, 1>(simd, column, &mut rows);
+            column += S::F64_LANES;
         }
     }
 }
 
-/// Solves some columns, one element of each after the other.
-#[inline(always)]
-fn solve_columns<const N: usize>(lower: DMatrixView<f64>, mut rest: [&mut [f64]; N]) {
-    for (i, lower) in lower.column_iter().enumerate() {
-        let [diagonal, lower @ ..] = &lower.as_slice()[i..] else {
-            return;
-        };
-        for column in &mut rest {
-            let Some((first, below)) = std::mem::take(column).split_first_mut() else {
-                continue;
-            };
-            *first /= diagonal;
-            for (value, l) in below.iter_mut().zip(lower) {
-                *value -= *first * l;
+impl PlainSolution<'_> {
+    /// Solves `N` vectors of columns, or those that are left of them; `rows` is for their rows side by side.
+    #[inline(always)]
+    fn solve_columns<S: Simd, const N: usize>(&mut self, simd: S, first: usize, rows: &mut [f64]) {
+        let (n, width) = (self.right.nrows(), N * S::F64_LANES);
+        let last = (first + width).min(self.right.ncols());
+        for column in first..last {
+            let own = self.right.column(column);
+            for (row, value) in own.as_slice().iter().enumerate() {
+                rows[row * width + column - first] = *value;
             }
-            *column = below;
+        }
+        for row in 0..n {
+            let upper = self.upper.column(row);
+            let (diagonal, left) = (upper[row], &upper.as_slice()[..row]);
+            let mut own = [Lanes::zero(simd); N];
+            for v in 0..N {
+                own[v] = Lanes::load(simd, rows, row * width + v * S::F64_LANES);
+            }
+            for k in 0..row {
+                for v in 0..N {
+                    let solved = Lanes::load(simd, rows, k * width + v * S::F64_LANES);
+                    own[v] = own[v].plus(-left[k], solved);
+                }
+            }
+            for v in 0..N {
+                (own[v] * (1.0 / diagonal)).store(rows, row * width + v * S::F64_LANES);
+            }
+        }
+        for column in first..last {
+            let mut own = self.right.column_mut(column);
+            for (row, value) in own.as_mut_slice().iter_mut().enumerate() {
+                *value = rows[row * width + column - first];
+            }
         }
     }
 }
@@ -144,10 +174,34 @@ mod tests {
             let plain = Cholesky::new(matrix(n)).unwrap().l();
             let blocked = cholesky(matrix(n)).unwrap().lower_triangle();
             assert_relative_eq!(blocked, plain, epsilon = 1e-12);
-            let mut right = DMatrix::from_fn(n, 7, |i, j| (i * j) as f64 - 3.0);
-            let given = right.clone();
-            solve_lower(plain.as_view(), right.as_view_mut());
-            assert_relative_eq!(&plain * right, given, epsilon = 1e-9);
+            for columns in [1, 7, 70] {
+                let mut right = DMatrix::from_fn(n, columns, |i, j| (i * j % 11) as f64 - 3.0);
+                let given = right.clone();
+                solve_lower(plain.as_view(), right.as_view_mut());
+                assert_relative_eq!(&plain * right, given, epsilon = 1e-9);
+            }
+        }
+    }
+
+    fn bits<S: Simd>(simd: S) -> Vec<u64> {
+        let lower = Cholesky::new(matrix(PLAIN)).unwrap().l();
+        let mut right = DMatrix::from_fn(PLAIN, 37, |i, j| (i * j % 11) as f64 - 3.0);
+        let solution = PlainSolution {
+            upper: lower.transpose(),
+            right: right.as_view_mut(),
+        };
+        solution.with_simd(simd);
+        right.iter().map(|v| v.to_bits()).collect()
+    }
+
+    #[test]
+    fn every_vector_width_gives_the_same_bits() {
+        let narrow = bits(pulp::Scalar);
+        assert!(narrow.iter().all(|bits| f64::from_bits(*bits).is_finite()));
+        #[cfg(target_arch = "x86_64")]
+        {
+            assert!(pulp::x86::V3::try_new().is_none_or(|simd| bits(simd) == narrow));
+            assert!(pulp::x86::V4::try_new().is_none_or(|simd| bits(simd) == narrow));
         }
     }
 
