@@ -2,14 +2,16 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::flight_data::{FlightData, Observed};
+use super::flight_data::{FlightData, Information, Observed};
 use super::held_values::{HeldDifferences, TermsPosterior};
 use super::observation::Observation;
 use super::observed_differences::ObservedDifferences;
 use super::open_scales::add_open_scales;
 use super::other_flights::OtherFlights;
-use super::posterior::{Gaussian, gaussian, information, of_differences, reweighted};
-use super::scales::{centres, most_probable};
+use super::posterior::{
+    Gaussian, WhitenedInformation, gaussian, information, of_differences, reweighted,
+};
+use super::scales::{LEAST_VARIANCE, centres, most_probable};
 use super::self_check::{self, Agreement};
 use super::unknowns::Unknowns;
 use crate::aero::WindTunnel;
@@ -20,9 +22,6 @@ use crate::numerics::linear_algebra::root::EXACT;
 
 /// Number of reweightings: weights follow from scales, and scales from weights.
 const REWEIGHTINGS: usize = 2;
-
-/// Share of the largest variance below which the comparison of classes ignores a direction.
-const CHECKED_VARIANCE: f64 = 1e-6;
 
 /// Posterior of one coefficient, with its evidence and its self-check.
 #[derive(Clone, Debug)]
@@ -58,27 +57,52 @@ impl CoefficientPosterior {
         let mut data = Data::new(&terms, evidence, basis);
         let mut weights = vec![1.0; evidence.len()];
         let mut noise_scales = centres(&terms);
-        let (mut observed, mut scales, mut gaussian) = data.fit(&terms, &weights, &noise_scales)?;
+        let mut fit = data.fit(&terms, &weights, &noise_scales)?;
         for _ in 0..REWEIGHTINGS {
             let freedom = basis.settings.degrees_of_freedom;
-            weights = reweighted(&data.flights, &weights, &gaussian, freedom);
-            noise_scales = scales;
-            (observed, scales, gaussian) = data.fit(&terms, &weights, &noise_scales)?;
+            weights = reweighted(&data.flights, &weights, &fit.gaussian, freedom);
+            noise_scales = fit.scales;
+            fit = data.fit(&terms, &weights, &noise_scales)?;
         }
+        let Fit {
+            observed,
+            scales,
+            information,
+            mut gaussian,
+        } = fit;
         let terms_posterior = TermsPosterior {
             terms: &terms,
             scales: &scales,
             gaussian: &gaussian,
         };
         let held = data.held(&terms_posterior, &weights, evidence, basis.tunnel);
-        let mut posterior = data.posterior(terms, scales, &weights, gaussian, evidence);
-        add_open_scales(&observed, &posterior.scales, &mut posterior.gaussian);
+        let flights = data.agreement_of_flights(&weights, &gaussian);
+        let root = data.unknowns.root(&terms, &scales, LEAST_VARIANCE);
+        let all = WhitenedInformation::new(&root, &information);
+        let classes = data.agreement_of_classes(&all, &weights, evidence);
+        add_open_scales(&observed, &scales, &mut gaussian);
         Some(CoefficientPosterior {
+            terms,
+            unknowns: data.unknowns,
+            scales,
             noise_scales,
+            gaussian,
+            weights: data.estimated.keys().map(|&m| (m, weights[m])).collect(),
+            estimated: data.estimated,
             held,
-            ..posterior
+            flights,
+            classes,
         })
     }
+}
+
+/// Most probable scales and their Gaussian for some weights, with the evidence that they follow from.
+struct Fit {
+    observed: ObservedDifferences,
+    scales: Vec<Scale>,
+    /// Normal equations of all unknowns; the noise of the maneuvers has the scales of the start.
+    information: Information,
+    gaussian: Gaussian,
 }
 
 /// Evidence about a coefficient.
@@ -158,21 +182,20 @@ impl Data {
         }
     }
 
-    /// Finds the most probable scales from a start. Returns the observed differences, these scales
-    /// and the Gaussian; the noise of the maneuvers has the scales of the start.
-    fn fit(
-        &mut self,
-        terms: &[PosteriorTerm],
-        weights: &[f64],
-        start: &[Scale],
-    ) -> Option<(ObservedDifferences, Vec<Scale>, Gaussian)> {
+    /// Finds the most probable scales from a start.
+    fn fit(&mut self, terms: &[PosteriorTerm], weights: &[f64], start: &[Scale]) -> Option<Fit> {
         self.set_noise(terms, start);
-        let sums = information(&self.flights, weights, self.unknowns.count);
-        let information_on_differences = of_differences(&sums, &self.unknowns)?;
+        let information = information(&self.flights, weights, self.unknowns.count);
+        let information_on_differences = of_differences(&information, &self.unknowns)?;
         let observed = ObservedDifferences::new(terms, &self.unknowns, &information_on_differences);
         let scales = most_probable(&observed, start);
-        let gaussian = gaussian(&self.unknowns.root(terms, &scales, EXACT), &sums)?;
-        Some((observed, scales, gaussian))
+        let gaussian = gaussian(&self.unknowns.root(terms, &scales, EXACT), &information)?;
+        Some(Fit {
+            observed,
+            scales,
+            information,
+            gaussian,
+        })
     }
 
     /// Differences from the tunnel of the values that each maneuver holds, by the posterior of the
@@ -201,41 +224,38 @@ impl Data {
         held
     }
 
-    fn posterior(
-        self,
-        terms: Vec<PosteriorTerm>,
-        scales: Vec<Scale>,
+    /// Agreement of each flight with the others.
+    fn agreement_of_flights(
+        &self,
         weights: &[f64],
-        gaussian: Gaussian,
-        evidence: &[ManeuverResults],
-    ) -> CoefficientPosterior {
-        let root = self.unknowns.root(&terms, &scales, CHECKED_VARIANCE);
-        let checked = self.flight_ids.iter().zip(&self.flights);
-        let flights = checked.filter_map(|(id, flight)| {
-            Some((id.clone(), self_check::flight(flight, weights, &gaussian)?))
+        all_flights: &Gaussian,
+    ) -> BTreeMap<String, Agreement> {
+        let flights = self.flight_ids.iter().zip(&self.flights);
+        let agreement = flights.filter_map(|(id, flight)| {
+            Some((
+                id.clone(),
+                self_check::flight(flight, weights, all_flights)?,
+            ))
         });
+        agreement.collect()
+    }
+
+    /// Agreement of each class with the others; `all` is the information of all flights.
+    fn agreement_of_classes(
+        &self,
+        all: &WhitenedInformation,
+        weights: &[f64],
+        evidence: &[ManeuverResults],
+    ) -> BTreeMap<String, Agreement> {
         let class = |place: &usize| evidence[*place].maneuver.class.as_str();
         let names: BTreeSet<&str> = self.estimated.keys().map(class).collect();
-        let classes = names.into_iter().filter_map(|name| {
+        let agreement = names.into_iter().filter_map(|name| {
             let is_of_class = |m: usize| evidence[m].maneuver.class == name;
-            let count = self.unknowns.count;
-            let agreement =
-                self_check::maneuvers(&self.flights, weights, &root, count, is_of_class)?;
+            let (all, count) = (all.clone(), self.unknowns.count);
+            let agreement = self_check::maneuvers(&self.flights, weights, all, count, is_of_class)?;
             Some((name.to_owned(), agreement))
         });
-        let classes: BTreeMap<String, Agreement> = classes.collect();
-        CoefficientPosterior {
-            held: BTreeMap::new(),
-            flights: flights.collect(),
-            classes,
-            weights: self.estimated.keys().map(|&m| (m, weights[m])).collect(),
-            estimated: self.estimated,
-            terms,
-            unknowns: self.unknowns,
-            scales,
-            noise_scales: vec![],
-            gaussian,
-        }
+        agreement.collect()
     }
 }
 

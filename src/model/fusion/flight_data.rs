@@ -99,12 +99,9 @@ impl FlightData {
         }
     }
 
-    /// Evidence of some of the maneuvers.
+    /// Evidence of some of the maneuvers, by their indices in this flight, in this order.
     #[must_use]
-    pub fn of_maneuvers(&self, counts: impl Fn(usize) -> bool) -> FlightData {
-        let kept: Vec<usize> = (0..self.maneuvers.len())
-            .filter(|&i| counts(self.maneuvers[i].0))
-            .collect();
+    pub fn of_maneuvers(&self, kept: &[usize]) -> FlightData {
         let places: Vec<usize> = kept
             .iter()
             .flat_map(|&i| self.maneuvers[i].1.clone())
@@ -149,15 +146,10 @@ impl FlightData {
     /// Adds the flight to the normal equations. A covariance that is not positive definite adds
     /// nothing.
     pub fn add_to(&self, weights: &[f64], sums: &mut Information) {
-        let Some(cholesky) = self.cholesky(weights) else {
+        let active = self.active();
+        let Some((rows, differences)) = self.whitened(&active, weights) else {
             return;
         };
-        let active = self.active();
-        let lower = cholesky.l_dirty();
-        let mut rows = self.dense(&active);
-        solve_lower(lower.as_view(), rows.as_view_mut());
-        let mut differences = self.differences.clone();
-        lower.solve_lower_triangular_mut(&mut differences);
         let (matrix, vector) = (square(&rows), rows.tr_mul(&differences));
         for (j, &column) in active.iter().enumerate() {
             sums.vector[column] += vector[j];
@@ -165,6 +157,45 @@ impl FlightData {
                 sums.matrix[(row, column)] += matrix[(i, j)];
             }
         }
+    }
+
+    /// Rows and differences by which some maneuvers, by their indices in this flight, add to the normal
+    /// equations of its other maneuvers; the rows are columns over all unknowns. `None` if the flight adds
+    /// nothing ([`FlightData::add_to`]).
+    #[must_use]
+    pub fn added_by(
+        &self,
+        maneuvers: &[usize],
+        weights: &[f64],
+        unknowns: usize,
+    ) -> Option<(DMatrix<f64>, DVector<f64>)> {
+        let others = (0..self.maneuvers.len()).filter(|i| !maneuvers.contains(i));
+        let order: Vec<usize> = others.chain(maneuvers.iter().copied()).collect();
+        let count = maneuvers.iter().map(|&i| self.maneuvers[i].1.len()).sum();
+        // The last rows of a Cholesky factor leave those before them as they are.
+        let ordered = self.of_maneuvers(&order);
+        let active = ordered.active();
+        let (rows, differences) = ordered.whitened(&active, weights)?;
+        let first = rows.nrows() - count;
+        let mut columns = DMatrix::zeros(unknowns, count);
+        for (own, place) in rows.column_iter().zip(active) {
+            columns
+                .row_mut(place)
+                .tr_copy_from(&own.rows_range(first..));
+        }
+        Some((columns, differences.rows_range(first..).into_owned()))
+    }
+
+    /// Rows L⁻¹ A over the active unknowns and differences L⁻¹ y, with the covariance Σ = L Lᵀ. `None`
+    /// unless Σ is positive definite.
+    fn whitened(&self, active: &[usize], weights: &[f64]) -> Option<(DMatrix<f64>, DVector<f64>)> {
+        let cholesky = self.cholesky(weights)?;
+        let lower = cholesky.l_dirty();
+        let mut rows = self.dense(active);
+        solve_lower(lower.as_view(), rows.as_view_mut());
+        let mut differences = self.differences.clone();
+        lower.solve_lower_triangular_mut(&mut differences);
+        Some((rows, differences))
     }
 
     #[must_use]

@@ -10,7 +10,9 @@ use crate::model::prior::scale_prior::Scale;
 use crate::model::prior::term::PosteriorTerm;
 use crate::numerics::linear_algebra::root::{BlockRoot, EXACT};
 use crate::numerics::linear_algebra::symmetric::{square, staircase_square};
-use crate::numerics::linear_algebra::triangular::{cholesky, solve_lower, solve_staircase};
+use crate::numerics::linear_algebra::triangular::{
+    cholesky, solve_lower, solve_staircase, subtract_square,
+};
 
 /// Share of the information that may be lost by rounding: with data a million times more accurate
 /// than the prior, matrices stay positive definite.
@@ -45,20 +47,56 @@ pub struct SolvedPosterior<'a> {
     vector: DVector<f64>,
 }
 
-impl<'a> SolvedPosterior<'a> {
+/// Information of the data on the whitened unknowns R⁻¹ z.
+#[derive(Clone, Debug)]
+pub struct WhitenedInformation<'a> {
+    root: &'a BlockRoot,
+    /// Lower triangle of Rᵀ Λ R.
+    inner: DMatrix<f64>,
+    /// Rᵀ η.
+    vector: DVector<f64>,
+}
+
+impl<'a> WhitenedInformation<'a> {
+    #[must_use]
+    pub fn new(root: &'a BlockRoot, information: &Information) -> WhitenedInformation<'a> {
+        WhitenedInformation {
+            root,
+            inner: root.lower_product(&root.left(&information.matrix)),
+            vector: root.left_of(&information.vector),
+        }
+    }
+
+    /// Removes rows that the data had added, each flight's as columns over the unknowns, with their
+    /// differences.
+    pub fn remove(&mut self, added: &[(DMatrix<f64>, DVector<f64>)]) {
+        let columns = added.iter().flat_map(|(rows, _)| rows.column_iter());
+        let columns: Vec<_> = columns.collect();
+        if columns.is_empty() {
+            return;
+        }
+        let differences = added.iter().flat_map(|(_, own)| own.iter().copied());
+        let differences = DVector::from_iterator(columns.len(), differences);
+        let rows = self.root.left(&DMatrix::from_columns(&columns));
+        self.vector.gemv(-1.0, &rows, &differences, 1.0);
+        subtract_square(&rows, &rows.transpose(), &mut self.inner.as_view_mut());
+    }
+
     /// Posterior; `None` if the data are not finite.
     #[must_use]
-    pub fn new(root: &'a BlockRoot, information: &Information) -> Option<SolvedPosterior<'a>> {
-        let lower = inner_root(root.lower_product(&root.left(&information.matrix)))?;
-        let mut vector = root.left_of(&information.vector);
+    pub fn solved(self) -> Option<SolvedPosterior<'a>> {
+        let lower = inner_root(self.inner)?;
+        let mut vector = self.vector;
         lower.solve_lower_triangular_mut(&mut vector);
         Some(SolvedPosterior {
-            root,
+            root: self.root,
             lower,
             vector,
         })
     }
+}
 
+impl SolvedPosterior<'_> {
     /// Product L⁻¹ Rᵀ A for some columns A over the unknowns, from which Aᵀ P A follows as its
     /// square.
     fn whitened_columns(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
@@ -94,7 +132,9 @@ pub fn inner_root(mut inner: DMatrix<f64>) -> Option<DMatrix<f64>> {
 /// Gaussian with a prior covariance R Rᵀ. `None` if the data are not finite.
 #[must_use]
 pub fn gaussian(root: &BlockRoot, information: &Information) -> Option<Gaussian> {
-    let covariance = SolvedPosterior::new(root, information)?.covariance();
+    let covariance = WhitenedInformation::new(root, information)
+        .solved()?
+        .covariance();
     let mean = &covariance * &information.vector;
     mean.iter()
         .all(|v| v.is_finite())
@@ -111,7 +151,7 @@ pub fn of_differences(information: &Information, unknowns: &Unknowns) -> Option<
         vector: vector.rows(n, all - n).into_owned(),
     };
     let root = unknowns.root_of_others(EXACT);
-    let others = SolvedPosterior::new(&root, &of_others)?;
+    let others = WhitenedInformation::new(&root, &of_others).solved()?;
     let cross = matrix.view((n, 0), (all - n, n)).into_owned();
     let halves = others.whitened_columns(&cross);
     Some(Information {

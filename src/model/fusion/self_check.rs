@@ -4,10 +4,7 @@
 use nalgebra::{Cholesky, DVector};
 
 use super::flight_data::FlightData;
-use super::posterior::{
-    Gaussian, LeaveOneOut, LeaveOneOutDifference, SolvedPosterior, information,
-};
-use crate::numerics::linear_algebra::root::BlockRoot;
+use super::posterior::{Gaussian, LeaveOneOut, LeaveOneOutDifference, WhitenedInformation};
 use crate::numerics::statistics::normal::NORMAL_95;
 
 /// Agreement of omitted data with their prediction.
@@ -58,25 +55,32 @@ pub fn flight(data: &FlightData, weights: &[f64], all_flights: &Gaussian) -> Opt
 }
 
 /// Agreement of some maneuvers with all others. The calibration errors of their flights are not
-/// estimated from the others.
+/// estimated from the others. `all` is the information of all flights.
 #[must_use]
 pub fn maneuvers(
     flights: &[FlightData],
     weights: &[f64],
-    root: &BlockRoot,
+    mut all: WhitenedInformation,
     unknowns: usize,
     is_left_out: impl Fn(usize) -> bool,
 ) -> Option<Agreement> {
-    let others = flights.iter().map(|f| f.of_maneuvers(|m| !is_left_out(m)));
-    let others: Vec<FlightData> = others.filter(|f| !f.rows.is_empty()).collect();
-    let sums = information(&others, weights, unknowns);
-    let rest = SolvedPosterior::new(root, &sums)?;
+    let left_out = |flight: &FlightData| -> Vec<usize> {
+        let own = flight.maneuvers.iter().enumerate();
+        own.filter(|(_, (place, _))| is_left_out(*place))
+            .map(|(i, _)| i)
+            .collect()
+    };
+    let flights = flights.iter().map(|flight| (flight, left_out(flight)));
+    let flights: Vec<_> = flights
+        .filter(|(_, left_out)| !left_out.is_empty())
+        .collect();
+    let added = flights.iter();
+    let added = added.filter_map(|(flight, own)| flight.added_by(own, weights, unknowns));
+    all.remove(&added.collect::<Vec<_>>());
+    let rest = all.solved()?;
     let mut sum = Agreement::default();
-    for flight in flights {
-        let left_out = flight.of_maneuvers(&is_left_out);
-        if left_out.rows.is_empty() {
-            continue;
-        }
+    for (flight, left_out) in &flights {
+        let left_out = flight.of_maneuvers(left_out);
         let (predicted, predicted_covariance) = rest.image(&left_out, unknowns);
         let differences: DVector<f64> = &left_out.differences - predicted;
         let covariance = predicted_covariance + left_out.covariance(weights);

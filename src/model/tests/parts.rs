@@ -10,7 +10,9 @@ use crate::maneuver::Maneuver;
 use crate::model::fusion::coefficient::Data;
 use crate::model::fusion::observed_differences::ObservedDifferences;
 use crate::model::fusion::open_scales::add_open_scales;
-use crate::model::fusion::posterior::{LeaveOneOut, gaussian, information, of_differences};
+use crate::model::fusion::posterior::{
+    LeaveOneOut, WhitenedInformation, gaussian, information, of_differences,
+};
 use crate::model::fusion::scales::{
     logarithms_of, most_probable, negative_log_posterior, scales_of,
 };
@@ -290,6 +292,52 @@ fn the_spread_over_open_scales_is_the_mean_square_over_draws_of_them() {
     let n = squares.len();
     let (a, b) = (added.rows(0, n).into_owned(), &squares);
     assert!(a.dot(b) > 0.95 * a.norm() * b.norm());
+}
+
+#[test]
+fn without_what_maneuvers_add_there_is_the_information_of_the_others() {
+    let flown = campaign();
+    let (terms, mut data) = data(&flown, &Settings::default());
+    data.set_noise(&terms, &scales());
+    let weights = vec![1.0, 0.4, 1.0, 1.0, 1.0, 0.7, 1.0, 1.0, 1.0, 1.0];
+    let count = data.unknowns.count;
+    let removed = [0, 2];
+    for flight in &data.flights {
+        let removed: Vec<usize> = removed
+            .into_iter()
+            .filter(|i| *i < flight.maneuvers.len())
+            .collect();
+        let kept: Vec<usize> = (0..flight.maneuvers.len())
+            .filter(|i| !removed.contains(i))
+            .collect();
+        let (columns, differences) = flight.added_by(&removed, &weights, count).unwrap();
+        let all = information(std::slice::from_ref(flight), &weights, count);
+        let others = information(&[flight.of_maneuvers(&kept)], &weights, count);
+        let scale = all.matrix.amax();
+        assert!(others.matrix.amax() > 0.1 * scale && columns.amax().powi(2) > 0.01 * scale);
+        let rest = &all.matrix - &columns * columns.transpose();
+        assert_relative_eq!(rest, others.matrix, epsilon = 1e-9 * scale);
+        let rest = &all.vector - &columns * &differences;
+        assert_relative_eq!(rest, others.vector, epsilon = 1e-9 * all.vector.amax());
+    }
+    let root = data.unknowns.root(&terms, &scales(), EXACT);
+    let all = information(&data.flights, &weights, count);
+    let mut whitened = WhitenedInformation::new(&root, &all);
+    let flights = data.flights.iter();
+    let added = flights.map(|flight| flight.added_by(&[0], &weights, count).unwrap());
+    let added: Vec<_> = added.collect();
+    whitened.remove(&added);
+    let mut others = all.clone();
+    for (columns, differences) in &added {
+        others.matrix -= columns * columns.transpose();
+        others.vector -= columns * differences;
+    }
+    let expected = WhitenedInformation::new(&root, &others).solved().unwrap();
+    let found = whitened.solved().unwrap();
+    let (mean, covariance) = found.image(&data.flights[0], count);
+    let (expected_mean, expected_covariance) = expected.image(&data.flights[0], count);
+    assert_relative_eq!(mean, expected_mean, epsilon = 1e-9);
+    assert_relative_eq!(covariance, expected_covariance, epsilon = 1e-9);
 }
 
 #[test]
