@@ -30,6 +30,7 @@
 //! | [`response`] | result of a pass: cost, gradient and information |
 //! | [`filter`] | a maneuver prepared |
 //! | [`joint_filter`] | several maneuvers that share derivatives, or one |
+//! | `quadratic_model` | a step within the limits of the noise |
 //! | [`scoring`] | the iteration |
 //! | [`signal_slopes`] | slopes of rates and outputs along the recorded signals |
 //! | `error_propagation` | innovations' changes by errors of the instruments |
@@ -48,6 +49,7 @@ pub mod joint_filter;
 mod linearised;
 pub mod noise;
 mod pass;
+mod quadratic_model;
 #[cfg(test)]
 mod reference;
 pub mod response;

@@ -6,13 +6,14 @@
 //! rotary gust are fixed with the gust.
 
 use std::cmp::Ordering;
+use std::ops::RangeInclusive;
 
 use nalgebra::{DMatrix, DVector};
 
 use super::joint_filter::{JointFilter, JointResponse};
+use super::quadratic_model::QuadraticModel;
 use crate::dynamics::InGusts;
 use crate::numerics::damping::{next_damping, raised_damping};
-use crate::numerics::linear_algebra::symmetric::solve_damped;
 use crate::settings::settings;
 
 settings! {
@@ -77,13 +78,14 @@ pub fn minimise<const NX: usize, E: InGusts<NX>>(
     };
     let (mut damping, mut slow_steps) = (0.0, 0);
     while scored.iterations < settings.max_iterations {
-        let (gradient, information) = scored.free_system(filter, floors);
-        let Some(full) = solve_damped(&information, &gradient, 0.0) else {
+        let model = scored.model(filter, floors);
+        let limits = step_limits(&scored.parameters, floors, filter.first_noise());
+        let Some(full) = model.step(0.0, &limits) else {
             "the information matrix is singular".clone_into(&mut scored.reason);
             break;
         };
-        let gain = 0.5 * gradient.dot(&full);
-        let own_gain = own_gain(&full, &information, filter.first_noise());
+        let gain = model.predicted_gain(&full);
+        let own_gain = own_gain(&full, model.information(), filter.first_noise());
         let settled = gain < NOISE_TOLERANCE && own_gain < settings.tolerance;
         if settled || slow_steps >= SLOW_STEPS {
             scored.converged = true;
@@ -92,7 +94,7 @@ pub fn minimise<const NX: usize, E: InGusts<NX>>(
         }
         scored.iterations += 1;
         let before = scored.response.cost;
-        if !scored.lower(filter, floors, &gradient, &information, &mut damping) {
+        if !scored.lower(filter, &model, &limits, &mut damping) {
             "no step lowers the cost".clone_into(&mut scored.reason);
             break;
         }
@@ -109,50 +111,47 @@ impl Scored {
         self.response.cost.total_cmp(&other.response.cost)
     }
 
-    /// Fixes the parameters at their floors. Returns gradient and information of the free
-    /// parameters; rows of fixed parameters have a unit diagonal and are zero elsewhere.
-    fn free_system<const NX: usize, E: InGusts<NX>>(
+    /// Quadratic model about the parameters. Those at their floors are fixed.
+    fn model<const NX: usize, E: InGusts<NX>>(
         &mut self,
         filter: &JointFilter<NX, E>,
         floors: &[f64],
-    ) -> (DVector<f64>, DMatrix<f64>) {
-        let mut gradient = filter.gradient(&self.response);
-        let mut information = filter.information(&self.response);
-        let at_floor = |j: usize| self.parameters[j] <= floors[j] && gradient[j] <= 0.0;
+    ) -> QuadraticModel {
+        let (gradient, information) = (
+            filter.gradient(&self.response),
+            filter.information(&self.response),
+        );
+        let mut model = QuadraticModel::new(gradient, information);
+        let at_floor = |j: usize| self.parameters[j] <= floors[j] && model.gradient()[j] <= 0.0;
         self.free = (0..floors.len()).map(|j| !at_floor(j)).collect();
         filter.fix_noise(&mut self.free);
         for j in (0..self.free.len()).filter(|j| !self.free[*j]) {
-            gradient[j] = 0.0;
-            information.row_mut(j).fill(0.0);
-            information.column_mut(j).fill(0.0);
-            information[(j, j)] = 1.0;
+            model.fix(j, 0.0);
         }
-        (gradient, information)
+        model
     }
 
     /// Tries steps of growing damping until one lowers the cost.
     fn lower<const NX: usize, E: InGusts<NX>>(
         &mut self,
         filter: &JointFilter<NX, E>,
-        floors: &[f64],
-        gradient: &DVector<f64>,
-        information: &DMatrix<f64>,
+        model: &QuadraticModel,
+        limits: &[RangeInclusive<f64>],
         damping: &mut f64,
     ) -> bool {
-        // A damped step may fail: its cost alone is cheap.
+        // A step may fail after others did: its cost alone is cheap.
         let mut may_fail = *damping > 0.0;
         while *damping < MOST_DAMPING {
-            if let Some(step) = solve_damped(information, gradient, *damping) {
-                let next =
-                    stepped_parameters(&self.parameters, &step, floors, filter.first_noise());
+            if let Some(step) = model.step(*damping, limits) {
+                let both = self.parameters.iter().zip(step.iter());
+                let next: Vec<f64> = both.map(|(value, step)| value + step).collect();
                 let lowers = |response: &JointResponse| response.cost < self.response.cost;
                 let may_lower = !may_fail || filter.innovations(&next).is_ok_and(|r| lowers(&r));
                 if may_lower
                     && let Ok(response) = filter.respond(&next)
                     && lowers(&response)
                 {
-                    let predicted = gradient.dot(&step) - 0.5 * (information * &step).dot(&step);
-                    let kept = (self.response.cost - response.cost) / predicted;
+                    let kept = (self.response.cost - response.cost) / model.predicted_gain(&step);
                     (self.parameters, self.response) = (next, response);
                     *damping = next_damping(*damping, kept, FIRST_DAMPING);
                     return true;
@@ -172,21 +171,15 @@ fn own_gain(step: &DVector<f64>, information: &DMatrix<f64>, parameters: usize) 
     0.5 * (information.view((0, 0), (parameters, parameters)) * step).dot(&step)
 }
 
-/// Parameters after a step; noise changes by a factor at most, and stays above its floor.
-fn stepped_parameters(
-    values: &[f64],
-    step: &DVector<f64>,
-    floors: &[f64],
-    first_noise: usize,
-) -> Vec<f64> {
-    let all = values.iter().zip(step.iter()).zip(floors).enumerate();
-    all.map(|(j, ((value, step), floor))| {
-        let step = if j < first_noise {
-            *step
+/// Limits of a step: noise changes by a factor at most, and stays above its floor.
+fn step_limits(values: &[f64], floors: &[f64], first_noise: usize) -> Vec<RangeInclusive<f64>> {
+    let both = values.iter().zip(floors).enumerate();
+    both.map(|(j, (value, floor))| {
+        if j < first_noise {
+            f64::NEG_INFINITY..=f64::INFINITY
         } else {
-            step.clamp(-LARGEST_FALL, LARGEST_GROWTH)
-        };
-        (value + step).max(*floor)
+            (floor - value).clamp(-LARGEST_FALL, 0.0)..=LARGEST_GROWTH
+        }
     })
     .collect()
 }

@@ -77,7 +77,7 @@ impl<'a> Step for JointStep<'a> {
     type Artefact = Joined;
 
     const KIND: Kind = Kind::Joint;
-    const VERSION: u32 = 15;
+    const VERSION: u32 = 16;
 
     fn item(&self) -> &str {
         &self.bin.joint_id
@@ -213,7 +213,7 @@ impl<'a> Step for PredictStep<'a> {
     type Artefact = Predicted;
 
     const KIND: Kind = Kind::Predict;
-    const VERSION: u32 = 12;
+    const VERSION: u32 = 13;
 
     fn item(&self) -> &str {
         &self.member.maneuver.maneuver_id
