@@ -65,6 +65,26 @@ impl QuadraticModel {
         }
     }
 
+    /// Step with a share of another step's changes from the parameter `first` on; those before it go to
+    /// their minimum. `None` if their information is singular.
+    pub fn with_share(
+        &self,
+        step: &DVector<f64>,
+        share: f64,
+        first: usize,
+    ) -> Option<DVector<f64>> {
+        if share == 1.0 {
+            return Some(step.clone());
+        }
+        let changes = share * step.rows_range(first..);
+        let coupling = self.information.view_range(..first, first..);
+        let gradient = self.gradient.rows_range(..first) - coupling * &changes;
+        let information = self.information.view_range(..first, ..first).into_owned();
+        let before = solve_damped(&information, &gradient, 0.0)?;
+        let both = before.iter().chain(&changes).copied();
+        Some(DVector::from_iterator(step.len(), both))
+    }
+
     /// Decrease of J by a step.
     pub fn predicted_gain(&self, step: &DVector<f64>) -> f64 {
         self.gradient.dot(step) - 0.5 * (&self.information * step).dot(step)
@@ -147,6 +167,20 @@ mod tests {
         for damping in [0.0, 1e-4, 1.0, 1e4] {
             let step = model().step(damping, &limits).unwrap();
             assert!(limits[2].contains(&step[2]) && step[3] == 0.0, "{step}");
+        }
+    }
+
+    #[test]
+    fn parameters_before_a_shortened_step_end_at_their_minimum() {
+        let model = model();
+        let full = model.step(0.0, &[FREE; 4]).unwrap();
+        for share in [0.0, 0.4, 1.0] {
+            let step = model.with_share(&full, share, 2).unwrap();
+            let slope = model.gradient() - model.information() * &step;
+            for j in 0..2 {
+                assert_abs_diff_eq!(slope[j], 0.0, epsilon = 1e-9);
+                assert_relative_eq!(step[j + 2], share * full[j + 2]);
+            }
         }
     }
 

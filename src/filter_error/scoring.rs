@@ -40,6 +40,11 @@ const LARGEST_FALL: f64 = 4.0;
 /// still changes. The noise drifts along valleys in which no estimate changes.
 const NOISE_TOLERANCE: f64 = 0.1;
 
+/// Least share of a step of the noise, and the share of the predicted gain from which on the noise
+/// explains the decrease of a step.
+const LEAST_SHARE: f64 = 0.4;
+const MOSTLY_BY_NOISE: f64 = 0.5;
+
 /// Number of successive steps that lower J by less than the tolerance, after which the iteration
 /// ends. Such steps follow a valley across which the second gradient is not exact.
 const SLOW_STEPS: usize = 3;
@@ -76,7 +81,7 @@ pub fn minimise<const NX: usize, E: InGusts<NX>>(
         parameters: start,
         response,
     };
-    let (mut damping, mut slow_steps) = (0.0, 0);
+    let (mut tuning, mut slow_steps) = (StepTuning::default(), 0);
     while scored.iterations < settings.max_iterations {
         let model = scored.model(filter, floors);
         let limits = step_limits(&scored.parameters, floors, filter.first_noise());
@@ -94,7 +99,7 @@ pub fn minimise<const NX: usize, E: InGusts<NX>>(
         }
         scored.iterations += 1;
         let before = scored.response.cost;
-        if !scored.lower(filter, &model, &limits, &mut damping) {
+        if !scored.lower(filter, &model, (&full, &limits), &mut tuning) {
             "no step lowers the cost".clone_into(&mut scored.reason);
             break;
         }
@@ -131,18 +136,24 @@ impl Scored {
         model
     }
 
-    /// Tries steps of growing damping until one lowers the cost.
+    /// Tries the full step and steps of growing damping, until one lowers the cost.
     fn lower<const NX: usize, E: InGusts<NX>>(
         &mut self,
         filter: &JointFilter<NX, E>,
         model: &QuadraticModel,
-        limits: &[RangeInclusive<f64>],
-        damping: &mut f64,
+        (full, limits): (&DVector<f64>, &[RangeInclusive<f64>]),
+        tuning: &mut StepTuning,
     ) -> bool {
-        // A step may fail after others did: its cost alone is cheap.
-        let mut may_fail = *damping > 0.0;
-        while *damping < MOST_DAMPING {
-            if let Some(step) = model.step(*damping, limits) {
+        let first_noise = filter.first_noise();
+        // A damped step may fail: its cost alone is cheap.
+        let mut may_fail = tuning.damping > 0.0;
+        while tuning.damping < MOST_DAMPING {
+            let step = if tuning.damping > 0.0 {
+                model.step(tuning.damping, limits)
+            } else {
+                model.with_share(full, tuning.noise_share, first_noise)
+            };
+            if let Some(step) = step {
                 let both = self.parameters.iter().zip(step.iter());
                 let next: Vec<f64> = both.map(|(value, step)| value + step).collect();
                 let lowers = |response: &JointResponse| response.cost < self.response.cost;
@@ -151,17 +162,67 @@ impl Scored {
                     && let Ok(response) = filter.respond(&next)
                     && lowers(&response)
                 {
-                    let kept = (self.response.cost - response.cost) / model.predicted_gain(&step);
+                    let decrease = self.response.cost - response.cost;
+                    tuning.follow(decrease, model, (full, &step), first_noise);
                     (self.parameters, self.response) = (next, response);
-                    *damping = next_damping(*damping, kept, FIRST_DAMPING);
                     return true;
                 }
             }
             may_fail = true;
-            *damping = raised_damping(*damping, FIRST_DAMPING);
+            tuning.damping = raised_damping(tuning.damping, FIRST_DAMPING);
         }
         false
     }
+}
+
+/// Damping and length of the next step, which follow from the steps before.
+struct StepTuning {
+    damping: f64,
+    /// Share of the noise's full step.
+    noise_share: f64,
+}
+
+impl Default for StepTuning {
+    fn default() -> Self {
+        StepTuning {
+            damping: 0.0,
+            noise_share: 1.0,
+        }
+    }
+}
+
+impl StepTuning {
+    /// Follows a step that lowered the cost.
+    fn follow(
+        &mut self,
+        decrease: f64,
+        model: &QuadraticModel,
+        (full, step): (&DVector<f64>, &DVector<f64>),
+        first_noise: usize,
+    ) {
+        let gain = model.predicted_gain(full);
+        let without_noise = model.with_share(full, 0.0, first_noise);
+        let by_others = without_noise.map_or(0.0, |step| model.predicted_gain(&step));
+        let by_noise = gain - by_others;
+        self.noise_share = if self.damping == 0.0 && by_noise > MOSTLY_BY_NOISE * gain {
+            next_share(self.noise_share, (decrease - by_others) / by_noise)
+        } else {
+            1.0
+        };
+        let kept = decrease / model.predicted_gain(step);
+        self.damping = next_damping(self.damping, kept, FIRST_DAMPING);
+    }
+}
+
+/// Share of the noise's next step that ends at the minimum along it.
+///
+/// The information is the expected curvature of the cost; along the noise the curvature of a maneuver
+/// may be twice as large, and full steps zigzag. Let the full step of the noise predict the gain G,
+/// and let r be the curvature over the expected one. The share u then gains G (2u − r u²), of which
+/// `kept` is the ratio to G. The share 1/r ends at the minimum.
+fn next_share(share: f64, kept: f64) -> f64 {
+    let curvature = (2.0 * share - kept) / (share * share);
+    curvature.max(1.0).recip().max(LEAST_SHARE)
 }
 
 /// Half the squared length of the step of the filter's own parameters, in units of their bounds at
@@ -182,4 +243,73 @@ fn step_limits(values: &[f64], floors: &[f64], first_noise: usize) -> Vec<RangeI
         }
     })
     .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    /// Share of the gain that a share of a step keeps, with a curvature over the expected one.
+    fn kept(share: f64, curvature: f64) -> f64 {
+        2.0 * share - curvature * share * share
+    }
+
+    #[test]
+    fn the_next_step_of_the_noise_ends_at_the_minimum_along_it() {
+        for share in [0.5, 0.8, 1.0] {
+            for curvature in [1.0, 1.3, 1.9, 2.4] {
+                let next = next_share(share, kept(share, curvature));
+                assert_relative_eq!(next, 1.0 / curvature, max_relative = 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn a_step_of_the_noise_is_not_lengthened_and_not_stopped() {
+        assert_relative_eq!(next_share(1.0, kept(1.0, 0.5)), 1.0);
+        assert_relative_eq!(next_share(0.5, kept(0.5, 9.0)), LEAST_SHARE);
+    }
+
+    #[test]
+    fn a_quadratic_whose_noise_is_twice_as_curved_is_minimised_by_two_steps() {
+        let model = |at: f64| {
+            QuadraticModel::new(
+                DVector::from_column_slice(&[0.0, -2.0 * at]),
+                DMatrix::identity(2, 2),
+            )
+        };
+        let (start, mut tuning) = (0.7, StepTuning::default());
+        let full = DVector::from_column_slice(&[0.0, -2.0 * start]);
+        let cost = |at: f64| at * at;
+        let next = 0.3 * start;
+        tuning.noise_share = 0.35;
+        let step = model(start)
+            .with_share(&full, tuning.noise_share, 1)
+            .unwrap();
+        assert_relative_eq!(start + step[1], next, max_relative = 1e-12);
+        tuning.follow(cost(start) - cost(next), &model(start), (&full, &step), 1);
+        let full = DVector::from_column_slice(&[0.0, -2.0 * next]);
+        let step = model(next)
+            .with_share(&full, tuning.noise_share, 1)
+            .unwrap();
+        assert_relative_eq!(next + step[1], 0.0, epsilon = 1e-12);
+    }
+
+    #[test]
+    fn a_damped_step_and_a_step_of_other_parameters_leave_the_noise_its_full_step() {
+        let model = QuadraticModel::new(
+            DVector::from_column_slice(&[2.0, 1.0]),
+            DMatrix::identity(2, 2),
+        );
+        let full = DVector::from_column_slice(&[2.0, 1.0]);
+        for damping in [0.0, 1.0] {
+            let mut tuning = StepTuning {
+                damping,
+                noise_share: 0.5,
+            };
+            tuning.follow(1.0, &model, (&full, &full), 1);
+            assert_relative_eq!(tuning.noise_share, 1.0);
+        }
+    }
 }
