@@ -73,7 +73,7 @@ impl QuadraticModel {
         share: f64,
         first: usize,
     ) -> Option<DVector<f64>> {
-        if share == 1.0 {
+        if share >= 1.0 {
             return Some(step.clone());
         }
         let changes = share * step.rows_range(first..);
@@ -150,8 +150,8 @@ mod tests {
             // At the upper limit a further step would still lower the cost.
             let (least, most) = (*limits[j].start(), *limits[j].end());
             match step[j] {
-                s if s == most => assert!(slope[j] > 0.0, "{slope}"),
-                s if s == least => assert!(slope[j] < 0.0, "{slope}"),
+                s if s >= most => assert!(slope[j] > 0.0, "{slope}"),
+                s if s <= least => assert!(slope[j] < 0.0, "{slope}"),
                 _ => assert_abs_diff_eq!(slope[j], 0.0, epsilon = 1e-9),
             }
         }
