@@ -55,7 +55,7 @@ impl QuadraticModel {
             for j in (0..fixed.len()).filter(|j| fixed[*j]) {
                 target[j] = step[j];
             }
-            let Some((j, limit, share)) = first_limit(&step, &target, limits) else {
+            let Some((j, limit, share)) = first_limit((&step, &target), limits, &fixed) else {
                 return Some(target);
             };
             step += share * (target - &step);
@@ -93,16 +93,17 @@ impl QuadraticModel {
 
 /// First limit on the way from a step to another: its parameter, its value and the share of the way.
 fn first_limit(
-    from: &DVector<f64>,
-    to: &DVector<f64>,
+    (from, to): (&DVector<f64>, &DVector<f64>),
     limits: &[RangeInclusive<f64>],
+    fixed: &[bool],
 ) -> Option<(usize, f64, f64)> {
-    let beyond = limits.iter().enumerate().filter_map(|(j, limits)| {
+    let limits = limits.iter().enumerate();
+    let beyond = limits.filter(|(j, limits)| !fixed[*j] && !limits.contains(&to[*j]));
+    let way = beyond.map(|(j, limits)| {
         let limit = to[j].clamp(*limits.start(), *limits.end());
-        let share = (limit - from[j]) / (to[j] - from[j]);
-        (!limits.contains(&to[j])).then_some((j, limit, share))
+        (j, limit, (limit - from[j]) / (to[j] - from[j]))
     });
-    beyond.min_by(|a, b| a.2.total_cmp(&b.2))
+    way.min_by(|a, b| a.2.total_cmp(&b.2))
 }
 
 #[cfg(test)]
@@ -168,6 +169,14 @@ mod tests {
             let step = model().step(damping, &limits).unwrap();
             assert!(limits[2].contains(&step[2]) && step[3] == 0.0, "{step}");
         }
+    }
+
+    #[test]
+    fn a_gradient_without_a_value_gives_no_endless_search() {
+        let gradient = DVector::from_element(2, f64::NAN);
+        let model = QuadraticModel::new(gradient, DMatrix::identity(2, 2));
+        let step = model.step(0.0, &[-1.0..=1.0, FREE]);
+        assert!(step.is_none_or(|step| step.iter().any(|s| s.is_nan())));
     }
 
     #[test]

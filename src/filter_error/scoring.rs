@@ -1,5 +1,5 @@
 //! Minimisation of the filter's cost: scoring steps, damped where a full step does not lower the
-//! cost.
+//! cost. The noise's part of a full step is shortened where the last one went beyond the minimum.
 //!
 //! If a noise is zero, the cost has no minimum in its logarithm. A noise at its floor whose
 //! gradient points below the floor is therefore fixed there. Corner and correlation of a fixed
@@ -239,7 +239,8 @@ fn step_limits(values: &[f64], floors: &[f64], first_noise: usize) -> Vec<RangeI
         if j < first_noise {
             f64::NEG_INFINITY..=f64::INFINITY
         } else {
-            (floor - value).clamp(-LARGEST_FALL, 0.0)..=LARGEST_GROWTH
+            let fall = if value > floor { value - floor } else { 0.0 };
+            -fall.min(LARGEST_FALL)..=LARGEST_GROWTH
         }
     })
     .collect()
@@ -263,6 +264,16 @@ mod tests {
                 assert_relative_eq!(next, 1.0 / curvature, max_relative = 1e-12);
             }
         }
+    }
+
+    #[test]
+    fn a_step_of_the_noise_ends_at_its_floor_and_grows_by_a_factor_at_most() {
+        let (values, floors) = ([3.0, -1.0, -9.0, 0.5], [f64::NEG_INFINITY, -9.0, -9.0, 0.0]);
+        let limits = step_limits(&values, &floors, 1);
+        let free = f64::NEG_INFINITY..=f64::INFINITY;
+        assert_eq!(limits, [free, -4.0..=1.5, 0.0..=1.5, -0.5..=1.5]);
+        let of_zero = step_limits(&[f64::NEG_INFINITY], &[f64::NEG_INFINITY], 0);
+        assert_eq!(of_zero, [0.0..=1.5]);
     }
 
     #[test]
