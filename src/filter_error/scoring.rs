@@ -36,6 +36,9 @@ const MOST_DAMPING: f64 = 1e8;
 /// that is absent thus falls to its floor in few steps.
 const LARGEST_GROWTH: f64 = 1.5;
 const LARGEST_FALL: f64 = 4.0;
+/// Distance from its floor at which a noise counts as there: a step to the floor may end one rounding
+/// above it.
+const ROUNDING: f64 = 1e-12;
 /// Predicted decrease of J by a full step below which the iteration may end although the noise
 /// still changes. The noise drifts along valleys in which no estimate changes.
 const NOISE_TOLERANCE: f64 = 0.1;
@@ -83,8 +86,8 @@ pub fn minimise<const NX: usize, E: InGusts<NX>>(
     };
     let (mut tuning, mut slow_steps) = (StepTuning::default(), 0);
     while scored.iterations < settings.max_iterations {
-        let model = scored.model(filter, floors);
         let limits = step_limits(&scored.parameters, floors, filter.first_noise());
+        let model = scored.model(filter, &limits);
         let Some(full) = model.step(0.0, &limits) else {
             "the information matrix is singular".clone_into(&mut scored.reason);
             break;
@@ -120,15 +123,15 @@ impl Scored {
     fn model<const NX: usize, E: InGusts<NX>>(
         &mut self,
         filter: &JointFilter<NX, E>,
-        floors: &[f64],
+        limits: &[RangeInclusive<f64>],
     ) -> QuadraticModel {
         let (gradient, information) = (
             filter.gradient(&self.response),
             filter.information(&self.response),
         );
         let mut model = QuadraticModel::new(gradient, information);
-        let at_floor = |j: usize| self.parameters[j] <= floors[j] && model.gradient()[j] <= 0.0;
-        self.free = (0..floors.len()).map(|j| !at_floor(j)).collect();
+        let at_floor = |j: usize| *limits[j].start() >= 0.0 && model.gradient()[j] <= 0.0;
+        self.free = (0..limits.len()).map(|j| !at_floor(j)).collect();
         filter.fix_noise(&mut self.free);
         for j in (0..self.free.len()).filter(|j| !self.free[*j]) {
             model.fix(j, 0.0);
@@ -239,8 +242,13 @@ fn step_limits(values: &[f64], floors: &[f64], first_noise: usize) -> Vec<RangeI
         if j < first_noise {
             f64::NEG_INFINITY..=f64::INFINITY
         } else {
-            let fall = if value > floor { value - floor } else { 0.0 };
-            -fall.min(LARGEST_FALL)..=LARGEST_GROWTH
+            let fall = value - floor;
+            let most = if fall > ROUNDING {
+                fall.min(LARGEST_FALL)
+            } else {
+                0.0
+            };
+            -most..=LARGEST_GROWTH
         }
     })
     .collect()
@@ -274,6 +282,19 @@ mod tests {
         assert_eq!(limits, [free, -4.0..=1.5, 0.0..=1.5, -0.5..=1.5]);
         let of_zero = step_limits(&[f64::NEG_INFINITY], &[f64::NEG_INFINITY], 0);
         assert_eq!(of_zero, [0.0..=1.5]);
+    }
+
+    #[test]
+    fn a_noise_that_a_step_has_taken_to_its_floor_is_there_in_spite_of_rounding() {
+        let floor = -0.9;
+        let mut rounded = 0;
+        for value in (0..100).map(|k| 0.007 * f64::from(k)) {
+            let fall = *step_limits(&[value], &[floor], 0)[0].start();
+            rounded += usize::from(value + fall > floor);
+            let after = step_limits(&[value + fall], &[floor], 0);
+            assert_eq!(after, [0.0..=1.5], "{value}");
+        }
+        assert!(rounded > 0);
     }
 
     #[test]
