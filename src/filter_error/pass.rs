@@ -28,6 +28,7 @@ use crate::output_error::case::build_up::ValuedTerm;
 use crate::output_error::case::chunking::{CHUNK, POINTS, Strided};
 use crate::output_error::case::layout::LaneLayout;
 use crate::output_error::kernel::chunk::{ChunkBuildUp, fill_regressor_rows};
+use crate::output_error::kernel::chunk_rows::ChunkRows;
 use crate::output_error::kernel::normal_equations::NormalSums;
 use crate::output_error::kernel::pass::{Diverged, MeasurementUpdate, Propagation};
 use crate::output_error::kernel::propagators::Propagators;
@@ -137,15 +138,14 @@ pub(super) trait RowSink<const NX: usize> {
     /// Takes the steps of some samples of a chunk, before their rows.
     fn take_steps(&mut self, history: &StageHistory<NX>, steps: &Propagators<NX>, samples: usize);
 
-    /// Takes the rows of a chunk that begins at the sample `first`: sample by sample, output by
-    /// output. `white` has the whitened innovations, and `used` the outputs that count.
+    /// Takes the rows of a chunk that begins at the sample `first`. `white` has the whitened innovations, and `used` the outputs that count.
     fn take<'a, S: Simd>(
         &mut self,
         simd: S,
         first: usize,
         white: &[[f64; OUTPUTS]],
         used: impl Fn(usize) -> &'a [bool; OUTPUTS],
-        rows: &mut [f64],
+        rows: ChunkRows,
     );
 }
 
@@ -160,10 +160,10 @@ impl<const NX: usize> RowSink<NX> for NormalSums {
         first: usize,
         white: &[[f64; OUTPUTS]],
         used: impl Fn(usize) -> &'a [bool; OUTPUTS],
-        rows: &mut [f64],
+        mut rows: ChunkRows,
     ) {
-        self.complete_rows(white.len(), rows, |k| (white[k], used(k)));
-        self.add_rows(simd, first, white.len(), rows, &mut Idle);
+        self.complete_rows(white.len(), &mut rows, |k| (white[k], used(k)));
+        self.add_rows(simd, first, white.len(), &rows, &mut Idle);
     }
 }
 
@@ -223,14 +223,13 @@ impl<const NX: usize> RowSink<NX> for RecordedPass<NX> {
         first: usize,
         white: &[[f64; OUTPUTS]],
         used: impl Fn(usize) -> &'a [bool; OUTPUTS],
-        rows: &mut [f64],
+        rows: ChunkRows,
     ) {
         let width = self.rows.width();
         for k in 0..white.len() {
             for o in (0..OUTPUTS).filter(|o| used(k)[*o]) {
-                let (from, to) = (k * OUTPUTS + o, (first + k) * OUTPUTS + o);
-                self.rows.values_mut()[to * width..][..width]
-                    .copy_from_slice(&rows[from * width..][..width]);
+                let to = ((first + k) * OUTPUTS + o) * width;
+                rows.copy_to(k, o, &mut self.rows.values_mut()[to..][..width]);
             }
         }
     }
@@ -378,8 +377,8 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink<NX>> WithSimd for FilterPass<'_
     fn with_simd<S: Simd>(mut self, simd: S) -> Result<(), Diverged> {
         let (case, layout) = (self.case, self.layout);
         let samples = case.samples();
-        let mut rows = AlignedBuffer::zeros(CHUNK * OUTPUTS * layout.width());
-        let rows = rows.slice_mut();
+        let mut rows = AlignedBuffer::zeros(ChunkRows::length(layout.width()));
+        let mut rows = ChunkRows::new(rows.slice_mut());
         let mut regressors = AlignedBuffer::zeros(POINTS * layout.row_length);
         let regressors = regressors.slice_mut();
         let mut build_up = ChunkBuildUp::<NX>::ZERO;
@@ -435,7 +434,7 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink<NX>> WithSimd for FilterPass<'_
                 layout,
                 regressors: S::as_simd_f64s(regressors).0,
                 sensitivities: S::as_mut_simd_f64s(self.start_sensitivities.slice_mut()).0,
-                rows: S::as_mut_simd_f64s(rows).0,
+                rows: rows.reborrow(),
                 history: &history,
                 propagators: &propagators,
                 count,
@@ -447,7 +446,7 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink<NX>> WithSimd for FilterPass<'_
                 let pattern = usize::from(chunk.patterns[k]);
                 &self.corrections.patterns[pattern].used
             };
-            sink.take(simd, first, white, used, rows);
+            sink.take(simd, first, white, used, rows.reborrow());
         }
         Ok(())
     }

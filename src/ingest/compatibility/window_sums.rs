@@ -360,6 +360,7 @@ impl WithSimd for Products<'_> {
             let rows = StridedRows {
                 values,
                 stride: WIDE,
+                vector_stride: VECTOR,
                 count: values.len() / WIDE,
             };
             rows.add_gram(simd, &[VECTOR; WIDE / VECTOR], self.products, WIDE);

@@ -281,6 +281,7 @@ impl WithSimd for Gram<'_> {
         let rows = StridedRows {
             values: self.of.values(),
             stride: width(columns),
+            vector_stride: VECTOR,
             count: rows,
         };
         rows.add_gram(simd, &used, self.to, width(columns));

@@ -11,9 +11,11 @@
     reason = "plain indices become straight code for the vectors"
 )]
 
+use std::array::from_fn;
+
 use pulp::Simd;
 
-use super::simd::VECTOR;
+use super::simd::{VECTOR, load};
 
 /// Work that advances in small steps between the rows of a sum. A chain of dependent operations and
 /// the independent sums then share the processor.
@@ -33,15 +35,24 @@ impl Interleaved for Idle {
 /// Rows of a tile between two steps of the interleaved work: about the latency of one step.
 const ROWS_BETWEEN: usize = 4;
 
-/// Rows of numbers, `stride` apart.
+/// Rows of numbers, in vectors of [`VECTOR`] lanes.
 #[derive(Clone, Copy)]
 pub(crate) struct StridedRows<'a> {
     pub values: &'a [f64],
+    /// Distance between two rows.
     pub stride: usize,
+    /// Distance between two vectors of a row: [`VECTOR`] if its numbers follow one another.
+    pub vector_stride: usize,
     pub count: usize,
 }
 
 impl StridedRows<'_> {
+    /// Index of a lane, counted from the row's first number.
+    #[inline(always)]
+    fn place(self, lane: usize) -> usize {
+        lane / VECTOR * self.vector_stride + lane % VECTOR
+    }
+
     /// Adds Σ s sᵀ to the lower triangle of a matrix with rows of `width`. `used` has the lanes in
     /// use of each vector.
     #[inline(always)]
@@ -106,12 +117,14 @@ impl StridedRows<'_> {
         let into = S::as_mut_simd_f64s(&mut row[lane..lane + C * S::F64_LANES]).0;
         let mut sums = [simd.splat_f64s(0.0); C];
         sums.copy_from_slice(into);
+        let v = self.place(v);
+        let places: [usize; C] = from_fn(|c| self.place(lane + c * S::F64_LANES));
+        let end = (v + 1).max(places[C - 1] + S::F64_LANES);
         for k in 0..self.count {
-            let row = &self.values[k * self.stride..];
+            let row = &self.values[k * self.stride..][..end];
             let factor = simd.splat_f64s(row[v]);
-            let s = S::as_simd_f64s(&row[lane..lane + C * S::F64_LANES]).0;
             for c in 0..C {
-                sums[c] = simd.mul_add_f64s(factor, s[c], sums[c]);
+                sums[c] = simd.mul_add_f64s(factor, load::<S>(row, places[c]), sums[c]);
             }
         }
         into.copy_from_slice(&sums);
@@ -151,13 +164,15 @@ impl StridedRows<'_> {
         interleaved: &mut impl Interleaved,
     ) {
         let mut sums = [[simd.splat_f64s(0.0); C]; T];
-        let end = (first + T).max(lane + C * S::F64_LANES);
         let matrix =
             &mut matrix[first * width + lane..(first + T - 1) * width + lane + C * S::F64_LANES];
         for t in 0..T {
             let row = S::as_simd_f64s(&matrix[t * width..][..C * S::F64_LANES]).0;
             sums[t].copy_from_slice(row);
         }
+        let first = self.place(first);
+        let places: [usize; C] = from_fn(|c| self.place(lane + c * S::F64_LANES));
+        let end = (first + T).max(places[C - 1] + S::F64_LANES);
         for k in 0..self.count {
             if k % ROWS_BETWEEN == 0 {
                 interleaved.advance();
@@ -165,7 +180,9 @@ impl StridedRows<'_> {
             // Rows of one length, so that their bounds are checked once.
             let row = &self.values[k * self.stride..][..end];
             let mut s = [simd.splat_f64s(0.0); C];
-            s.copy_from_slice(S::as_simd_f64s(&row[lane..][..C * S::F64_LANES]).0);
+            for c in 0..C {
+                s[c] = load::<S>(row, places[c]);
+            }
             let factors = &row[first..first + T];
             for t in 0..T {
                 let factor = simd.splat_f64s(factors[t]);

@@ -70,11 +70,11 @@ impl AlignedBuffer {
         self.length = 0;
     }
 
-    /// Appends values.
+    /// Appends a number of zeros.
     #[inline]
-    pub fn append(&mut self, values: &[f64]) {
-        self.buffer.extend_from_slice(values);
-        self.length += values.len();
+    pub fn append_zeros(&mut self, length: usize) {
+        self.length += length;
+        self.buffer.resize(self.first + self.length, 0.0);
     }
 
     #[inline]

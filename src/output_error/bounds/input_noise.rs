@@ -169,6 +169,7 @@ impl<const NX: usize, E: Equations<NX>> WithSimd for Adjoint<'_, NX, E> {
                 let changes = StridedRows {
                     values: rows,
                     stride: width,
+                    vector_stride: VECTOR,
                     count: COEFFICIENTS * CHUNK.min(blocks - b),
                 };
                 changes.add_gram(simd, &whole_vectors, self.covariance, width);

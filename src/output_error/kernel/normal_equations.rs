@@ -12,17 +12,19 @@
 )]
 
 use std::array::from_fn;
+use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 use pulp::Simd;
 
+use super::chunk_rows::ChunkRows;
 use super::pass::Sink;
 use crate::dynamics::OUTPUTS;
-use crate::numerics::vectors::row_products::{Interleaved, StridedRows};
+use crate::numerics::vectors::row_products::Interleaved;
 use crate::numerics::vectors::simd::{AlignedBuffer, vectorised};
 use crate::output_error::case::Measurements;
 use crate::output_error::case::blocks::BlockSums;
-use crate::output_error::case::chunking::{CHUNK, Strided};
+use crate::output_error::case::chunking::Strided;
 use crate::output_error::case::layout::LaneLayout;
 
 /// Sums of all outputs of one case.
@@ -246,7 +248,7 @@ impl Sink for NormalAccumulator<'_> {
         simd: S,
         samples: Strided,
         outputs: &[[f64; OUTPUTS]],
-        rows: &mut [f64],
+        mut rows: ChunkRows,
         interleaved: &mut impl Interleaved,
     ) {
         let Measurements { values, used } = self.measurements;
@@ -258,9 +260,10 @@ impl Sink for NormalAccumulator<'_> {
             }
             (residuals, &used[sample])
         };
-        self.sums.complete_rows(outputs.len(), rows, residuals);
+        let count = outputs.len();
+        self.sums.complete_rows(count, &mut rows, residuals);
         self.sums
-            .add_rows(simd, samples.first, outputs.len(), rows, interleaved);
+            .add_rows(simd, samples.first, count, &rows, interleaved);
     }
 }
 
@@ -272,23 +275,20 @@ impl NormalSums {
     pub fn complete_rows<'u>(
         &mut self,
         samples: usize,
-        rows: &mut [f64],
+        rows: &mut ChunkRows,
         residuals: impl Fn(usize) -> ([f64; OUTPUTS], &'u [bool; OUTPUTS]),
     ) {
         let NormalSums { counts, layout, .. } = self;
-        let (width, residual_lane, one_lane) =
-            (layout.width(), layout.residual_lane, layout.one_lane);
-        let of_samples = rows.chunks_exact_mut(OUTPUTS * width);
-        for (k, of_sample) in of_samples.take(samples).enumerate() {
+        let (residual_lane, one_lane) = (layout.residual_lane, layout.one_lane);
+        for k in 0..samples {
             let (residuals, used) = residuals(k);
             for o in 0..OUTPUTS {
-                let row = &mut of_sample[o * width..][..width];
                 if used[o] {
-                    row[residual_lane] = residuals[o];
-                    row[one_lane] = 1.0;
+                    rows.set(k, o, residual_lane, residuals[o]);
+                    rows.set(k, o, one_lane, 1.0);
                     counts[o] += 1;
                 } else {
-                    row.fill(0.0);
+                    rows.clear(k, o);
                 }
             }
         }
@@ -301,7 +301,7 @@ impl NormalSums {
         simd: S,
         first: usize,
         samples: usize,
-        rows: &[f64],
+        rows: &ChunkRows,
         interleaved: &mut impl Interleaved,
     ) {
         let NormalSums {
@@ -315,14 +315,11 @@ impl NormalSums {
         } = self;
         let width = layout.width();
         if *stride == 1 {
-            add_to_blocks(simd, first, *samples_per_block, rows, samples, blocks);
+            let samples = first..first + samples;
+            add_to_blocks(simd, samples, *samples_per_block, rows, width, blocks);
         }
         for o in 0..OUTPUTS {
-            let own = StridedRows {
-                values: &rows[o * width..],
-                stride: OUTPUTS * width,
-                count: samples,
-            };
+            let own = rows.of_output(o, samples);
             own.add_weighted_sum(simd, layout.residual_lane, moments[o].slice_mut());
             own.add_gram_interleaved(
                 simd,
@@ -335,41 +332,27 @@ impl NormalSums {
     }
 }
 
-/// Adds the rows of some samples, from `first` on, to the rows of their blocks. The first sample of a
-/// block appends its rows.
+/// Adds the rows of a chunk of samples to the rows of their blocks, of `width` lanes. The first sample
+/// of a block appends its rows.
 #[inline(always)]
 fn add_to_blocks<S: Simd>(
     simd: S,
-    first: usize,
+    samples: Range<usize>,
     samples_per_block: usize,
-    rows: &[f64],
-    samples: usize,
+    rows: &ChunkRows,
+    width: usize,
     blocks: &mut AlignedBuffer,
 ) {
-    let row = rows.len() / CHUNK;
-    let mut k = 0;
-    while k < samples {
-        let block = (first + k) / samples_per_block;
-        let next = ((block + 1) * samples_per_block - first).min(samples);
-        if blocks.slice().len() <= block * row {
-            blocks.append(&rows[k * row..][..row]);
-            k += 1;
+    let length = OUTPUTS * width;
+    let mut sample = samples.start;
+    while sample < samples.end {
+        let block = sample / samples_per_block;
+        let next = ((block + 1) * samples_per_block).min(samples.end);
+        if blocks.slice().len() <= block * length {
+            blocks.append_zeros(length);
         }
-        let sums = S::as_mut_simd_f64s(&mut blocks.slice_mut()[block * row..][..row]).0;
-        let lines = S::as_simd_f64s(&rows[k * row..next * row]).0;
-        let vectors = sums.len();
-        // The number of vectors is a multiple of OUTPUTS: so many sums go on side by side.
-        for (v, sums) in sums.chunks_exact_mut(OUTPUTS).enumerate() {
-            let mut partial = [simd.splat_f64s(0.0); OUTPUTS];
-            partial.copy_from_slice(sums);
-            for n in 0..next - k {
-                let line = &lines[n * vectors + v * OUTPUTS..][..OUTPUTS];
-                for i in 0..OUTPUTS {
-                    partial[i] = simd.add_f64s(partial[i], line[i]);
-                }
-            }
-            sums.copy_from_slice(&partial);
-        }
-        k = next;
+        let sums = &mut blocks.slice_mut()[block * length..][..length];
+        rows.add_to(simd, sample - samples.start..next - samples.start, sums);
+        sample = next;
     }
 }

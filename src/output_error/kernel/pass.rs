@@ -23,6 +23,7 @@ use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::chunk::{ChunkBuildUp, fill_regressor_rows};
+use super::chunk_rows::ChunkRows;
 use super::propagators::Propagators;
 use super::trajectory::{StageHistory, Trajectory};
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
@@ -42,14 +43,14 @@ pub struct Diverged {
 
 /// Consumer of the outputs' sensitivities.
 pub(crate) trait Sink {
-    /// Takes the outputs of some samples and their sensitivities: sample by sample, output by output
-    /// one row of lanes. The sink may overwrite the rows, and interleaves the other work.
+    /// Takes the outputs of some samples and their sensitivities. The sink may overwrite the rows, and
+    /// interleaves the other work.
     fn take<S: Simd>(
         &mut self,
         simd: S,
         samples: Strided,
         outputs: &[[f64; OUTPUTS]],
-        rows: &mut [f64],
+        rows: ChunkRows,
         interleaved: &mut impl Interleaved,
     );
 }
@@ -126,8 +127,8 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
         let length = |first: usize| CHUNK.min(samples - first);
         let mut sensitivities = initial_sensitivities::<NX>(case.initial_state, layout);
         let sensitivities = sensitivities.slice_mut();
-        let mut rows = AlignedBuffer::zeros(CHUNK * OUTPUTS * layout.width());
-        let rows = rows.slice_mut();
+        let mut rows = AlignedBuffer::zeros(ChunkRows::length(layout.width()));
+        let mut rows = ChunkRows::new(rows.slice_mut());
         let mut regressors = AlignedBuffer::zeros(POINTS * layout.row_length);
         let regressors = regressors.slice_mut();
         let mut build_up = ChunkBuildUp::<NX>::ZERO;
@@ -181,7 +182,7 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
                 layout,
                 regressors: S::as_simd_f64s(regressors).0,
                 sensitivities: S::as_mut_simd_f64s(sensitivities).0,
-                rows: S::as_mut_simd_f64s(rows).0,
+                rows: rows.reborrow(),
                 history,
                 propagators: &propagators,
                 count,
@@ -194,7 +195,7 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
             };
             let outputs = &self.outputs[first..next];
             self.sink
-                .take(simd, samples, outputs, rows, &mut trajectory);
+                .take(simd, samples, outputs, rows.reborrow(), &mut trajectory);
             x = trajectory.finish();
         }
         Ok(())
@@ -263,8 +264,8 @@ pub(crate) struct Propagation<'a, S: Simd, const NX: usize, K> {
     /// Rows of regressors, point by point.
     pub regressors: &'a [S::f64s],
     pub sensitivities: &'a mut [S::f64s],
-    /// Sensitivities of the outputs: sample by sample, output by output a row of lanes.
-    pub rows: &'a mut [S::f64s],
+    /// Sensitivities of the outputs.
+    pub rows: ChunkRows<'a>,
     pub history: &'a StageHistory<NX>,
     pub propagators: &'a Propagators<NX>,
     pub count: usize,
@@ -305,12 +306,8 @@ impl<S: Simd, const NX: usize, K: MeasurementUpdate<NX>> Propagation<'_, S, NX, 
             let mut r = [[self.simd.splat_f64s(0.0); STAGES]; N];
             let mut y = self.read::<E, N>(k, lane, groups, places, &s, &mut r);
             self.correction.correct(self.simd, k, lanes, &mut s, &mut y);
-            // One slice for a sample, so that its rows share their base.
-            let rows = &mut self.rows[k * OUTPUTS * vectors..][..OUTPUTS * vectors];
             for n in 0..N {
-                for o in 0..OUTPUTS {
-                    rows[o * vectors + lanes[n] / S::F64_LANES] = y[n][o];
-                }
+                self.rows.store::<S>(k, lanes[n], &y[n]);
             }
             s = next_sensitivities::<S, NX, E, N>(self.simd, groups, self.propagators, k, &s, &r);
         }

@@ -3,6 +3,7 @@
 
 use pulp::Simd;
 
+use super::chunk_rows::ChunkRows;
 use super::normal_equations::{NormalAccumulator, NormalSums};
 use super::pass::{Diverged, Sink};
 use crate::dynamics::{Equations, OUTPUTS};
@@ -72,23 +73,19 @@ impl Sink for SensitivityRecorder<'_> {
         _: S,
         samples: Strided,
         outputs: &[[f64; OUTPUTS]],
-        rows: &mut [f64],
+        rows: ChunkRows,
         _: &mut impl Interleaved,
     ) {
         let width = self.sensitivities.width;
-        let (first, length) = (
-            samples.first * OUTPUTS * width,
-            outputs.len() * OUTPUTS * width,
-        );
-        let kept = &mut self.sensitivities.rows.slice_mut()[first..first + length];
-        kept.copy_from_slice(&rows[..length]);
-        let used = self.used[samples.first..].iter();
-        for (kept, used) in kept.chunks_exact_mut(OUTPUTS * width).zip(used) {
+        let kept = self.sensitivities.rows.slice_mut();
+        let kept = kept[samples.first * OUTPUTS * width..].chunks_exact_mut(OUTPUTS * width);
+        for (k, kept) in kept.take(outputs.len()).enumerate() {
             for (o, row) in kept.chunks_exact_mut(width).enumerate() {
-                if !used[o] {
+                if !self.used[samples.first + k][o] {
                     row.fill(0.0);
                     continue;
                 }
+                rows.copy_to(k, o, row);
                 for (lane, output) in &self.biases {
                     row[*lane] = if *output == o { 1.0 } else { 0.0 };
                 }
