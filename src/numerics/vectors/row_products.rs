@@ -1,4 +1,4 @@
-//! Gram matrices Σ s sᵀ and weighted sums Σ v s over rows of numbers.
+//! Gram matrices Σ s sᵀ over rows of numbers.
 //!
 //! The symmetric matrix is updated tile by tile. A tile stays in the processor's registers while
 //! the rows run past, and only tiles that touch the lower triangle are computed.
@@ -89,45 +89,6 @@ impl StridedRows<'_> {
                 _ => self.add_gram_rows::<S, VECTOR, 2>(simd, first, matrix, width, interleaved),
             }
         }
-    }
-
-    /// Adds Σ v s to a row; v is lane `v` of s.
-    #[inline(always)]
-    pub fn add_weighted_sum<S: Simd>(self, simd: S, v: usize, row: &mut [f64]) {
-        let mut lane = 0;
-        while lane + 3 * S::F64_LANES <= row.len() {
-            self.add_weighted_vectors::<S, 3>(simd, v, lane, row);
-            lane += 3 * S::F64_LANES;
-        }
-        while lane < row.len() {
-            self.add_weighted_vectors::<S, 1>(simd, v, lane, row);
-            lane += S::F64_LANES;
-        }
-    }
-
-    /// Adds Σ v s for `C` vectors from a lane on.
-    #[inline(always)]
-    fn add_weighted_vectors<S: Simd, const C: usize>(
-        self,
-        simd: S,
-        v: usize,
-        lane: usize,
-        row: &mut [f64],
-    ) {
-        let into = S::as_mut_simd_f64s(&mut row[lane..lane + C * S::F64_LANES]).0;
-        let mut sums = [simd.splat_f64s(0.0); C];
-        sums.copy_from_slice(into);
-        let v = self.place(v);
-        let places: [usize; C] = from_fn(|c| self.place(lane + c * S::F64_LANES));
-        let end = (v + 1).max(places[C - 1] + S::F64_LANES);
-        for k in 0..self.count {
-            let row = &self.values[k * self.stride..][..end];
-            let factor = simd.splat_f64s(row[v]);
-            for c in 0..C {
-                sums[c] = simd.mul_add_f64s(factor, load::<S>(row, places[c]), sums[c]);
-            }
-        }
-        into.copy_from_slice(&sums);
     }
 
     /// Adds to `T` rows of the matrix, from its left edge to the diagonal, in tiles of `C` vectors.

@@ -32,8 +32,6 @@ use crate::output_error::case::layout::LaneLayout;
 pub(crate) struct NormalSums {
     /// Gram matrix of the rows (s, v, 1) of each output; the lower triangle counts.
     gram: [AlignedBuffer; OUTPUTS],
-    /// Moments Σ v (s, v, 1) of each output.
-    moments: [AlignedBuffer; OUTPUTS],
     /// Number of samples of each output that count.
     counts: [usize; OUTPUTS],
     /// Distance between the samples of the pass.
@@ -73,7 +71,6 @@ impl NormalSums {
         let width = layout.width();
         NormalSums {
             gram: from_fn(|_| AlignedBuffer::zeros(width * width)),
-            moments: from_fn(|_| AlignedBuffer::zeros(width)),
             counts: [0; OUTPUTS],
             stride: 1,
             blocks: AlignedBuffer::default(),
@@ -92,8 +89,8 @@ impl NormalSums {
 
     /// Clears the sums for a pass of this stride.
     pub fn clear(&mut self, stride: usize) {
-        for sums in self.gram.iter_mut().chain(&mut self.moments) {
-            sums.slice_mut().fill(0.0);
+        for gram in &mut self.gram {
+            gram.slice_mut().fill(0.0);
         }
         (self.counts, self.stride) = ([0; OUTPUTS], stride);
         if stride == 1 {
@@ -142,15 +139,17 @@ impl NormalSums {
 
     /// Sum Σ v² of an output.
     pub fn square(&self, output: usize) -> f64 {
-        self.stride as f64 * self.moments[output].slice()[self.layout.residual_lane]
+        let lane = self.layout.residual_lane;
+        self.stride as f64 * self.sum(output, lane, lane)
     }
 
     /// Gradient Σ_o w_o Σ s v over the outputs o with weights w_o, for all parameters.
     pub fn gradient(&self, weights: &[f64; OUTPUTS]) -> DVector<f64> {
+        let residual = self.layout.residual_lane;
         let sum_of = |place: &ParameterPlace| -> f64 {
             (0..OUTPUTS)
                 .filter(|o| place.acts_on(*o))
-                .map(|o| self.stride as f64 * weights[o] * self.moments[o].slice()[place.lane])
+                .map(|o| self.stride as f64 * weights[o] * self.sum(o, place.lane, residual))
                 .sum()
         };
         let sums: Vec<f64> = self.places.iter().map(sum_of).collect();
@@ -161,7 +160,7 @@ impl NormalSums {
     pub fn squares(&self, output: usize) -> DMatrix<f64> {
         self.symmetric_by_parameter(|a, b| {
             if a.acts_on(output) && b.acts_on(output) {
-                self.gram_entry(output, a.lane, b.lane)
+                self.stride as f64 * self.sum(output, a.lane, b.lane)
             } else {
                 0.0
             }
@@ -186,13 +185,15 @@ impl NormalSums {
         self.symmetric_by_parameter(|a, b| match (a.only_output, b.only_output) {
             (None, None) => sum[a.lane.max(b.lane) * width + a.lane.min(b.lane)],
             (Some(o), Some(other)) if o != other => 0.0,
-            (Some(o), _) | (_, Some(o)) => weights[o] * self.gram_entry(o, a.lane, b.lane),
+            (Some(o), _) | (_, Some(o)) => {
+                weights[o] * (self.stride as f64 * self.sum(o, a.lane, b.lane))
+            }
         })
     }
 
-    fn gram_entry(&self, output: usize, i: usize, j: usize) -> f64 {
-        let entry = i.max(j) * self.layout.width() + i.min(j);
-        self.stride as f64 * self.gram[output].slice()[entry]
+    /// Sum of the products of two lanes over the samples of the pass.
+    fn sum(&self, output: usize, i: usize, j: usize) -> f64 {
+        self.gram[output].slice()[i.max(j) * self.layout.width() + i.min(j)]
     }
 
     /// Symmetric matrix of the parameters from its entries.
@@ -306,7 +307,6 @@ impl NormalSums {
     ) {
         let NormalSums {
             gram,
-            moments,
             stride,
             layout,
             blocks,
@@ -320,7 +320,6 @@ impl NormalSums {
         }
         for o in 0..OUTPUTS {
             let own = rows.of_output(o, samples);
-            own.add_weighted_sum(simd, layout.residual_lane, moments[o].slice_mut());
             own.add_gram_interleaved(
                 simd,
                 &layout.lanes_used,
