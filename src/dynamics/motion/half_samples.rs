@@ -7,20 +7,33 @@ use crate::numerics::vectors::simd::vectorised;
 /// step)²/12, and with it the effect of a surface. At 10 samples per second and 1 Hz that is 3 %.
 /// At the ends, and beside a gap, the value is the mean of its neighbours.
 pub fn with_half_samples(values: &[f64]) -> Vec<f64> {
+    let mut points = with_means_between(values);
+    let (pairs, _) = points.as_chunks_mut::<2>();
+    vectorised(
+        #[inline(always)]
+        || {
+            let inner = pairs.get_mut(1..).unwrap_or_default();
+            for ([_, point], four) in inner.iter_mut().zip(values.windows(4)) {
+                let middle = *point + ((four[1] - four[0]) - (four[3] - four[2])) / 16.0;
+                *point = if middle.is_finite() { middle } else { *point };
+            }
+        },
+    );
+    points
+}
+
+/// Interleaves samples with the means of neighbours.
+pub fn with_means_between(values: &[f64]) -> Vec<f64> {
     let Some(last) = values.last() else {
         return vec![];
     };
+    // Room for the last sample, which has no pair.
     let mut pairs = Vec::with_capacity(values.len());
     vectorised(
         #[inline(always)]
         || {
             let pair = |pair: &[f64]| [pair[0], 0.5 * (pair[0] + pair[1])];
             pairs.extend(values.windows(2).map(pair));
-            let inner = pairs.get_mut(1..).unwrap_or_default();
-            for ([_, point], four) in inner.iter_mut().zip(values.windows(4)) {
-                let middle = *point + ((four[1] - four[0]) - (four[3] - four[2])) / 16.0;
-                *point = if middle.is_finite() { middle } else { *point };
-            }
         },
     );
     let mut points = pairs.into_flattened();

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use pulp::Arch;
 
-use super::half_samples::{constant_mean, with_half_samples};
+use super::half_samples::{constant_mean, with_half_samples, with_means_between};
 use super::local_slope::slope;
 use super::measured_motion::{MeasuredMotion, Signals};
 use super::vane_inversion::{FLOW_SIGNALS, VaneInversion};
@@ -66,6 +66,35 @@ impl ManeuverSignals {
         surfaces: impl IntoIterator<Item = &'a str>,
         mass_properties: MassProperties,
     ) -> Result<ManeuverSignals, String> {
+        let between = with_half_samples;
+        ManeuverSignals::cut_with(aircraft, record, range, surfaces, mass_properties, between)
+    }
+
+    /// [`ManeuverSignals::cut`] with all signals linear between samples, as other estimators take
+    /// them.
+    ///
+    /// # Errors
+    /// As [`ManeuverSignals::cut`].
+    pub fn cut_linear<'a>(
+        aircraft: &Aircraft,
+        record: &Record,
+        range: Range<usize>,
+        surfaces: impl IntoIterator<Item = &'a str>,
+        mass_properties: MassProperties,
+    ) -> Result<ManeuverSignals, String> {
+        let between = with_means_between;
+        ManeuverSignals::cut_with(aircraft, record, range, surfaces, mass_properties, between)
+    }
+
+    /// Cuts `range` out of the record; `between` adds the values between samples.
+    fn cut_with<'a>(
+        aircraft: &Aircraft,
+        record: &Record,
+        range: Range<usize>,
+        surfaces: impl IntoIterator<Item = &'a str>,
+        mass_properties: MassProperties,
+        between: fn(&[f64]) -> Vec<f64>,
+    ) -> Result<ManeuverSignals, String> {
         let mut points = BTreeMap::new();
         for name in signal::REQUIRED.iter().copied().chain(surfaces) {
             let values = checked_values(record, name, &range)?;
@@ -74,14 +103,14 @@ impl ManeuverSignals {
             let at_points = if is_mean {
                 constant_mean(values)
             } else {
-                with_half_samples(values)
+                between(values)
             };
             points.insert(name.into(), Arc::new(at_points));
         }
         for name in RATES {
             let values = record.values(name).unwrap_or_default();
             let slope = slope(values, &range, record.step_s);
-            points.insert(slope_name(name).into(), Arc::new(with_half_samples(&slope)));
+            points.insert(slope_name(name).into(), Arc::new(between(&slope)));
         }
         let mut signals = ManeuverSignals {
             points,
@@ -236,20 +265,6 @@ impl ManeuverSignals {
         let mut signals = self.clone();
         signals.set(name, with_half_samples(values));
         signals
-    }
-
-    /// Signals with all signals linear between samples, as other estimators take them.
-    #[must_use]
-    pub fn linear_between_samples(mut self) -> ManeuverSignals {
-        for points in self.points.values_mut() {
-            // No copy, unless other signals share the points.
-            let points = Arc::make_mut(points);
-            for middle in (1..points.len()).step_by(2) {
-                points[middle] = 0.5 * (points[middle - 1] + points[middle + 1]);
-            }
-        }
-        self.flow = Arc::new(self.flow_at_cg());
-        self
     }
 
     /// Signals with a further, constant signal.

@@ -156,14 +156,13 @@ impl StandardCase {
     pub fn signals(&self) -> Result<ManeuverSignals, String> {
         let derivatives = self.free.iter().chain(self.held.iter().map(|(d, _)| d));
         let surfaces = derivatives.flat_map(|d| d.regressor.signals());
-        let signals = ManeuverSignals::cut(
+        ManeuverSignals::cut_linear(
             &self.aircraft,
             &self.record,
             0..self.record.samples,
             surfaces,
             MassProperties::Mean,
-        )?;
-        Ok(signals.linear_between_samples())
+        )
     }
 
     /// Free and held parameters of the case.
