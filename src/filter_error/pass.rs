@@ -25,9 +25,10 @@ use crate::numerics::vectors::row_products::Idle;
 use crate::numerics::vectors::simd::{AlignedBuffer, VECTOR, load};
 use crate::output_error::case::Case;
 use crate::output_error::case::build_up::ValuedTerm;
-use crate::output_error::case::chunking::{CHUNK, POINTS, Strided};
+use crate::output_error::case::chunking::{CHUNK, Strided};
 use crate::output_error::case::layout::LaneLayout;
-use crate::output_error::kernel::chunk::{ChunkBuildUp, fill_regressor_rows};
+use crate::output_error::kernel::chunk::ChunkBuildUp;
+use crate::output_error::kernel::chunk_regressors::ChunkRegressors;
 use crate::output_error::kernel::chunk_rows::ChunkRows;
 use crate::output_error::kernel::normal_equations::NormalSums;
 use crate::output_error::kernel::pass::{Diverged, MeasurementUpdate, Propagation};
@@ -379,8 +380,8 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink<NX>> WithSimd for FilterPass<'_
         let samples = case.samples();
         let mut rows = AlignedBuffer::zeros(ChunkRows::length(layout.width()));
         let mut rows = ChunkRows::new(rows.slice_mut());
-        let mut regressors = AlignedBuffer::zeros(POINTS * layout.row_length);
-        let regressors = regressors.slice_mut();
+        let mut regressors = AlignedBuffer::zeros(ChunkRegressors::length(layout));
+        let mut regressors = ChunkRegressors::new(regressors.slice_mut());
         let mut build_up = ChunkBuildUp::<NX>::ZERO;
         let mut history = StageHistory::<NX>::EMPTY;
         let mut propagators = Propagators::<NX>::ZERO;
@@ -428,11 +429,11 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink<NX>> WithSimd for FilterPass<'_
             };
             propagators.set_steps::<S, E>(simd, &history, count, case.step_s);
             sink.take_steps(&history, &propagators, count);
-            fill_regressor_rows(case, layout, points, regressors);
+            regressors.set(case, layout, points);
             let mut propagation = Propagation {
                 simd,
                 layout,
-                regressors: S::as_simd_f64s(regressors).0,
+                regressors: &regressors,
                 sensitivities: S::as_mut_simd_f64s(self.start_sensitivities.slice_mut()).0,
                 rows: rows.reborrow(),
                 history: &history,

@@ -1,4 +1,4 @@
-//! One chunk of points: the build-up, and the regressors in the rows that the lanes read.
+//! Build-up at the points of a chunk.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
@@ -13,8 +13,7 @@ use nalgebra::{SMatrix, SVector};
 use crate::dynamics::{COEFFICIENTS, Equations};
 use crate::output_error::case::Case;
 use crate::output_error::case::build_up::ValuedTerm;
-use crate::output_error::case::chunking::{PADDED_POINTS, POINTS, Strided};
-use crate::output_error::case::layout::LaneLayout;
+use crate::output_error::case::chunking::{PADDED_POINTS, Strided};
 
 /// Build-up at the points of a chunk: c = offset + slope · x.
 #[repr(align(64))]
@@ -89,26 +88,6 @@ impl<const NX: usize> ChunkBuildUp<NX> {
             }
         }
         by_state
-    }
-}
-
-/// Copies the regressors at the points of a chunk into rows in the order of the lanes.
-#[inline(always)]
-pub(crate) fn fill_regressor_rows<const NX: usize, E: Equations<NX>>(
-    case: &Case<NX, E>,
-    layout: &LaneLayout,
-    points: Strided,
-    rows: &mut [f64],
-) {
-    for &(place, column) in &layout.columns {
-        let column = &case.columns[column][points.first..][..=points.stride * (POINTS - 1)];
-        let rows = rows.chunks_exact_mut(layout.row_length);
-        if points.stride == 1 {
-            rows.zip(column).for_each(|(row, c)| row[place] = *c);
-        } else {
-            let column = column.iter().step_by(points.stride);
-            rows.zip(column).for_each(|(row, c)| row[place] = *c);
-        }
     }
 }
 

@@ -22,7 +22,8 @@
 use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
 
-use super::chunk::{ChunkBuildUp, fill_regressor_rows};
+use super::chunk::ChunkBuildUp;
+use super::chunk_regressors::ChunkRegressors;
 use super::chunk_rows::ChunkRows;
 use super::propagators::Propagators;
 use super::trajectory::{StageHistory, Trajectory};
@@ -31,7 +32,7 @@ use crate::numerics::runge_kutta::{POINT, STAGES};
 use crate::numerics::vectors::row_products::Interleaved;
 use crate::numerics::vectors::simd::{AlignedBuffer, VECTOR, load};
 use crate::output_error::case::build_up::ValuedTerm;
-use crate::output_error::case::chunking::{CHUNK, POINTS, Strided, WIDEST_STRIDE};
+use crate::output_error::case::chunking::{CHUNK, Strided, WIDEST_STRIDE};
 use crate::output_error::case::layout::LaneLayout;
 use crate::output_error::case::{Case, InitialState};
 
@@ -129,8 +130,8 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
         let sensitivities = sensitivities.slice_mut();
         let mut rows = AlignedBuffer::zeros(ChunkRows::length(layout.width()));
         let mut rows = ChunkRows::new(rows.slice_mut());
-        let mut regressors = AlignedBuffer::zeros(POINTS * layout.row_length);
-        let regressors = regressors.slice_mut();
+        let mut regressors = AlignedBuffer::zeros(ChunkRegressors::length(layout));
+        let mut regressors = ChunkRegressors::new(regressors.slice_mut());
         let mut build_up = ChunkBuildUp::<NX>::ZERO;
         let mut histories = [StageHistory::<NX>::EMPTY; 2];
         let mut propagators = Propagators::<NX>::ZERO;
@@ -167,7 +168,7 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
                 first: 2 * stride * first,
                 stride,
             };
-            fill_regressor_rows(case, layout, points, regressors);
+            regressors.set(case, layout, points);
             let next = first + count;
             let next_count = if next < samples { length(next) } else { 0 };
             let next_points = Strided {
@@ -180,7 +181,7 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
             let mut propagation = Propagation {
                 simd,
                 layout,
-                regressors: S::as_simd_f64s(regressors).0,
+                regressors: &regressors,
                 sensitivities: S::as_mut_simd_f64s(sensitivities).0,
                 rows: rows.reborrow(),
                 history,
@@ -261,8 +262,7 @@ impl<const NX: usize> MeasurementUpdate<NX> for NoUpdate {
 pub(crate) struct Propagation<'a, S: Simd, const NX: usize, K> {
     pub simd: S,
     pub layout: &'a LaneLayout,
-    /// Rows of regressors, point by point.
-    pub regressors: &'a [S::f64s],
+    pub regressors: &'a ChunkRegressors<'a>,
     pub sensitivities: &'a mut [S::f64s],
     /// Sensitivities of the outputs.
     pub rows: ChunkRows<'a>,
@@ -293,7 +293,7 @@ impl<S: Simd, const NX: usize, K: MeasurementUpdate<NX>> Propagation<'_, S, NX, 
         let vectors = self.layout.width() / S::F64_LANES;
         let lanes = groups.map(|group| self.layout.groups[group].start + lane);
         let places = groups.map(|group| match self.layout.regressors.get(group) {
-            Some(first) => (first + lane) / S::F64_LANES,
+            Some(first) => first + lane,
             None => 0,
         });
         let mut s = [[self.simd.splat_f64s(0.0); NX]; N];
@@ -331,18 +331,10 @@ impl<S: Simd, const NX: usize, K: MeasurementUpdate<NX>> Propagation<'_, S, NX, 
         r: &mut [[S::f64s; STAGES]; N],
     ) -> [[S::f64s; OUTPUTS]; N] {
         let mut y = [[self.simd.splat_f64s(0.0); OUTPUTS]; N];
-        // Regressors at the start, the middle and the end of the step.
-        let row = self.layout.row_length / S::F64_LANES;
-        let of_step = &self.regressors[2 * k * row..][..3 * row];
         for n in 0..N {
             let mut in_outputs = None;
             if groups[n] != COEFFICIENTS {
-                let place = places[n];
-                let points = [
-                    of_step[place],
-                    of_step[row + place],
-                    of_step[2 * row + place],
-                ];
+                let points = self.regressors.of_step::<S>(k, places[n]);
                 for stage in 0..STAGES {
                     r[n][stage] = points[POINT[stage]];
                     if lane < VECTOR {
