@@ -8,19 +8,34 @@ use super::normal::NORMAL_95;
 /// exceeds the variance, and the delta method behind the degrees of freedom fails.
 const FEWEST: f64 = 3.0;
 
-/// Degrees of freedom above which only the first term of the expansion about the normal
-/// distribution is used: its error is 1.4e-6 there. The inverse of the distribution function loses
+/// Degrees of freedom from which the expansion about the normal distribution is used: its error is
+/// below 1e-8 there. The inverse of the distribution function takes a hundred times as long, and loses
 /// its digits far above (7 % at 1e7).
-const MANY: f64 = 1e3;
+const MANY: f64 = 50.0;
 
 /// Half width of a 95 % interval in standard errors; NaN with zero degrees of freedom.
 #[must_use]
 pub fn quantile_95(degrees_of_freedom: f64) -> f64 {
     if degrees_of_freedom >= MANY {
-        // Abramowitz and Stegun 26.7.5.
-        return NORMAL_95 * (1.0 + (NORMAL_95 * NORMAL_95 + 1.0) / (4.0 * degrees_of_freedom));
+        return NORMAL_95 * (1.0 + expansion(NORMAL_95 * NORMAL_95, 1.0 / degrees_of_freedom));
     }
     StudentsT::new(0.0, 1.0, degrees_of_freedom).map_or(f64::NAN, |t| t.inverse_cdf(0.975))
+}
+
+/// Relative excess of a quantile over the normal one (Abramowitz and Stegun 26.7.5, four terms), from
+/// the square of the normal quantile and the reciprocal of the degrees of freedom.
+fn expansion(square: f64, reciprocal: f64) -> f64 {
+    let x = square;
+    let terms = [
+        (x + 1.0) / 4.0,
+        ((5.0 * x + 16.0) * x + 3.0) / 96.0,
+        (((3.0 * x + 19.0) * x + 17.0) * x - 15.0) / 384.0,
+        ((((79.0 * x + 776.0) * x + 1482.0) * x - 1920.0) * x - 945.0) / 92_160.0,
+    ];
+    terms
+        .iter()
+        .rev()
+        .fold(0.0, |sum, term| reciprocal * (term + sum))
 }
 
 /// Ratio of Student's 95 % interval to the normal one.
@@ -65,7 +80,7 @@ mod tests {
         assert_relative_eq!(
             quantile_95(MANY),
             quantile_95(MANY * (1.0 - 1e-9)),
-            max_relative = 2e-6
+            max_relative = 2e-8
         );
         assert_relative_eq!(quantile_95(f64::INFINITY), NORMAL_95);
     }

@@ -98,7 +98,7 @@ impl<'a> Step for EstimateStep<'a> {
     type Artefact = Estimated;
 
     const KIND: Kind = Kind::Estimate;
-    const VERSION: u32 = 39;
+    const VERSION: u32 = 40;
 
     fn item(&self) -> &str {
         &self.maneuver.maneuver_id

@@ -77,7 +77,7 @@ impl<'a> Step for JointStep<'a> {
     type Artefact = Joined;
 
     const KIND: Kind = Kind::Joint;
-    const VERSION: u32 = 17;
+    const VERSION: u32 = 18;
 
     fn item(&self) -> &str {
         &self.bin.joint_id
