@@ -27,7 +27,7 @@ use crate::output_error::case::Case;
 use crate::output_error::case::build_up::ValuedTerm;
 use crate::output_error::case::chunking::{CHUNK, Strided};
 use crate::output_error::case::layout::LaneLayout;
-use crate::output_error::kernel::chunk::ChunkBuildUp;
+use crate::output_error::kernel::chunk_build_up::ChunkBuildUp;
 use crate::output_error::kernel::chunk_regressors::ChunkRegressors;
 use crate::output_error::kernel::chunk_rows::ChunkRows;
 use crate::output_error::kernel::normal_equations::NormalSums;

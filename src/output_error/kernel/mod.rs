@@ -2,12 +2,12 @@
 //! (1.2), its gradient (1.4) and the Gauss-Newton second gradient (1.5).
 //!
 //! [`reference`] is the same pass in plain scalar code, to be read first. The fast pass goes chunk
-//! by chunk. [`chunk`] has the build-up at a chunk's points, [`chunk_regressors`] the regressors there,
-//! and [`chunk_rows`] the outputs' sensitivities. [`trajectory`] integrates the states,
-//! and [`propagators`] turns each step into matrices. [`pass`] propagates all sensitivities with
-//! these matrices, and [`normal_equations`] adds up the sums. [`response`] is what a caller sees.
+//! by chunk. [`chunk_build_up`] has the build-up at a chunk's points, and [`chunk_regressors`] the
+//! regressors there. [`trajectory`] integrates the states, and [`propagators`] turns each step into
+//! matrices. [`pass`] propagates all sensitivities with these matrices. [`chunk_rows`] has those of
+//! the outputs, and [`normal_equations`] adds up the sums. [`response`] is what a caller sees.
 
-pub(crate) mod chunk;
+pub(crate) mod chunk_build_up;
 pub(crate) mod chunk_regressors;
 pub(crate) mod chunk_rows;
 pub(crate) mod normal_equations;

@@ -22,7 +22,7 @@
 use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
 
-use super::chunk::ChunkBuildUp;
+use super::chunk_build_up::ChunkBuildUp;
 use super::chunk_regressors::ChunkRegressors;
 use super::chunk_rows::ChunkRows;
 use super::propagators::Propagators;

@@ -25,7 +25,7 @@
 use nalgebra::SVector;
 use pulp::Simd;
 
-use super::chunk::ChunkBuildUp;
+use super::chunk_build_up::ChunkBuildUp;
 use super::trajectory::StageHistory;
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
 use crate::numerics::runge_kutta::{STAGES, reaches_s, weights_s};

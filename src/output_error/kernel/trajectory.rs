@@ -11,7 +11,7 @@
 
 use nalgebra::SVector;
 
-use super::chunk::ChunkBuildUp;
+use super::chunk_build_up::ChunkBuildUp;
 use crate::dynamics::{COEFFICIENTS, Equations, Rates};
 use crate::numerics::runge_kutta::{self, POINT, STAGES, reaches_s, weights_s};
 use crate::numerics::vectors::row_products::Interleaved;
