@@ -9,6 +9,7 @@
 mod header;
 mod layout;
 mod outline;
+mod page_file;
 mod reading;
 mod writing;
 #[cfg(test)]

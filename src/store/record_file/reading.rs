@@ -17,6 +17,7 @@ use parquet::file::metadata::PageIndexPolicy;
 
 use super::header::RecordHeader;
 use super::layout::{MARK, PAGE};
+use super::page_file::PageFile;
 use crate::error::Error;
 use crate::flight::record::{Series, with_margin};
 use crate::flight::stand_in::GapExtent;
@@ -189,8 +190,10 @@ impl RecordFile {
         let bad = |what: &dyn Display| not_a_record(&self.path, what);
         let file =
             File::open(&self.path).map_err(Error::io(&self.path, "cannot open the record"))?;
-        let builder =
-            ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.metadata.clone());
+        let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(
+            PageFile::new(file),
+            self.metadata.clone(),
+        );
         let fields = builder.schema().fields().iter().enumerate();
         let columns: Vec<usize> = fields
             .filter(|(_, f)| wanted(f.name().strip_suffix(MARK).unwrap_or(f.name())))
