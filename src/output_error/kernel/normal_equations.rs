@@ -318,12 +318,11 @@ impl NormalSums {
             let samples = first..first + samples;
             add_to_blocks(simd, samples, *samples_per_block, rows, width, blocks);
         }
-        for o in 0..OUTPUTS {
-            let own = rows.of_output(o, samples);
-            own.add_gram_interleaved(
+        for (o, gram) in gram.iter_mut().enumerate() {
+            rows.of_output(o, samples).add_gram_interleaved(
                 simd,
                 &layout.lanes_used,
-                gram[o].slice_mut(),
+                gram.slice_mut(),
                 width,
                 interleaved,
             );
