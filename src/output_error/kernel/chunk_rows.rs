@@ -1,19 +1,21 @@
 //! Rows of a chunk: for each output at each sample the numbers of all lanes.
 //!
 //! A *strip* has one vector of lanes of one output, sample after sample. The strips of all outputs
-//! follow one another, then comes the next vector. The compiler thus knows all distances but that of a
-//! lane's vector, so the loops need few addresses. With addresses for each output and vector, they
-//! would spill to memory and take longer than the sums.
+//! follow one another, then come those of the next vector. The compiler thus knows all distances but
+//! that between vectors, and the loops need few addresses. An address for each output and vector would
+//! not fit into the registers: the stores of addresses then take longer than the sums.
 #![expect(
     clippy::inline_always,
     reason = "compiled into the kernel for the processor at hand"
 )]
 
+use std::ops::Range;
+
 use pulp::Simd;
 
 use crate::dynamics::OUTPUTS;
 use crate::numerics::vectors::row_products::StridedRows;
-use crate::numerics::vectors::simd::{VECTOR, store};
+use crate::numerics::vectors::simd::{VECTOR, load, store};
 use crate::output_error::case::chunking::CHUNK;
 
 /// Numbers of a strip.
@@ -98,19 +100,18 @@ impl<'a> ChunkRows<'a> {
 
     /// Adds the rows of some samples to sums: output by output a row of lanes.
     #[inline(always)]
-    pub fn add_to<S: Simd>(&self, simd: S, samples: std::ops::Range<usize>, sums: &mut [f64]) {
+    pub fn add_to<S: Simd>(&self, simd: S, samples: Range<usize>, sums: &mut [f64]) {
         let width = sums.len() / OUTPUTS;
         for lane in (0..width).step_by(S::F64_LANES) {
             let mut of_outputs = [simd.splat_f64s(0.0); OUTPUTS];
             for (output, sum) in of_outputs.iter_mut().enumerate() {
-                *sum = S::as_simd_f64s(&sums[output * width + lane..][..S::F64_LANES]).0[0];
+                *sum = load::<S>(sums, output * width + lane);
             }
             for sample in samples.clone() {
                 let first = Self::index(sample, 0, lane);
                 let strips = &self.values[first..][..(OUTPUTS - 1) * STRIP + S::F64_LANES];
                 for (output, sum) in of_outputs.iter_mut().enumerate() {
-                    let own = S::as_simd_f64s(&strips[output * STRIP..][..S::F64_LANES]).0[0];
-                    *sum = simd.add_f64s(*sum, own);
+                    *sum = simd.add_f64s(*sum, load::<S>(strips, output * STRIP));
                 }
             }
             for (output, sum) in of_outputs.iter().enumerate() {
