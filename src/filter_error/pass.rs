@@ -139,7 +139,8 @@ pub(super) trait RowSink<const NX: usize> {
     /// Takes the steps of some samples of a chunk, before their rows.
     fn take_steps(&mut self, history: &StageHistory<NX>, steps: &Propagators<NX>, samples: usize);
 
-    /// Takes the rows of a chunk that begins at the sample `first`. `white` has the whitened innovations, and `used` the outputs that count.
+    /// Takes the rows of a chunk that begins at the sample `first`. `white` has the whitened
+    /// innovations, and `used` the outputs that count.
     fn take<'a, S: Simd>(
         &mut self,
         simd: S,
