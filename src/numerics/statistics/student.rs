@@ -9,7 +9,7 @@ use super::normal::NORMAL_95;
 const FEWEST: f64 = 3.0;
 
 /// Degrees of freedom from which the expansion about the normal distribution is used: its error is
-/// below 1e-8 there. The inverse of the distribution function takes a hundred times as long, and loses
+/// below 1e-8 there. The inverse of the distribution function takes longer, and loses
 /// its digits far above (7 % at 1e7).
 const MANY: f64 = 50.0;
 
@@ -23,9 +23,8 @@ pub fn quantile_95(degrees_of_freedom: f64) -> f64 {
 }
 
 /// Relative excess of a quantile over the normal one (Abramowitz and Stegun 26.7.5, four terms), from
-/// the square of the normal quantile and the reciprocal of the degrees of freedom.
-fn expansion(square: f64, reciprocal: f64) -> f64 {
-    let x = square;
+/// the square `x` of the normal quantile and the reciprocal of the degrees of freedom.
+fn expansion(x: f64, reciprocal: f64) -> f64 {
     let terms = [
         (x + 1.0) / 4.0,
         ((5.0 * x + 16.0) * x + 3.0) / 96.0,

@@ -39,7 +39,7 @@ impl<'a> ChunkRows<'a> {
         ChunkRows { values }
     }
 
-    /// The same rows for a shorter time.
+    /// Borrows the same rows for a shorter time.
     #[inline(always)]
     pub fn reborrow(&mut self) -> ChunkRows<'_> {
         ChunkRows {

@@ -140,7 +140,7 @@ impl NormalSums {
     /// Sum Σ v² of an output.
     pub fn square(&self, output: usize) -> f64 {
         let lane = self.layout.residual_lane;
-        self.stride as f64 * self.sum(output, lane, lane)
+        self.gram_entry(output, lane, lane)
     }
 
     /// Gradient Σ_o w_o Σ s v over the outputs o with weights w_o, for all parameters.
@@ -160,7 +160,7 @@ impl NormalSums {
     pub fn squares(&self, output: usize) -> DMatrix<f64> {
         self.symmetric_by_parameter(|a, b| {
             if a.acts_on(output) && b.acts_on(output) {
-                self.stride as f64 * self.sum(output, a.lane, b.lane)
+                self.gram_entry(output, a.lane, b.lane)
             } else {
                 0.0
             }
@@ -185,10 +185,13 @@ impl NormalSums {
         self.symmetric_by_parameter(|a, b| match (a.only_output, b.only_output) {
             (None, None) => sum[a.lane.max(b.lane) * width + a.lane.min(b.lane)],
             (Some(o), Some(other)) if o != other => 0.0,
-            (Some(o), _) | (_, Some(o)) => {
-                weights[o] * (self.stride as f64 * self.sum(o, a.lane, b.lane))
-            }
+            (Some(o), _) | (_, Some(o)) => weights[o] * self.gram_entry(o, a.lane, b.lane),
         })
+    }
+
+    /// Sum of the products of two lanes over all samples.
+    fn gram_entry(&self, output: usize, i: usize, j: usize) -> f64 {
+        self.stride as f64 * self.sum(output, i, j)
     }
 
     /// Sum of the products of two lanes over the samples of the pass.
