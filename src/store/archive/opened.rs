@@ -369,7 +369,7 @@ impl OpenFile {
             .with_projection(mask)
             .with_row_selection(selection)
             .with_batch_size(BATCH_ROWS);
-        let mut read = 0;
+        let (mut read, mut numbers) = (0, Vec::new());
         for batch in builder.build().map_err(|e| unreadable(&e))? {
             let batch: RecordBatch = batch.map_err(|e| unreadable(&e))?;
             let array = batch
@@ -377,7 +377,8 @@ impl OpenFile {
                 .first()
                 .ok_or_else(|| unreadable(&"a batch without its column"))?;
             read += array.len();
-            hand_over(array, column.clock_factor, sink).map_err(|e| unreadable(&e))?;
+            hand_over(array, column.clock_factor, &mut numbers, sink)
+                .map_err(|e| unreadable(&e))?;
         }
         if read == rows.len() {
             Ok(())
