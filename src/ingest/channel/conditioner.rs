@@ -20,6 +20,7 @@ use crate::flight::fill_value::{is_fill_value, is_usual};
 use crate::flight::record::Series;
 use crate::flight::{Channel, Mark};
 use crate::ingest::settings::Settings;
+use crate::numerics::series::finite_places::finite_values;
 use crate::numerics::statistics::order_statistics::{
     upper_median_in_place, upper_median_of_counts,
 };
@@ -372,15 +373,6 @@ impl Conditioner {
         statistics.wraps = self.unwrapper.map_or(0, |u| u.wraps());
         statistics
     }
-}
-
-/// The finite values and their places.
-fn finite_values(values: &[f64]) -> (Vec<usize>, Vec<f64>) {
-    let count = values.iter().filter(|v| v.is_finite()).count();
-    let mut places = Vec::with_capacity(count);
-    places.extend((0..values.len()).filter(|k| values[*k].is_finite()));
-    let finite = places.iter().map(|k| values[*k]).collect();
-    (places, finite)
 }
 
 /// Ranges in which at least `least` values are equal, with the number of these values. Missing

@@ -1,5 +1,6 @@
 //! Update rate of a channel: how many samples of the record lie between two recorded values.
 
+use crate::numerics::series::finite_places::finite_places;
 use crate::numerics::vectors::simd::vectorised;
 
 /// Longest period of a slow channel, in samples of the record: a channel at 1 Hz in a record at
@@ -155,7 +156,7 @@ impl Changes {
 fn distances(values: &[f64]) -> [usize; LONGEST_BETWEEN_NULLS + 1] {
     let mut distances = [0_usize; LONGEST_BETWEEN_NULLS + 1];
     let mut last = None;
-    for (k, _) in values.iter().enumerate().filter(|(_, v)| v.is_finite()) {
+    for k in finite_places(values) {
         if let Some(count) = last.and_then(|last| distances.get_mut(k - last)) {
             *count += 1;
         }
@@ -168,11 +169,12 @@ fn distances(values: &[f64]) -> [usize; LONGEST_BETWEEN_NULLS + 1] {
 fn changes(values: &[f64], first: usize) -> Vec<usize> {
     let mut changes = Vec::new();
     let mut before = f64::NAN;
-    for (k, value) in values.iter().enumerate().filter(|(_, v)| v.is_finite()) {
+    for k in finite_places(values) {
+        let value = values[k];
         if before.is_finite() && value.to_bits() != before.to_bits() {
             changes.push(first + k);
         }
-        before = *value;
+        before = value;
     }
     changes
 }
