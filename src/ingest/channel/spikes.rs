@@ -10,7 +10,9 @@ use std::ops::Range;
 
 use crate::ingest::settings::Spikes;
 use crate::numerics::series::sample_count::whole_steps;
-use crate::numerics::statistics::order_statistics::{SIGMA_PER_MAD, lower_quantile_in_place};
+use crate::numerics::statistics::order_statistics::{
+    SIGMA_PER_MAD, finite_magnitudes, lower_quantile_of_magnitudes,
+};
 use crate::numerics::vectors::simd::vectorised;
 
 /// Variance of a sample minus its neighbours' mean, in variances of white noise: 1 + 1/4 + 1/4.
@@ -46,19 +48,35 @@ const LEAST_REACH: usize = 4;
 
 /// Estimates the level with which a spike is compared, and the standard deviation of the noise.
 pub fn noise_levels(values: &[f64]) -> (f64, f64) {
-    let mut deviations = Vec::with_capacity(values.len() / STRIDE + 1);
-    let sampled = values.chunks(STRIDE).filter_map(|part| part.get(..3));
-    deviations.extend(sampled.map(off_neighbours).filter(|r| r.is_finite()));
-    if deviations.is_empty() {
+    let mut deviations = sampled_deviations(values);
+    if finite_magnitudes(&deviations) == 0 {
         return (0.0, f64::NAN);
     }
     let noise = noise_of(&mut deviations);
     (noise.max(rounding(values, deviations)), noise)
 }
 
-/// Standard deviation of white noise from deviations of samples off their neighbours' mean.
-fn noise_of(deviations: &mut [f64]) -> f64 {
-    SIGMA_PER_MAD / MEAN_VARIANCE.sqrt() * lower_quantile_in_place(deviations, 0.5).unwrap_or(0.0)
+/// Bits of the deviations of every `STRIDE`-th sample off its neighbours' mean; not finite beside a gap.
+fn sampled_deviations(values: &[f64]) -> Vec<u64> {
+    let parts = values.chunks_exact(STRIDE);
+    let last = parts.remainder().get(..3);
+    let mut deviations = vec![0; parts.len()];
+    vectorised(
+        #[inline(always)]
+        || {
+            for (deviation, part) in deviations.iter_mut().zip(values.chunks_exact(STRIDE)) {
+                *deviation = off_neighbours(part).to_bits();
+            }
+        },
+    );
+    deviations.extend(last.map(|part| off_neighbours(part).to_bits()));
+    deviations
+}
+
+/// Standard deviation of white noise from the bits of deviations of samples off their neighbours' mean.
+fn noise_of(deviations: &mut [u64]) -> f64 {
+    let median = lower_quantile_of_magnitudes(deviations, 0.5).unwrap_or(0.0);
+    SIGMA_PER_MAD / MEAN_VARIANCE.sqrt() * median
 }
 
 /// Replaces single-sample spikes by their neighbours' mean and returns their places. `floors` gives
@@ -192,10 +210,9 @@ impl Height {
 /// Noise around a sample, without the sample and its neighbours, which a spike spoils.
 fn local_noise(values: &[f64], k: usize, reach: usize) -> f64 {
     let around = k.saturating_sub(reach)..(k + reach + 1).min(values.len());
-    let mut deviations: Vec<f64> = around
+    let mut deviations: Vec<u64> = around
         .filter(|i| i.abs_diff(k) > 1)
-        .map(|i| off_mean(values, i).abs())
-        .filter(|r| r.is_finite())
+        .map(|i| off_mean(values, i).abs().to_bits())
         .collect();
     noise_of(&mut deviations)
 }
@@ -203,17 +220,18 @@ fn local_noise(values: &[f64], k: usize, reach: usize) -> f64 {
 /// Deviation off the neighbours' mean that rounding alone causes: half the quantisation step, the
 /// least that is not zero. Of a channel that hardly ever changes, half of the least difference between
 /// its values.
-fn rounding(values: &[f64], mut deviations: Vec<f64>) -> f64 {
+fn rounding(values: &[f64], mut deviations: Vec<u64>) -> f64 {
     let largest = values
         .iter()
         .step_by(STRIDE)
         .map(|v| v.abs())
         .fold(0.0, f64::max);
-    deviations.retain(|r| *r > MEAN_ROUNDING * largest);
-    if deviations.len() < LEAST_ROUNDED {
+    let least = (MEAN_ROUNDING * largest).to_bits();
+    deviations.retain(|deviation| *deviation > least);
+    if finite_magnitudes(&deviations) < LEAST_ROUNDED {
         0.5 * least_difference(values, MEAN_ROUNDING * largest)
     } else {
-        lower_quantile_in_place(&mut deviations, ROUNDING_QUANTILE).unwrap_or(0.0)
+        lower_quantile_of_magnitudes(&mut deviations, ROUNDING_QUANTILE).unwrap_or(0.0)
     }
 }
 

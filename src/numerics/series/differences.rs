@@ -3,7 +3,9 @@
 //! Motion at the aircraft's frequencies hardly contributes to second and third differences, and their
 //! median leaves out steps.
 
-use crate::numerics::statistics::order_statistics::{SIGMA_PER_MAD, upper_median_in_place};
+use crate::numerics::statistics::order_statistics::{
+    SIGMA_PER_MAD, finite_magnitudes, upper_median_of_magnitudes,
+};
 
 /// Second difference of three samples.
 #[must_use]
@@ -22,15 +24,12 @@ pub fn third(u: &[f64; 4]) -> f64 {
 /// fewer than two of them.
 #[must_use]
 pub fn white_noise(samples: &[f64]) -> Option<f64> {
-    let mut sizes: Vec<f64> = samples
-        .array_windows()
-        .map(|w| second(w).abs())
-        .filter(|size| size.is_finite())
-        .collect();
-    if sizes.len() < 2 {
+    let sizes = samples.array_windows().map(|w| second(w).abs().to_bits());
+    let mut sizes: Vec<u64> = sizes.collect();
+    if finite_magnitudes(&sizes) < 2 {
         return None;
     }
-    Some(noise_of_second(upper_median_in_place(&mut sizes)?))
+    Some(noise_of_second(upper_median_of_magnitudes(&mut sizes)?))
 }
 
 /// Standard deviation of white noise from the median size of its second differences.

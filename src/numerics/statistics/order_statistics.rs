@@ -7,12 +7,13 @@
 //! | [`upper_median_in_place`] | the larger of the two middle values | ordered: −∞ first, then +∞, then NaN |
 //! | [`quantile`] | linear between the two neighbours | left out |
 //! | [`quantile_of_sorted`] | linear between the two neighbours | infinite if a neighbour is |
-//! | [`lower_quantile_in_place`] | the smaller of the two neighbours | ordered |
+//! | [`upper_median_of_magnitudes`] | the larger of the two middle values | left out |
+//! | [`lower_quantile_of_magnitudes`] | the smaller of the two neighbours | left out |
 //! | [`trimmed_range`] | | ordered |
 //! | [`weighted_median`] | the smaller of the two middle values | ordered |
 //!
-//! Every function returns `None` for no values. The functions on `_in_place` reorder their argument
-//! and allocate nothing; they select in linear time. The upper median of many values is one of the
+//! Every function returns `None` for no values. The functions on `_in_place` and `_of_magnitudes` reorder their
+//! argument and allocate nothing; they select in linear time. The upper median of many values is one of the
 //! values. It needs one selection; the mean of the middle two needs a second pass. Noise estimates
 //! over thousands of samples therefore use it. Trends use it for the scatter of the median
 //! maneuver. The scatter then belongs to one maneuver and is not the mean of two classes.
@@ -69,17 +70,28 @@ pub fn upper_median_of_counts(counts: &mut [usize]) -> Option<usize> {
     (!counts.is_empty()).then(|| *counts.select_nth_unstable(middle).1)
 }
 
-/// Upper median of the finite values among non-negative ones that are given by their bits.
+/// Upper median of the finite values among non-negative ones that are given by their bits. Reorders them.
 ///
 /// Non-negative floats are in the order of their bits, which compare faster than the floats; what
 /// is not finite comes last.
 #[must_use]
 pub fn upper_median_of_magnitudes(bits: &mut [u64]) -> Option<f64> {
-    let finite = bits
-        .iter()
-        .filter(|bits| **bits < f64::INFINITY.to_bits())
-        .count();
-    (finite > 0).then(|| f64::from_bits(*bits.select_nth_unstable(finite / 2).1))
+    select_magnitude(bits, finite_magnitudes(bits) / 2)
+}
+
+/// Quantile of the finite values among non-negative ones that are given by their bits, at a share between 0
+/// and 1; the smaller of two neighbours. Reorders them.
+#[must_use]
+pub fn lower_quantile_of_magnitudes(bits: &mut [u64], share: f64) -> Option<f64> {
+    let last = finite_magnitudes(bits).checked_sub(1)?;
+    select_magnitude(bits, whole(last as f64 * share))
+}
+
+/// Number of finite values among non-negative ones that are given by their bits.
+#[must_use]
+pub fn finite_magnitudes(bits: &[u64]) -> usize {
+    let infinite = f64::INFINITY.to_bits();
+    bits.iter().filter(|bits| **bits < infinite).count()
 }
 
 /// Quantile of the finite values at a share between 0 and 1, linear between neighbours.
@@ -106,13 +118,6 @@ pub fn quantile_of_sorted(sorted: &[f64], share: f64) -> Option<f64> {
     Some(first + second.filter(|_| is_between).map_or(0.0, step))
 }
 
-/// Quantile of all values at a share between 0 and 1; the smaller of two neighbours. Reorders them.
-#[must_use]
-pub fn lower_quantile_in_place(values: &mut [f64], share: f64) -> Option<f64> {
-    let rank = whole(values.len().checked_sub(1)? as f64 * share);
-    select(values, rank)
-}
-
 /// Largest minus smallest value, after a share of the values is left out at either end.
 #[must_use]
 pub fn trimmed_range(mut values: Vec<f64>, share: f64) -> Option<f64> {
@@ -124,6 +129,12 @@ pub fn trimmed_range(mut values: Vec<f64>, share: f64) -> Option<f64> {
 
 fn finite(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     values.into_iter().filter(|v| v.is_finite()).collect()
+}
+
+fn select_magnitude(bits: &mut [u64], rank: usize) -> Option<f64> {
+    let is_there = rank < bits.len();
+    let magnitude = is_there.then(|| f64::from_bits(*bits.select_nth_unstable(rank).1));
+    magnitude.filter(|magnitude| magnitude.is_finite())
 }
 
 fn select(values: &mut [f64], rank: usize) -> Option<f64> {
@@ -159,18 +170,20 @@ mod tests {
     fn medians_of_even_counts_follow_their_rules() {
         assert_eq!(median(EVEN), Some(2.5));
         assert_eq!(upper_median(EVEN), Some(3.0));
-        assert_eq!(lower_quantile_in_place(&mut EVEN.clone(), 0.5), Some(2.0));
         assert_eq!(quantile(EVEN, 0.5), Some(2.5));
         assert_eq!(upper_median_of_counts(&mut [4, 1, 3, 2]), Some(3));
         let mut bits = EVEN.map(f64::to_bits);
         assert_eq!(upper_median_of_magnitudes(&mut bits), Some(3.0));
+        assert_eq!(lower_quantile_of_magnitudes(&mut bits, 0.5), Some(2.0));
     }
 
     #[test]
     fn medians_of_odd_counts_are_the_middle_value() {
         assert_eq!(median(ODD), Some(2.0));
         assert_eq!(upper_median(ODD), Some(2.0));
-        assert_eq!(lower_quantile_in_place(&mut ODD.clone(), 0.5), Some(2.0));
+        let mut bits = ODD.map(f64::to_bits);
+        assert_eq!(upper_median_of_magnitudes(&mut bits), Some(2.0));
+        assert_eq!(lower_quantile_of_magnitudes(&mut bits, 0.5), Some(2.0));
         assert_eq!(quantile(ODD, 0.5), Some(2.0));
     }
 
@@ -183,6 +196,8 @@ mod tests {
         assert_eq!(upper_median_in_place(&mut spoiled.clone()), Some(3.0));
         let mut bits = spoiled.map(f64::to_bits);
         assert_eq!(upper_median_of_magnitudes(&mut bits), Some(2.0));
+        assert_eq!(lower_quantile_of_magnitudes(&mut bits, 1.0), Some(3.0));
+        assert_eq!(finite_magnitudes(&bits), 3);
     }
 
     #[test]
@@ -193,7 +208,7 @@ mod tests {
         assert_eq!(upper_median_of_counts(&mut []), None);
         assert_eq!(upper_median_of_magnitudes(&mut [f64::NAN.to_bits()]), None);
         assert_eq!(quantile([f64::NAN], 0.5), None);
-        assert_eq!(lower_quantile_in_place(&mut [], 0.5), None);
+        assert_eq!(lower_quantile_of_magnitudes(&mut [], 0.5), None);
         assert_eq!(trimmed_range(Vec::new(), 0.02), None);
     }
 

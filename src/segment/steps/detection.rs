@@ -18,7 +18,7 @@ use super::step::{SignalSteps, Step, Steps};
 use crate::flight::Record;
 use crate::numerics::series::differences::white_noise;
 use crate::numerics::statistics::order_statistics::{
-    SIGMA_PER_MAD, lower_quantile_in_place, upper_median_in_place,
+    SIGMA_PER_MAD, finite_magnitudes, lower_quantile_of_magnitudes, upper_median_of_magnitudes,
 };
 use crate::numerics::vectors::simd::vectorised;
 use crate::segment::settings::Settings;
@@ -44,12 +44,14 @@ const NEAR_MAXIMUM: f64 = 0.95;
 pub(in crate::segment) fn detect(record: &Record, settings: &Settings) -> (Steps, Steps) {
     let lengths = DetectorLengths::new(record, settings);
     let (mut steps, mut deflections) = (Steps::default(), Steps::default());
+    // Memory of one signal that serves the next.
+    let (mut levels, mut sizes) = (Vec::new(), Vec::new());
     for (signal, set) in &settings.steps {
         let Some(values) = record.values(signal) else {
             continue;
         };
-        let levels = levels(values, lengths.level);
-        let own_noise = noise(&levels, lengths, is_maneuver_alone(record));
+        set_levels(&mut levels, values, lengths.level);
+        let own_noise = noise(&levels, lengths, is_maneuver_alone(record), &mut sizes);
         let mut over_noise = settings.steps_over_noise * own_noise;
         if is_maneuver_alone(record) {
             over_noise = over_noise.min(settings.outstanding_share * largest(&levels, lengths));
@@ -94,7 +96,9 @@ pub(in crate::segment) fn largest_change(
         .values(signal)
         .and_then(|v| v.get(first..end))
         .unwrap_or_default();
-    largest(&levels(values, lengths.level), lengths)
+    let mut levels = Vec::new();
+    set_levels(&mut levels, values, lengths.level);
+    largest(&levels, lengths)
 }
 
 /// Standard deviation of the changes between levels that white noise of a signal causes. `None`
@@ -111,23 +115,30 @@ pub(in crate::segment) fn level_noise(
 
 /// Standard deviation of uncommanded changes. Steps are few, so it follows from the median size of
 /// all changes. In a recording that is a single maneuver they are not few; there it follows from
-/// the rests between the inputs.
-fn noise(levels: &[f64], lengths: DetectorLengths, is_maneuver_alone: bool) -> f64 {
-    let mut sizes: Vec<f64> = sizes(levels, lengths).collect();
-    if sizes.len() < 2 {
+/// the rests between the inputs. `sizes` becomes the bits of the changes' sizes.
+fn noise(
+    levels: &[f64],
+    lengths: DetectorLengths,
+    is_maneuver_alone: bool,
+    sizes: &mut Vec<u64>,
+) -> f64 {
+    sizes.clear();
+    sizes.extend(all_sizes(levels, lengths).map(f64::to_bits));
+    if finite_magnitudes(sizes) < 2 {
         return 0.0;
     }
-    let of_all = SIGMA_PER_MAD * upper_median_in_place(&mut sizes).unwrap_or(0.0);
+    let of_all = SIGMA_PER_MAD * upper_median_of_magnitudes(sizes).unwrap_or(0.0);
     if !is_maneuver_alone {
         return of_all;
     }
-    let quiet = lower_quantile_in_place(&mut sizes, QUIET_SHARE).unwrap_or(0.0);
+    let quiet = lower_quantile_of_magnitudes(sizes, QUIET_SHARE).unwrap_or(0.0);
     of_all.min(quiet / QUIET_DEVIATIONS)
 }
 
 /// Largest change of a signal.
 fn largest(levels: &[f64], lengths: DetectorLengths) -> f64 {
-    sizes(levels, lengths).fold(0.0, f64::max)
+    let finite = all_sizes(levels, lengths).filter(|size| size.is_finite());
+    finite.fold(0.0, f64::max)
 }
 
 /// Longest recording that may be one maneuver alone, s: the longest maneuvers take 40 s with their
@@ -196,13 +207,11 @@ fn level_pairs(levels: &[f64], lengths: DetectorLengths) -> (&[f64], &[f64]) {
     (&levels[..after.len()], after)
 }
 
-/// Sizes of the changes between levels, at each time at which both levels exist.
-fn sizes(levels: &[f64], lengths: DetectorLengths) -> impl Iterator<Item = f64> {
+/// Sizes of the changes between levels; not finite where a level does not exist.
+fn all_sizes(levels: &[f64], lengths: DetectorLengths) -> impl Iterator<Item = f64> {
     let (before, after) = level_pairs(levels, lengths);
     let changes = before.iter().zip(after);
-    changes
-        .map(|(before, after)| (after - before).abs())
-        .filter(|size| size.is_finite())
+    changes.map(|(before, after)| (after - before).abs())
 }
 
 /// The finite changes between levels of at least the smallest size.
@@ -306,11 +315,12 @@ const LOOKED_AT_ONCE: usize = 64;
 /// Least number of finite samples of a level that leaves out its largest and smallest: two remain.
 const FEWEST_TO_TRIM: f64 = 4.0;
 
-/// Level that begins at each sample: the mean of its finite samples without the largest and the
+/// Sets the level that begins at each sample: the mean of its finite samples without the largest and the
 /// smallest. NaN if fewer than half are finite.
-fn levels(values: &[f64], length: usize) -> Vec<f64> {
+fn set_levels(levels: &mut Vec<f64>, values: &[f64], length: usize) {
     let count = (values.len() + 1).saturating_sub(length);
-    let mut levels = Vec::with_capacity(count + SIDE);
+    levels.clear();
+    levels.reserve(count + SIDE);
     // Samples of the last levels, and missing ones up to a full side.
     let mut last = values[count / SIDE * SIDE..].to_vec();
     last.resize(SIDE + length - 1, f64::NAN);
@@ -324,7 +334,6 @@ fn levels(values: &[f64], length: usize) -> Vec<f64> {
         },
     );
     levels.truncate(count);
-    levels
 }
 
 #[inline(always)]
@@ -374,6 +383,12 @@ mod tests {
         half_transit: 3,
         level: 5,
     };
+
+    fn levels(values: &[f64], length: usize) -> Vec<f64> {
+        let mut levels = Vec::new();
+        set_levels(&mut levels, values, length);
+        levels
+    }
 
     fn steps(values: &[f64]) -> Vec<Step> {
         steps_of_levels(&levels(values, LENGTHS.level), 2.0, LENGTHS)
@@ -482,7 +497,8 @@ mod tests {
     fn noise_alone_is_the_same_by_its_quiet_tenth_as_by_its_median() {
         let mut random = crate::numerics::statistics::random::RandomStream::new(5, "levels");
         let levels: Vec<f64> = (0..20_000).map(|_| random.normal()).collect();
-        let [median, quiet] = [false, true].map(|alone| noise(&levels, LENGTHS, alone));
+        let [median, quiet] =
+            [false, true].map(|alone| noise(&levels, LENGTHS, alone, &mut vec![]));
         // Differences of white levels: √2 of their deviation.
         assert_abs_diff_eq!(median, 2.0_f64.sqrt(), epsilon = 0.05);
         assert_abs_diff_eq!(quiet, median, epsilon = 0.08);
