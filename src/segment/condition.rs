@@ -6,6 +6,7 @@ use crate::aircraft::{Aircraft, Position, VaneFlow};
 use crate::flight::{Record, signal};
 use crate::maneuver::{Class, Maneuver, ManeuverOrigin, Quality, Recognised};
 use crate::numerics::statistics::mean::finite_mean;
+use crate::numerics::vectors::simd::vectorised;
 use crate::units::DEG;
 
 use super::quality;
@@ -106,19 +107,25 @@ fn mean_alpha_deg(
     );
     let [p, q, r] = [of(signal::P)?, of(signal::Q)?, of(signal::R)?];
     let [x, y, z] = [of(signal::X_CG)?, of(signal::Y_CG)?, of(signal::Z_CG)?];
-    let alpha_at_cg = |k: usize| {
-        let at_vanes = VaneFlow {
-            alpha: alpha[k] / DEG,
-            beta: beta[k] / DEG,
-            velocity: velocity[k],
-            rates: [p[k] / DEG, q[k] / DEG, r[k] / DEG],
-        };
-        let cg = Position {
-            x_ft: x[k],
-            y_ft: y[k],
-            z_ft: z[k],
-        };
-        aircraft.sensors.flow_at_cg(&at_vanes, cg).alpha * DEG
-    };
-    finite_mean((0..alpha.len()).map(alpha_at_cg))
+    let mut at_cg = vec![0.0; alpha.len()];
+    vectorised(
+        #[inline(always)]
+        || {
+            for (k, alpha_at_cg) in at_cg.iter_mut().enumerate() {
+                let at_vanes = VaneFlow {
+                    alpha: alpha[k] / DEG,
+                    beta: beta[k] / DEG,
+                    velocity: velocity[k],
+                    rates: [p[k] / DEG, q[k] / DEG, r[k] / DEG],
+                };
+                let cg = Position {
+                    x_ft: x[k],
+                    y_ft: y[k],
+                    z_ft: z[k],
+                };
+                *alpha_at_cg = aircraft.sensors.flow_at_cg(&at_vanes, cg).alpha * DEG;
+            }
+        },
+    );
+    finite_mean(at_cg)
 }
