@@ -33,6 +33,7 @@ impl CubicCurve {
 /// Ordinate and slope of Hermite's cubic at the fraction `t` of an interval of length `h`, from the ordinates
 /// and slopes at its ends. With the chord c = (y₁ − y₀)/h:
 /// y = y₀ + h t [d₀ + t (3c − 2d₀ − d₁) + t² (d₀ + d₁ − 2c)].
+#[inline]
 pub fn hermite(h: f64, t: f64, [y0, y1]: [f64; 2], [d0, d1]: [f64; 2]) -> (f64, f64) {
     let chord = (y1 - y0) / h;
     let (second, third) = (3.0 * chord - 2.0 * d0 - d1, d0 + d1 - 2.0 * chord);

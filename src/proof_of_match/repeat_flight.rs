@@ -281,7 +281,7 @@ impl Repeat<'_> {
         let width = self.repeats.width();
         bias.resize(width, 0.0);
         let mut drawn = AlignedBuffer::zeros(SIDE_BY_SIDE * width);
-        let mut inside = Vec::with_capacity(draws.len());
+        let (mut inside, mut doubtful) = (Vec::with_capacity(draws.len()), Vec::new());
         for draws in draws.chunks(SIDE_BY_SIDE) {
             Arch::new().dispatch(DrawnDifferences {
                 bias: &bias,
@@ -290,7 +290,7 @@ impl Repeat<'_> {
                 drawn: drawn.slice_mut(),
             });
             let drawn = drawn.slice().chunks_exact(width).take(draws.len());
-            inside.extend(drawn.map(|drawn| limits.inside(drawn)));
+            inside.extend(drawn.map(|drawn| limits.inside(drawn, &mut doubtful)));
         }
         inside
     }
@@ -330,7 +330,8 @@ struct SampleLimits {
 struct Interval {
     /// Samples of the effects on either side.
     ends: [usize; 2],
-    least_width: f64,
+    /// Size of both effects up to which noise moves none of the samples outside.
+    certain: f64,
     samples: Vec<SampleLimit>,
 }
 
@@ -353,6 +354,7 @@ impl SampleLimits {
         required_pct: f64,
     ) -> SampleLimits {
         let last = recording.samples.div_ceil(stride).saturating_sub(1);
+        let noise = recording.noise[output];
         let limit = |sample: usize| SampleLimit {
             width: tolerance.width(recording.measured[sample][output]),
             share: (sample % stride) as f64 / stride as f64,
@@ -361,9 +363,10 @@ impl SampleLimits {
             let samples = first * stride..((first + 1) * stride).min(recording.samples);
             let counted = samples.filter(|k| !recording.repaired[*k][output]);
             let samples: Vec<SampleLimit> = counted.map(limit).collect();
+            let least_width = samples.iter().map(|own| own.width).fold(f64::MAX, f64::min);
             Interval {
                 ends: [first, (first + 1).min(last)],
-                least_width: samples.iter().map(|own| own.width).fold(f64::MAX, f64::min),
+                certain: (least_width - CERTAIN * noise) / BETWEEN,
                 samples,
             }
         };
@@ -371,22 +374,22 @@ impl SampleLimits {
         let counted = intervals.iter().map(|own| own.samples.len()).sum();
         SampleLimits {
             output,
-            noise: recording.noise[output],
+            noise,
             allowed: allowed_outside(counted, required_pct),
             intervals,
         }
     }
 
-    /// Probability that the required share of samples is inside, over the sensors' noise.
-    fn inside(&self, drawn: &[f64]) -> f64 {
+    /// Probability that the required share of samples is inside, over the sensors' noise. The memory of
+    /// `doubtful` is used again from draw to draw.
+    fn inside(&self, drawn: &[f64], doubtful: &mut Vec<(f64, f64)>) -> f64 {
         let noise = self.noise;
         let mut outside = 0;
-        let mut doubtful = Vec::new();
+        doubtful.clear();
         for interval in &self.intervals {
             let [first, last] = interval.ends;
             let (a, b) = (drawn[first], drawn[last]);
-            let largest = BETWEEN * a.abs().max(b.abs());
-            if interval.least_width - largest >= CERTAIN * noise {
+            if a.abs().max(b.abs()) <= interval.certain {
                 continue;
             }
             for SampleLimit { width, share } in &interval.samples {
@@ -402,9 +405,9 @@ impl SampleLimits {
                 }
             }
         }
-        let inside = doubtful.into_iter();
+        let inside = doubtful.iter();
         let inside: Vec<f64> = inside
-            .map(|(width, difference)| normal::within(width, difference, noise))
+            .map(|(width, difference)| normal::within(*width, *difference, noise))
             .collect();
         at_most_outside(&inside, self.allowed - outside)
     }

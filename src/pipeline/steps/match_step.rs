@@ -59,7 +59,7 @@ impl<'a> Step for MatchStep<'a> {
     type Artefact = Matched;
 
     const KIND: Kind = Kind::Match;
-    const VERSION: u32 = 7;
+    const VERSION: u32 = 8;
 
     fn item(&self) -> &str {
         &self.maneuver.maneuver_id
