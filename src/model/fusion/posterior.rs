@@ -112,11 +112,29 @@ impl SolvedPosterior<'_> {
         staircase_square(&halves, &first_rows)
     }
 
-    /// Means and covariance that the posterior gives for a flight's rows.
+    /// Means and covariance that the posterior gives for the rows of each flight. The columns of all
+    /// flights are solved together: those of one alone are too few for the blocks.
     #[must_use]
-    pub fn image(&self, flight: &FlightData, unknowns: usize) -> (DVector<f64>, DMatrix<f64>) {
-        let halves = self.whitened_columns(&flight.columns(unknowns));
-        (halves.tr_mul(&self.vector), square(&halves))
+    pub fn images(
+        &self,
+        flights: &[FlightData],
+        unknowns: usize,
+    ) -> Vec<(DVector<f64>, DMatrix<f64>)> {
+        let own: Vec<DMatrix<f64>> = flights.iter().map(|f| f.columns(unknowns)).collect();
+        let mut columns = DMatrix::zeros(unknowns, own.iter().map(DMatrix::ncols).sum());
+        let mut first = 0;
+        let mut places = vec![];
+        for own in &own {
+            columns.columns_mut(first, own.ncols()).copy_from(own);
+            places.push((first, own.ncols()));
+            first += own.ncols();
+        }
+        let halves = self.whitened_columns(&columns);
+        let image = |(first, count): (usize, usize)| {
+            let own = halves.columns(first, count).into_owned();
+            (own.tr_mul(&self.vector), square(&own))
+        };
+        places.into_iter().map(image).collect()
     }
 }
 

@@ -78,12 +78,14 @@ pub fn maneuvers(
     let added = added.filter_map(|(flight, own)| flight.added_by(own, weights, unknowns));
     all.remove(&added.collect::<Vec<_>>());
     let rest = all.solved()?;
+    let omitted = flights.iter();
+    let omitted = omitted.map(|(flight, left_out)| flight.of_maneuvers(left_out));
+    let omitted: Vec<FlightData> = omitted.collect();
     let mut sum = Agreement::default();
-    for (flight, left_out) in &flights {
-        let left_out = flight.of_maneuvers(left_out);
-        let (predicted, predicted_covariance) = rest.image(&left_out, unknowns);
-        let differences: DVector<f64> = &left_out.differences - predicted;
-        let covariance = predicted_covariance + left_out.covariance(weights);
+    let predictions = rest.images(&omitted, unknowns);
+    for (omitted, (predicted, predicted_covariance)) in omitted.iter().zip(predictions) {
+        let differences: DVector<f64> = &omitted.differences - predicted;
+        let covariance = predicted_covariance + omitted.covariance(weights);
         let prediction = LeaveOneOutDifference {
             differences,
             covariance,

@@ -334,10 +334,22 @@ fn without_what_maneuvers_add_there_is_the_information_of_the_others() {
     }
     let expected = WhitenedInformation::new(&root, &others).solved().unwrap();
     let found = whitened.solved().unwrap();
-    let (mean, covariance) = found.image(&data.flights[0], count);
-    let (expected_mean, expected_covariance) = expected.image(&data.flights[0], count);
-    assert_relative_eq!(mean, expected_mean, epsilon = 1e-9);
-    assert_relative_eq!(covariance, expected_covariance, epsilon = 1e-9);
+    let (images, expected) = (
+        found.images(&data.flights, count),
+        expected.images(&data.flights, count),
+    );
+    assert_eq!(images.len(), data.flights.len());
+    for ((mean, covariance), (expected_mean, expected_covariance)) in images.iter().zip(&expected) {
+        assert_relative_eq!(mean, expected_mean, epsilon = 1e-9);
+        assert_relative_eq!(covariance, expected_covariance, epsilon = 1e-9);
+    }
+    // The rows of each flight are its own.
+    for (flight, (mean, covariance)) in data.flights.iter().zip(&images) {
+        let alone = found.images(std::slice::from_ref(flight), count);
+        assert_relative_eq!(mean, &alone[0].0, epsilon = 1e-12);
+        assert_relative_eq!(covariance, &alone[0].1, epsilon = 1e-12);
+    }
+    assert!(found.images(&[], count).is_empty());
 }
 
 #[test]
