@@ -405,22 +405,20 @@ impl SampleLimits {
                 }
             }
         }
-        let inside = doubtful.iter();
-        let inside: Vec<f64> = inside
-            .map(|(width, difference)| normal::within(*width, *difference, noise))
-            .collect();
-        at_most_outside(&inside, self.allowed - outside)
+        let doubtful = doubtful.iter();
+        let inside = doubtful.map(|(width, difference)| normal::within(*width, *difference, noise));
+        at_most_outside(inside, self.allowed - outside)
     }
 }
 
 /// Probability that at most `allowed` of independent samples are outside.
-fn at_most_outside(inside: &[f64], allowed: usize) -> f64 {
+fn at_most_outside(inside: impl Iterator<Item = f64>, allowed: usize) -> f64 {
     if allowed == 0 {
-        return inside.iter().product();
+        return inside.product();
     }
     let mut outside = vec![0.0; allowed + 1];
     outside[0] = 1.0;
-    for (before, inside) in inside.iter().enumerate() {
+    for (before, inside) in inside.enumerate() {
         // At most as many samples can be outside as were considered so far.
         for count in (1..=allowed.min(before + 1)).rev() {
             outside[count] = inside * outside[count] + (1.0 - inside) * outside[count - 1];
@@ -437,15 +435,15 @@ mod tests {
 
     #[test]
     fn the_count_outside_is_that_of_the_binomial_distribution() {
-        let inside = [0.9; 10];
+        let inside = || [0.9; 10].into_iter();
         assert_relative_eq!(
-            at_most_outside(&inside, 0),
+            at_most_outside(inside(), 0),
             0.9_f64.powi(10),
             epsilon = 1e-12
         );
         let one = 10.0 * 0.1 * 0.9_f64.powi(9);
         let most_one = 0.9_f64.powi(10) + one;
-        assert_relative_eq!(at_most_outside(&inside, 1), most_one, epsilon = 1e-12);
-        assert_relative_eq!(at_most_outside(&inside, 10), 1.0, epsilon = 1e-12);
+        assert_relative_eq!(at_most_outside(inside(), 1), most_one, epsilon = 1e-12);
+        assert_relative_eq!(at_most_outside(inside(), 10), 1.0, epsilon = 1e-12);
     }
 }

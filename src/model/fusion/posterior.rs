@@ -70,14 +70,12 @@ impl<'a> WhitenedInformation<'a> {
     /// Removes rows that the data had added, each flight's as columns over the unknowns, with their
     /// differences.
     pub fn remove(&mut self, added: &[(DMatrix<f64>, DVector<f64>)]) {
-        let columns = added.iter().flat_map(|(rows, _)| rows.column_iter());
-        let columns: Vec<_> = columns.collect();
-        if columns.is_empty() {
+        let Some(columns) = side_by_side(added.iter().map(|(rows, _)| rows)) else {
             return;
-        }
+        };
         let differences = added.iter().flat_map(|(_, own)| own.iter().copied());
-        let differences = DVector::from_iterator(columns.len(), differences);
-        let rows = self.root.left(&DMatrix::from_columns(&columns));
+        let differences = DVector::from_iterator(columns.ncols(), differences);
+        let rows = self.root.left(&columns);
         self.vector.gemv(-1.0, &rows, &differences, 1.0);
         subtract_square(&rows, &rows.transpose(), &mut self.inner.as_view_mut());
     }
@@ -112,8 +110,8 @@ impl SolvedPosterior<'_> {
         staircase_square(&halves, &first_rows)
     }
 
-    /// Means and covariance that the posterior gives for the rows of each flight. The columns of all
-    /// flights are solved together: those of one alone are too few for the blocks.
+    /// Means and covariance that the posterior gives for the rows of each flight; none without a row.
+    /// The columns of all flights are solved together: those of one alone are too few for the blocks.
     #[must_use]
     pub fn images(
         &self,
@@ -121,21 +119,24 @@ impl SolvedPosterior<'_> {
         unknowns: usize,
     ) -> Vec<(DVector<f64>, DMatrix<f64>)> {
         let own: Vec<DMatrix<f64>> = flights.iter().map(|f| f.columns(unknowns)).collect();
-        let mut columns = DMatrix::zeros(unknowns, own.iter().map(DMatrix::ncols).sum());
-        let mut first = 0;
-        let mut places = vec![];
-        for own in &own {
-            columns.columns_mut(first, own.ncols()).copy_from(own);
-            places.push((first, own.ncols()));
-            first += own.ncols();
-        }
-        let halves = self.whitened_columns(&columns);
-        let image = |(first, count): (usize, usize)| {
-            let own = halves.columns(first, count).into_owned();
-            (own.tr_mul(&self.vector), square(&own))
+        let Some(columns) = side_by_side(own.iter()) else {
+            return vec![];
         };
-        places.into_iter().map(image).collect()
+        let halves = self.whitened_columns(&columns);
+        let mut first = 0;
+        let image = |own: &DMatrix<f64>| {
+            let halves = halves.columns(first, own.ncols()).into_owned();
+            first += own.ncols();
+            (halves.tr_mul(&self.vector), square(&halves))
+        };
+        own.iter().map(image).collect()
     }
+}
+
+/// Columns of some matrices side by side; `None` without a column.
+fn side_by_side<'m>(matrices: impl Iterator<Item = &'m DMatrix<f64>>) -> Option<DMatrix<f64>> {
+    let columns: Vec<_> = matrices.flat_map(DMatrix::column_iter).collect();
+    (!columns.is_empty()).then(|| DMatrix::from_columns(&columns))
 }
 
 /// Cholesky factor L of I + Rᵀ Λ R = L Lᵀ, from the lower triangle of `inner` = Rᵀ Λ R.
