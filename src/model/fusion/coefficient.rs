@@ -18,7 +18,7 @@ use crate::aero::WindTunnel;
 use crate::model::evidence::ManeuverResults;
 use crate::model::prior::scale_prior::Scale;
 use crate::model::prior::term::{PosteriorTerm, TermSources};
-use crate::numerics::linear_algebra::root::EXACT;
+use crate::numerics::linear_algebra::root::{BlockRoot, EXACT};
 
 /// Number of reweightings: weights follow from scales, and scales from weights.
 const REWEIGHTINGS: usize = 2;
@@ -60,16 +60,20 @@ impl CoefficientPosterior {
         let mut fit = data.fit(&terms, &weights, &noise_scales)?;
         for _ in 0..REWEIGHTINGS {
             let freedom = basis.settings.degrees_of_freedom;
-            weights = reweighted(&data.flights, &weights, &fit.gaussian, freedom);
+            let root = data.observed_root(&terms, &fit, EXACT);
+            let of_observed = gaussian(&root, &fit.information)?;
+            weights = reweighted(&data.flights, &weights, &of_observed, freedom);
             noise_scales = fit.scales;
             fit = data.fit(&terms, &weights, &noise_scales)?;
         }
+        let observed_root = data.observed_root(&terms, &fit, LEAST_VARIANCE);
         let Fit {
             observed,
             scales,
             information,
-            mut gaussian,
         } = fit;
+        let root = data.unknowns.root(&terms, &scales, EXACT);
+        let mut gaussian = gaussian(&root, &information)?;
         let terms_posterior = TermsPosterior {
             terms: &terms,
             scales: &scales,
@@ -77,8 +81,7 @@ impl CoefficientPosterior {
         };
         let held = data.held(&terms_posterior, &weights, evidence, basis.tunnel);
         let flights = data.agreement_of_flights(&weights, &gaussian);
-        let root = data.unknowns.root(&terms, &scales, LEAST_VARIANCE);
-        let all = WhitenedInformation::new(&root, &information);
+        let all = WhitenedInformation::new(&observed_root, &information);
         let classes = data.agreement_of_classes(&all, &weights, evidence);
         add_open_scales(&observed, &scales, &mut gaussian);
         Some(CoefficientPosterior {
@@ -96,13 +99,12 @@ impl CoefficientPosterior {
     }
 }
 
-/// Most probable scales and their Gaussian for some weights, with the evidence that they follow from.
+/// Most probable scales for some weights, with the evidence that they follow from.
 struct Fit {
     observed: ObservedDifferences,
     scales: Vec<Scale>,
     /// Normal equations of all unknowns; the noise of the maneuvers has the scales of the start.
     information: Information,
-    gaussian: Gaussian,
 }
 
 /// Evidence about a coefficient.
@@ -189,13 +191,18 @@ impl Data {
         let information_on_differences = of_differences(&information, &self.unknowns)?;
         let observed = ObservedDifferences::new(terms, &self.unknowns, &information_on_differences);
         let scales = most_probable(&observed, start);
-        let gaussian = gaussian(&self.unknowns.root(terms, &scales, EXACT), &information)?;
         Some(Fit {
             observed,
             scales,
             information,
-            gaussian,
         })
+    }
+
+    /// Root of the prior covariance of the unknowns on which the data depend.
+    fn observed_root(&self, terms: &[PosteriorTerm], fit: &Fit, least: f64) -> BlockRoot {
+        let is_observed = |unknown| fit.information.is_about(unknown);
+        let unknowns = &self.unknowns;
+        unknowns.root_of_observed(terms, &fit.scales, least, is_observed)
     }
 
     /// Differences from the tunnel of the values that each maneuver holds, by the posterior of the

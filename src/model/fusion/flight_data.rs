@@ -52,6 +52,12 @@ impl Information {
             vector: DVector::zeros(unknowns),
         }
     }
+
+    /// `true` for an unknown on which the data depend.
+    #[must_use]
+    pub fn is_about(&self, unknown: usize) -> bool {
+        self.matrix[(unknown, unknown)] != 0.0
+    }
 }
 
 /// Evidence of one maneuver: index in the evidence, class, and observation.

@@ -55,7 +55,7 @@ impl ObservedDifferences {
         for (term, first) in terms.iter().zip(&unknowns.starts) {
             let points = 0..term.prior.grid.len();
             let (start, every): (usize, Vec<usize>) = (places.len(), points.clone().collect());
-            let is_observed = |point: &usize| matrix[(first + point, first + point)] != 0.0;
+            let is_observed = |point: &usize| information.is_about(first + point);
             let observed_points: Vec<usize> = points.filter(is_observed).collect();
             places.extend(observed_points.iter().map(|point| first + point));
             observed.push(ObservedTerm {

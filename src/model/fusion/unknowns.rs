@@ -142,7 +142,7 @@ impl Unknowns {
     #[must_use]
     pub fn root_of_others(&self, least: f64) -> BlockRoot {
         let mut blocks = BlockRoot::default();
-        self.push_others(least, &mut blocks);
+        self.push_others(least, |_| true, &mut blocks);
         blocks
     }
 
@@ -150,22 +150,52 @@ impl Unknowns {
     #[must_use]
     pub fn root(&self, terms: &[PosteriorTerm], scales: &[Scale], least: f64) -> BlockRoot {
         let mut blocks = root_of_differences(terms, scales, least);
-        self.push_others(least, &mut blocks);
+        self.push_others(least, |_| true, &mut blocks);
         blocks
     }
 
-    fn push_others(&self, least: f64, blocks: &mut BlockRoot) {
+    /// Root as by [`Unknowns::root`], with zero variance for unknowns on which no data depend. The
+    /// posterior of the observed unknowns is the same.
+    #[must_use]
+    pub fn root_of_observed(
+        &self,
+        terms: &[PosteriorTerm],
+        scales: &[Scale],
+        least: f64,
+        is_observed: impl Fn(usize) -> bool,
+    ) -> BlockRoot {
+        let mut blocks = BlockRoot::default();
+        for ((term, scale), start) in terms.iter().zip(scales).zip(&self.starts) {
+            let covariance = term.prior.covariance.for_scale(scale);
+            let observed = of_observed(covariance, |i| is_observed(start + i));
+            blocks.push(root(&observed, least));
+        }
+        self.push_others(least, is_observed, &mut blocks);
+        blocks
+    }
+
+    fn push_others(&self, least: f64, is_observed: impl Fn(usize) -> bool, blocks: &mut BlockRoot) {
         for error in self.classes.values() {
             let alphas = &error.grid.alphas_deg;
             let covariance = DMatrix::from_fn(alphas.len(), alphas.len(), |i, j| {
                 let distance = (alphas[i] - alphas[j]).abs() / CLASS_LENGTH_DEG;
                 self.class_error * self.class_error * matern_3_2(distance)
             });
-            blocks.push(root(&covariance, least));
+            let observed = of_observed(covariance, |i| is_observed(error.start + i));
+            blocks.push(root(&observed, least));
         }
         let of_campaign = self.campaign.len();
         blocks.push(DMatrix::identity(of_campaign, of_campaign));
     }
+}
+
+/// Covariance with zero for all that is not observed.
+fn of_observed(mut covariance: DMatrix<f64>, is_observed: impl Fn(usize) -> bool) -> DMatrix<f64> {
+    for i in (0..covariance.nrows()).filter(|i| !is_observed(*i)) {
+        covariance.row_mut(i).fill(0.0);
+        covariance.column_mut(i).fill(0.0);
+    }
+    covariance
 }
 
 /// Root of the prior covariance of the differences. Directions below `least` of a term's largest

@@ -209,6 +209,31 @@ fn the_mean_from_observed_differences_is_that_of_all_unknowns() {
 }
 
 #[test]
+fn the_posterior_of_the_observed_unknowns_does_not_depend_on_the_others() {
+    let (terms, data) = data(&campaign(), &Settings::default());
+    let sums = information(&data.flights, &[1.0; 10], data.unknowns.count);
+    let is_observed = |unknown| sums.is_about(unknown);
+    let root = data.unknowns.root(&terms, &scales(), EXACT);
+    let of_observed = (data.unknowns).root_of_observed(&terms, &scales(), EXACT, is_observed);
+    let observed = (0..data.unknowns.count).filter(|i| is_observed(*i)).count();
+    assert_eq!(of_observed.rank(), observed);
+    assert!(observed < root.rank());
+    let whole = gaussian(&root, &sums).unwrap();
+    let found = gaussian(&of_observed, &sums).unwrap();
+    let deviation = whole.covariance.diagonal().map(f64::sqrt);
+    for i in 0..data.unknowns.count {
+        let factor = f64::from(u8::from(is_observed(i)));
+        let unit = deviation[i];
+        assert_relative_eq!(found.mean[i], factor * whole.mean[i], epsilon = 1e-9 * unit);
+        for j in (0..data.unknowns.count).filter(|j| is_observed(*j)) {
+            let expected = factor * whole.covariance[(i, j)];
+            let unit = unit * deviation[j];
+            assert_relative_eq!(found.covariance[(i, j)], expected, epsilon = 1e-9 * unit);
+        }
+    }
+}
+
+#[test]
 fn the_likelihood_of_the_scales_is_that_of_the_data() {
     // Differences of the log likelihood between two scales, against the dense one of the data.
     let flown = campaign();

@@ -14,7 +14,7 @@ use crate::pipeline::problems::problem;
 use crate::tables::{EstimateRow, LiftAndDragRow};
 
 /// Version of the posterior.
-pub const MODEL_VERSION: u32 = 7;
+pub const MODEL_VERSION: u32 = 8;
 
 /// Computes the posterior from the maneuvers that converged.
 pub fn fit_model(config: &Config, campaign: &mut Campaign) {
