@@ -7,7 +7,7 @@ use super::decisive_difference::{DecisiveDifference, PredictedDutchRoll};
 use super::derivative_table::DerivativeTable;
 use super::dutch_roll::{LateralModes, OwnEstimates};
 use super::free_run::{FreeRun, Simulation};
-use super::judgement::{self, Simulated, ToleranceFinding};
+use super::judgement::{self, Judged, Simulated, ToleranceFinding};
 use super::maneuver_recording::ManeuverRecording;
 use super::mean_run::MeanRun;
 use super::outputs::output_index;
@@ -168,7 +168,7 @@ struct RepeatableManeuver<'a> {
     maneuver: &'a Maneuver,
     local: Option<&'a LocalPosterior>,
     modes: Option<LateralModes>,
-    tests: Vec<&'a Test>,
+    judged: Vec<Judged<'a>>,
     recording: ManeuverRecording,
 }
 
@@ -205,12 +205,13 @@ impl<'a> RepeatableManeuver<'a> {
             return Err(format!("its trim needs `{signal}`, which is not recorded"));
         }
         let aircraft = (basis.aircraft, basis.aero_model);
+        let modes = dutch_roll(basis, maneuver, own);
         Ok(RepeatableManeuver {
             basis,
             maneuver,
             local,
-            modes: dutch_roll(basis, maneuver, own),
-            tests,
+            judged: judgement::judged(&tests, modes.is_some()),
+            modes,
             recording: ManeuverRecording::new(record, maneuver, aircraft, specification.trim_s)?,
         })
     }
@@ -228,12 +229,11 @@ impl<'a> RepeatableManeuver<'a> {
         let own = (!follows_mean).then(|| self.trimmed(database));
         let Trimmed { simulation, start } = own.as_ref().unwrap_or(&posterior);
         let run = simulation.fly(&start.start, self.recording.samples, mean.stride);
-        let judged = judgement::judged(&self.tests, self.modes.is_some());
         let predicted = |modes| predicted_dutch_roll(modes, &posterior.simulation, simulation);
         let dutch_roll = self.modes.as_ref().map(predicted).transpose()?;
         let about = (local, basis.aero_model);
         let decisive = mean
-            .decisive((&self.recording, &run), dutch_roll, about, &judged)
+            .decisive((&self.recording, &run), dutch_roll, about, &self.judged)
             .ok_or("its simulation departs, or no tolerance can be judged")?;
         let named = decisive.slopes.iter();
         let named = named.map(|(value, slope)| (local.values[*value].clone(), *slope));
@@ -306,11 +306,10 @@ impl<'a> RepeatableManeuver<'a> {
         matched: &mut Matched,
     ) {
         let required_pct = self.basis.specification.inside_pct;
-        let judged = judgement::judged(&self.tests, self.modes.is_some());
-        let findings = judgement::judge(&self.recording, simulated, &judged, required_pct);
-        let repeat = repeats.map(|repeats| {
-            repeats.probabilities(&self.recording, simulated, &judged, required_pct)
-        });
+        let judged = &self.judged;
+        let findings = judgement::judge(&self.recording, simulated, judged, required_pct);
+        let repeat =
+            repeats.map(|own| own.probabilities(&self.recording, simulated, judged, required_pct));
         let repeat = repeat.as_ref();
         matched
             .verdicts
