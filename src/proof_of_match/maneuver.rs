@@ -282,7 +282,8 @@ impl<'a> RepeatableManeuver<'a> {
         let model = (basis.aero_model, self.maneuver.axis);
         let flown = (&posterior.simulation, &posterior.start);
         let known = (self.local?, self.modes.as_ref());
-        repeat_flight::repeats(flown, mean, known, model, basis.specification.draws)
+        let drawn = (self.judged.as_slice(), basis.specification.draws);
+        repeat_flight::repeats(flown, mean, known, model, drawn)
     }
 
     /// Free run and Dutch roll of a trimmed model.

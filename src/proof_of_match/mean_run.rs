@@ -11,7 +11,6 @@ use super::start::MatchedStart;
 use crate::aero::{AeroModel, Axis, Regressor};
 use crate::model::{LocalKind, LocalPosterior, LocalValue};
 use crate::numerics::series::sample_count::whole_steps;
-use crate::numerics::vectors::simd::vectorised;
 
 /// Longest step of the run with slopes, s. Probabilities differ by 0.2 % rms from those of steps of a quarter.
 const LONGEST_STEP_S: f64 = 0.1;
@@ -67,31 +66,40 @@ impl MeanRun {
         self.slopes.split_at(self.derivatives.len())
     }
 
+    /// Slopes of an output: each sample as a row, each derivative and then each parameter of the start
+    /// as a column.
+    #[must_use]
+    pub fn slopes_of(&self, output: usize) -> DMatrix<f64> {
+        let samples = self.run.outputs.len();
+        let values = self.slopes.iter().flat_map(|own| &own[output]).copied();
+        DMatrix::from_iterator(samples, self.slopes.len(), values)
+    }
+
     /// Deficiency of the run with the outputs `mean`, at every `stride`-th sample: measured less
     /// computed outputs. It is reduced by the fraction of their mean square that derivatives, start
-    /// and noise explain. `roots` are those of the covariances of derivatives and start.
+    /// and noise explain. `covariance` is that of the derivatives.
     #[must_use]
     pub fn deficiency(
         &self,
         recording: &ManeuverRecording,
         mean: &[Outputs],
-        roots: [&DMatrix<f64>; 2],
+        covariance: &DMatrix<f64>,
     ) -> Vec<Outputs> {
         let flown = mean.len().min(self.run.outputs.len());
         let mut deficiency = vec![[0.0; COUNT]; mean.len()];
         for output in 0..COUNT {
             let counted = (0..flown).filter(|k| !recording.repaired[k * self.stride][output]);
+            let counted: Vec<usize> = counted.collect();
             let mut observed = 0.0;
-            for sample in counted.clone() {
+            for &sample in &counted {
                 let difference =
                     recording.measured[sample * self.stride][output] - mean[sample][output];
                 deficiency[sample][output] = difference;
                 observed += difference * difference;
             }
-            let noise = recording.noise[output] * recording.noise[output];
-            let variances = self.variances(output, roots);
-            let variances = counted.map(|sample| variances[sample] + noise);
-            let share = unexplained_share(observed, variances);
+            let noise = counted.len() as f64 * recording.noise[output].powi(2);
+            let explained = noise + self.variance(output, &counted, covariance);
+            let share = unexplained_share(observed, explained);
             for own in &mut deficiency {
                 own[output] *= share;
             }
@@ -99,48 +107,19 @@ impl MeanRun {
         deficiency
     }
 
-    /// Variance of an output at each sample by the deviations of derivatives and start.
-    fn variances(&self, output: usize, roots: [&DMatrix<f64>; 2]) -> Vec<f64> {
-        let (by_derivative, by_start) = self.slopes_by_kind();
-        let samples = self.run.outputs.len();
-        let (mut variances, mut deviations) = (vec![0.0; samples], vec![0.0; samples]);
-        for (slopes, root) in [by_derivative, by_start].into_iter().zip(roots) {
-            for independent in root.column_iter() {
-                deviations.fill(0.0);
-                for (own, factor) in slopes.iter().zip(independent.iter()) {
-                    add_scaled(&mut deviations, *factor, &own[output]);
-                }
-                let both = variances.iter_mut().zip(&deviations);
-                both.for_each(|(variance, deviation)| *variance += deviation * deviation);
-            }
-        }
-        variances
+    /// Variance of an output by the deviations of derivatives and start, summed over some samples.
+    fn variance(&self, output: usize, samples: &[usize], covariance: &DMatrix<f64>) -> f64 {
+        let slopes = self.slopes_of(output).select_rows(samples);
+        let (by_derivative, by_start) =
+            slopes.columns_range_pair(..self.derivatives.len(), self.derivatives.len()..);
+        let by_derivative = (by_derivative * covariance).dot(&by_derivative);
+        by_derivative + (by_start * &self.start_covariance).dot(&by_start)
     }
 }
 
-/// Adds a factor times some values.
-fn add_scaled(sums: &mut [f64], factor: f64, values: &[f64]) {
-    vectorised(
-        #[inline(always)]
-        || {
-            for (sum, value) in sums.iter_mut().zip(values) {
-                *sum += factor * value;
-            }
-        },
-    );
-}
-
-/// Share of the observed mean square beyond what the variances explain. The sum of the variances
-/// ends where it explains all: no later one makes it smaller.
-fn unexplained_share(observed: f64, variances: impl Iterator<Item = f64>) -> f64 {
-    let (mut explained, mut limit) = (0.0, 0.0);
-    for variance in variances {
-        explained += variance;
-        limit = EXPLAINED_DEVIATIONS * EXPLAINED_DEVIATIONS * explained;
-        if observed <= limit {
-            return 0.0;
-        }
-    }
+/// Share of the observed square beyond what the variance explains.
+fn unexplained_share(observed: f64, explained: f64) -> f64 {
+    let limit = EXPLAINED_DEVIATIONS * EXPLAINED_DEVIATIONS * explained;
     if observed > limit {
         1.0 - limit / observed
     } else {
@@ -185,4 +164,44 @@ fn start_parameters(axis: Axis) -> [usize; 7] {
 #[must_use]
 pub fn of_places(covariance: &DMatrix<f64>, places: &[usize]) -> DMatrix<f64> {
     covariance.select_rows(places).select_columns(places)
+}
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_relative_eq;
+
+    use super::*;
+
+    #[test]
+    fn the_variance_of_an_output_is_the_sum_over_samples_of_both_kinds_of_deviations() {
+        let history = |values: [f64; 3]| -> Histories { std::array::from_fn(|_| values.into()) };
+        let mean = MeanRun {
+            stride: 1,
+            run: FreeRun {
+                outputs: vec![[0.0; COUNT]; 3],
+                has_departed: false,
+            },
+            slopes: vec![
+                history([1.0, 7.0, -3.0]),
+                history([2.0, 7.0, 1.0]),
+                history([1.0, 7.0, 5.0]),
+            ],
+            derivatives: vec![(0, 0), (1, 1)],
+            start_covariance: DMatrix::from_element(1, 1, 9.0),
+        };
+        let covariance = DMatrix::from_row_slice(2, 2, &[4.0, 1.0, 1.0, 2.0]);
+        // s' C s + 9 s² at the first and the last sample.
+        let first = 4.0 + 2.0 * 2.0 + 2.0 * 4.0 + 9.0;
+        let last = 4.0 * 9.0 - 2.0 * 3.0 + 2.0 + 9.0 * 25.0;
+        let sum = mean.variance(4, &[0, 2], &covariance);
+        assert_relative_eq!(sum, first + last, epsilon = 1e-12);
+        assert_relative_eq!(mean.variance(4, &[], &covariance), 0.0);
+    }
+
+    #[test]
+    fn a_difference_counts_beyond_two_standard_deviations_of_what_is_explained() {
+        assert_relative_eq!(unexplained_share(3.9, 1.0), 0.0);
+        assert_relative_eq!(unexplained_share(16.0, 1.0), 0.75);
+        assert_relative_eq!(unexplained_share(0.0, 0.0), 0.0);
+    }
 }

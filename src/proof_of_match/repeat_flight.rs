@@ -10,14 +10,14 @@
 //! A flight may differ from the mean by more than these parts explain. A derivative may vary in a
 //! way that the posterior smooths, or the equations may lack an effect. This *deficiency* belongs
 //! to the aircraft, so a repeat flight shows it again.
-#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
-use pulp::{Arch, Simd, WithSimd};
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::{DMatrix, DVectorView};
 
 use super::dutch_roll::{DutchRoll, LateralModes};
 use super::free_run::{FreeRun, Simulation};
 use super::judgement::{Judged, Simulated, allowed_outside};
-use super::linear_run::Histories;
 use super::maneuver_recording::ManeuverRecording;
 use super::mean_run::{MeanRun, of_places};
 use super::outputs::{Outputs, output_index};
@@ -28,8 +28,6 @@ use crate::model::LocalPosterior;
 use crate::numerics::linear_algebra::root::continuous_root;
 use crate::numerics::statistics::normal;
 use crate::numerics::statistics::random::RandomStream;
-use crate::numerics::vectors::lanes::Lanes;
-use crate::numerics::vectors::simd::{AlignedBuffer, VECTOR};
 
 /// Seed of the draws.
 const SEED: u64 = 60;
@@ -37,25 +35,17 @@ const SEED: u64 = 60;
 /// Distance from the limit beyond which noise has no effect, standard deviations.
 const CERTAIN: f64 = 5.0;
 
-/// Repeat flights about the mean of a posterior, at every `stride`-th sample.
+/// Repeat flights about the mean of a posterior, at every `stride`-th sample. All models share them.
 #[derive(Clone, Debug)]
 pub struct Repeats {
     stride: usize,
     /// Expected outputs of a repeat flight: those at the mean of the posterior, and the deficiency.
     expected: Vec<Outputs>,
-    /// Slopes of the outputs along the derivatives and the parameters of the start.
-    slopes: Vec<Histories>,
-    /// Repeat flights, which all models share.
-    draws: Vec<Draw>,
-}
-
-/// Drawn aircraft and start of a repeat flight.
-#[derive(Clone, Debug)]
-struct Draw {
-    /// Deviations of the derivatives and of the start's parameters.
-    deviations: Vec<f64>,
-    /// Dutch roll according to the estimates of the repeat flight.
-    dutch_roll: Option<DutchRoll>,
+    /// Changes of each judged output by the deviations of a repeat flight: samples as rows, repeat
+    /// flights as columns.
+    changes: BTreeMap<usize, DMatrix<f64>>,
+    /// Dutch roll according to the estimates of each repeat flight.
+    dutch_rolls: Vec<Option<DutchRoll>>,
 }
 
 /// Probabilities of one model: of each tolerance in the order of the tests, and of all requirements.
@@ -79,15 +69,16 @@ impl Probabilities {
     }
 }
 
-/// Draws repeat flights about the mean of a posterior; `mean` is the run at the mean in short
-/// steps. `None` if the start is not determined or the axis has no posterior.
+/// Draws repeat flights about the mean of a posterior, with the outputs that some tolerances judge;
+/// `mean` is the run at the mean in short steps. `None` if the start is not determined or the axis
+/// has no posterior.
 #[must_use]
 pub fn repeats(
     (simulation, start): (&Simulation, &MatchedStart),
     mean: &FreeRun,
     (posterior, modes): (&LocalPosterior, Option<&LateralModes>),
     model: (&AeroModel, Axis),
-    draws: usize,
+    (judged, draws): (&[Judged], usize),
 ) -> Option<Repeats> {
     let about = MeanRun::fly((simulation, start), posterior, model)?;
     if about.derivatives.is_empty() {
@@ -95,40 +86,61 @@ pub fn repeats(
     }
     let recording = simulation.recording;
     let (values, derivatives): (Vec<usize>, Vec<usize>) = about.derivatives.iter().copied().unzip();
-    let root = continuous_root(&of_places(&posterior.covariance, &values));
+    let covariance = of_places(&posterior.covariance, &values);
+    let expected = expected_outputs(&about, mean, recording, &covariance);
+    let root = continuous_root(&covariance);
     let root_of_start = continuous_root(&about.start_covariance);
-    // Long steps do for the slopes; the mean is compared with runs in short ones.
-    let mut expected: Vec<Outputs> = mean.outputs.iter().copied().step_by(about.stride).collect();
-    let deficiency = about.deficiency(recording, &expected, [&root, &root_of_start]);
-    for (expected, deficiency) in expected.iter_mut().zip(deficiency) {
-        for (output, own) in deficiency.into_iter().enumerate() {
-            expected[output] += own;
-        }
-    }
     let mut stream = RandomStream::new(SEED, &recording.start_s.to_string());
-    let draw = |_| {
+    let mut dutch_rolls = Vec::with_capacity(draws);
+    // Deviations of the derivatives and of the start's parameters, a column for each repeat flight.
+    let mut deviations = DMatrix::zeros(about.slopes.len(), draws);
+    for mut own in deviations.column_iter_mut() {
         let drawn = stream.deviations(&root);
-        let dutch_roll = modes.and_then(|modes| {
+        dutch_rolls.push(modes.and_then(|modes| {
             let deviation = |derivative: usize| {
                 let own = derivatives.iter().position(|own| *own == derivative);
                 own.map_or(0.0, |own| drawn[own])
             };
             let table = &simulation.aerodynamics.table;
             modes.of_repeat(table, deviation, &mut stream)
-        });
+        }));
         let of_start = stream.deviations(&root_of_start);
-        Draw {
-            deviations: drawn.iter().chain(&of_start).copied().collect(),
-            dutch_roll,
-        }
+        own.rows_range_mut(..drawn.len()).copy_from(&drawn);
+        own.rows_range_mut(drawn.len()..).copy_from(&of_start);
+    }
+    let outputs = judged.iter();
+    let outputs = outputs.filter_map(|own| output_index(own.tolerance.quantity));
+    let outputs: BTreeSet<usize> = outputs.collect();
+    // The run with slopes may depart where that in short steps does not.
+    let change = |output: usize| {
+        let own = about.slopes_of(output) * &deviations;
+        own.resize_vertically(expected.len(), 0.0)
     };
-    let draws = (0..draws).map(draw).collect();
+    let changes = outputs.into_iter().map(|output| (output, change(output)));
     Some(Repeats {
-        slopes: about.slopes,
         stride: about.stride,
+        changes: changes.collect(),
         expected,
-        draws,
+        dutch_rolls,
     })
+}
+
+/// Outputs at the mean of the posterior, and the deficiency. Long steps do for the slopes; the mean is
+/// compared with runs in short ones.
+fn expected_outputs(
+    about: &MeanRun,
+    mean: &FreeRun,
+    recording: &ManeuverRecording,
+    covariance: &DMatrix<f64>,
+) -> Vec<Outputs> {
+    let mut expected: Vec<Outputs> = mean.outputs.iter().copied().step_by(about.stride).collect();
+    let deficiency = about.deficiency(recording, &expected, covariance);
+    for (expected, deficiency) in expected.iter_mut().zip(deficiency) {
+        for (output, own) in deficiency.into_iter().enumerate() {
+            expected[output] += own;
+        }
+    }
+    expected
 }
 
 impl Repeats {
@@ -149,28 +161,21 @@ impl Repeats {
         if simulated.run.has_departed || self.expected.len() * self.stride < recording.samples {
             return sums;
         }
-        let limits = judged.iter().map(|own| {
-            let output = output_index(own.tolerance.quantity)?;
-            let stated = (&own.tolerance, output);
-            Some(SampleLimits::new(
-                recording,
-                stated,
-                self.stride,
-                required_pct,
-            ))
+        let inside = judged.iter().map(|own| {
+            let output = output_index(own.tolerance.quantity);
+            let Some((output, changes)) = output.and_then(|i| self.changes.get_key_value(&i))
+            else {
+                return self.inside_by_modes(simulated.model, &own.tolerance);
+            };
+            let bias = self.bias(&simulated.run, *output);
+            let stated = (&own.tolerance, *output);
+            let limits = SampleLimits::new(recording, stated, self.stride, required_pct);
+            limits.inside(&bias, changes)
         });
-        let repeat = Repeat {
-            repeats: self,
-            simulated,
-            bias: self.bias(&simulated.run),
-        };
-        let pairs = judged.iter().zip(limits);
-        let inside: Vec<Vec<f64>> = pairs
-            .map(|(own, limits)| repeat.inside(&own.tolerance, limits.as_ref()))
-            .collect();
-        let count = self.draws.len() as f64;
-        for draw in 0..self.draws.len() {
-            let tolerances: Vec<f64> = inside.iter().map(|own| own[draw]).collect();
+        let inside: Vec<Vec<f64>> = inside.collect();
+        let count = self.dutch_rolls.len() as f64;
+        for repeat in 0..self.dutch_rolls.len() {
+            let tolerances: Vec<f64> = inside.iter().map(|own| own[repeat]).collect();
             for (sum, inside) in sums.tolerances.iter_mut().zip(&tolerances) {
                 *sum += inside / count;
             }
@@ -179,128 +184,25 @@ impl Repeats {
         sums.clamped()
     }
 
-    /// Difference of the expected repeat flight from a model's run.
-    fn bias(&self, run: &FreeRun) -> Histories {
+    /// Difference of the expected repeat flight from a model's run, in one output.
+    fn bias(&self, run: &FreeRun, output: usize) -> Vec<f64> {
         let own = run.outputs.iter().step_by(self.stride);
         let pairs = self.expected.iter().zip(own);
-        std::array::from_fn(|i| {
-            pairs
-                .clone()
-                .map(|(expected, own)| expected[i] - own[i])
-                .collect()
-        })
+        pairs
+            .map(|(expected, own)| expected[output] - own[output])
+            .collect()
     }
 
-    /// Slopes of one output: parameter by parameter, each sample. Zeros fill the last vector.
-    fn slopes_of(&self, output: usize) -> AlignedBuffer {
-        let width = self.width();
-        let mut slopes = AlignedBuffer::zeros(self.slopes.len() * width);
-        let rows = slopes.slice_mut().chunks_exact_mut(width);
-        for (row, own) in rows.zip(&self.slopes) {
-            row[..own[output].len()].copy_from_slice(&own[output]);
-        }
-        slopes
-    }
-
-    /// Number of the samples, padded to whole vectors.
-    fn width(&self) -> usize {
-        self.expected.len().next_multiple_of(VECTOR)
-    }
-}
-
-/// Draws whose differences are summed side by side: one sum would wait for itself.
-const SIDE_BY_SIDE: usize = 4;
-
-/// Differences of some draws from a model's run, at the samples of one output.
-struct DrawnDifferences<'a> {
-    /// Difference of the expected repeat flight at each sample.
-    bias: &'a [f64],
-    /// Slopes, parameter by parameter.
-    slopes: &'a [f64],
-    /// Deviations of each parameter.
-    deviations: &'a [[f64; SIDE_BY_SIDE]],
-    /// Draw by draw, each sample.
-    drawn: &'a mut [f64],
-}
-
-impl WithSimd for DrawnDifferences<'_> {
-    type Output = ();
-
-    #[expect(
-        clippy::needless_range_loop,
-        reason = "an iterator's functions are not inlined"
-    )]
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let width = self.bias.len();
-        for sample in (0..width).step_by(S::F64_LANES) {
-            let mut sums = [Lanes::load(simd, self.bias, sample); SIDE_BY_SIDE];
-            for parameter in 0..self.deviations.len() {
-                let slope = Lanes::load(simd, self.slopes, parameter * width + sample);
-                for draw in 0..SIDE_BY_SIDE {
-                    sums[draw] = sums[draw] + slope * self.deviations[parameter][draw];
-                }
-            }
-            for draw in 0..SIDE_BY_SIDE {
-                sums[draw].store(self.drawn, draw * width + sample);
-            }
-        }
-    }
-}
-
-/// Deviations of some draws, parameter by parameter; zeros in place of absent draws.
-fn side_by_side(draws: &[Draw]) -> Vec<[f64; SIDE_BY_SIDE]> {
-    let count = draws.first().map_or(0, |draw| draw.deviations.len());
-    let of = |parameter: usize| {
-        std::array::from_fn(|draw| draws.get(draw).map_or(0.0, |own| own.deviations[parameter]))
-    };
-    (0..count).map(of).collect()
-}
-
-/// Repeat flights compared with one model's simulation.
-struct Repeat<'a> {
-    repeats: &'a Repeats,
-    simulated: &'a Simulated,
-    bias: Histories,
-}
-
-impl Repeat<'_> {
-    /// Probability of each draw that it meets a tolerance, over the sensors' noise. A tolerance of the
-    /// Dutch roll has no limits of samples.
-    fn inside(&self, tolerance: &Tolerance, limits: Option<&SampleLimits>) -> Vec<f64> {
-        let draws = &self.repeats.draws;
-        let Some(limits) = limits else {
-            let meets = |draw: &Draw| self.meets(draw.dutch_roll, tolerance);
-            return draws
-                .iter()
-                .map(|d| f64::from(u8::from(meets(d))))
-                .collect();
-        };
-        let slopes = self.repeats.slopes_of(limits.output);
-        let mut bias = self.bias[limits.output].clone();
-        let width = self.repeats.width();
-        bias.resize(width, 0.0);
-        let mut drawn = AlignedBuffer::zeros(SIDE_BY_SIDE * width);
-        let (mut inside, mut doubtful) = (Vec::with_capacity(draws.len()), Vec::new());
-        for draws in draws.chunks(SIDE_BY_SIDE) {
-            Arch::new().dispatch(DrawnDifferences {
-                bias: &bias,
-                slopes: slopes.slice(),
-                deviations: &side_by_side(draws),
-                drawn: drawn.slice_mut(),
-            });
-            let drawn = drawn.slice().chunks_exact(width).take(draws.len());
-            inside.extend(drawn.map(|drawn| limits.inside(drawn, &mut doubtful)));
-        }
-        inside
-    }
-
-    /// `true` if the model's Dutch roll is within the tolerance of a repeat flight's.
-    fn meets(&self, repeat: Option<DutchRoll>, tolerance: &Tolerance) -> bool {
+    /// One for each repeat flight whose Dutch roll meets a tolerance of a model's, zero for the others.
+    fn inside_by_modes(&self, model: Option<DutchRoll>, tolerance: &Tolerance) -> Vec<f64> {
         let value = |own: Option<DutchRoll>| own?.value(tolerance.quantity);
-        let (repeat, model) = (value(repeat), value(self.simulated.model));
-        let pair = repeat.zip(model);
-        pair.is_some_and(|(repeat, model)| (repeat - model).abs() <= tolerance.width(repeat))
+        let model = value(model);
+        let meets = |repeat: &Option<DutchRoll>| {
+            let pair = value(*repeat).zip(model);
+            pair.is_some_and(|(repeat, model)| (repeat - model).abs() <= tolerance.width(repeat))
+        };
+        let repeats = self.dutch_rolls.iter();
+        repeats.map(|own| f64::from(u8::from(meets(own)))).collect()
     }
 }
 
@@ -319,7 +221,6 @@ fn of_all_requirements(judged: &[Judged], tolerances: &[f64]) -> f64 {
 
 /// Limits of a tolerance at the samples that count.
 struct SampleLimits {
-    output: usize,
     noise: f64,
     /// Samples that may be outside.
     allowed: usize,
@@ -373,22 +274,31 @@ impl SampleLimits {
         let intervals: Vec<Interval> = (0..=last).map(interval).collect();
         let counted = intervals.iter().map(|own| own.samples.len()).sum();
         SampleLimits {
-            output,
             noise,
             allowed: allowed_outside(counted, required_pct),
             intervals,
         }
     }
 
-    /// Probability that the required share of samples is inside, over the sensors' noise. The memory of
-    /// `doubtful` is used again from draw to draw.
-    fn inside(&self, drawn: &[f64], doubtful: &mut Vec<(f64, f64)>) -> f64 {
+    /// Probability of each repeat flight that the required share of samples is inside, over the
+    /// sensors' noise. `bias` is the expected difference at each sample, `changes` are the deviations
+    /// from it.
+    fn inside(&self, bias: &[f64], changes: &DMatrix<f64>) -> Vec<f64> {
+        let mut doubtful = Vec::new();
+        let repeats = changes.column_iter();
+        let own =
+            |change: DVectorView<f64>| self.inside_of_one(bias, change.as_slice(), &mut doubtful);
+        repeats.map(own).collect()
+    }
+
+    /// Probability of one repeat flight; the memory of `doubtful` is used again.
+    fn inside_of_one(&self, bias: &[f64], change: &[f64], doubtful: &mut Vec<(f64, f64)>) -> f64 {
         let noise = self.noise;
         let mut outside = 0;
         doubtful.clear();
         for interval in &self.intervals {
             let [first, last] = interval.ends;
-            let (a, b) = (drawn[first], drawn[last]);
+            let (a, b) = (bias[first] + change[first], bias[last] + change[last]);
             if a.abs().max(b.abs()) <= interval.certain {
                 continue;
             }
@@ -411,21 +321,27 @@ impl SampleLimits {
     }
 }
 
+/// Probability below which a repeat flight counts as outside.
+const IMPOSSIBLE: f64 = 1e-18;
+
 /// Probability that at most `allowed` of independent samples are outside.
 fn at_most_outside(inside: impl Iterator<Item = f64>, allowed: usize) -> f64 {
-    if allowed == 0 {
-        return inside.product();
-    }
     let mut outside = vec![0.0; allowed + 1];
     outside[0] = 1.0;
+    let mut sum = 1.0;
     for (before, inside) in inside.enumerate() {
         // At most as many samples can be outside as were considered so far.
         for count in (1..=allowed.min(before + 1)).rev() {
             outside[count] = inside * outside[count] + (1.0 - inside) * outside[count - 1];
         }
         outside[0] *= inside;
+        sum = outside.iter().sum();
+        // It falls from sample to sample.
+        if sum < IMPOSSIBLE {
+            return 0.0;
+        }
     }
-    outside.iter().sum()
+    sum
 }
 
 #[cfg(test)]
@@ -445,5 +361,9 @@ mod tests {
         let most_one = 0.9_f64.powi(10) + one;
         assert_relative_eq!(at_most_outside(inside(), 1), most_one, epsilon = 1e-12);
         assert_relative_eq!(at_most_outside(inside(), 10), 1.0, epsilon = 1e-12);
+        // 0.5^60 is as good as never.
+        let even = || [0.5; 60].into_iter();
+        assert_relative_eq!(at_most_outside(even(), 0), 0.0);
+        assert_relative_eq!(at_most_outside(even(), 60), 1.0, epsilon = 1e-12);
     }
 }

@@ -59,7 +59,7 @@ impl<'a> Step for MatchStep<'a> {
     type Artefact = Matched;
 
     const KIND: Kind = Kind::Match;
-    const VERSION: u32 = 8;
+    const VERSION: u32 = 9;
 
     fn item(&self) -> &str {
         &self.maneuver.maneuver_id
