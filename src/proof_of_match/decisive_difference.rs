@@ -18,7 +18,6 @@ use super::derivative_table::DerivativeTable;
 use super::dutch_roll::{DutchRoll, LateralModes};
 use super::free_run::FreeRun;
 use super::judgement::Judged;
-use super::linear_run::Histories;
 use super::maneuver_recording::ManeuverRecording;
 use super::mean_run::{MeanRun, acting_derivatives};
 use super::outputs::output_index;
@@ -141,11 +140,10 @@ impl MeanRun {
             return None;
         }
         let per_width = 1.0 / tolerance.width(recording.measured[recorded][output]);
-        let (slopes, of_start) = self.slopes_by_kind();
-        let at = |slopes: &Histories| slopes[output][sample];
+        let slopes = self.slopes[output].column(sample);
+        let of_start = slopes.rows_range(self.derivatives.len()..).into_owned();
         let values = self.derivatives.iter().map(|(value, _)| *value);
-        let slopes = values.zip(slopes.iter().map(|own| per_width * at(own)));
-        let of_start = DVector::from_iterator(of_start.len(), of_start.iter().map(at));
+        let slopes = values.zip(slopes.iter().map(|own| per_width * own));
         let by_start = deviation(&self.start_covariance, &of_start);
         Some(LinearDifference {
             quantity: tolerance.quantity,

@@ -7,6 +7,7 @@
 
 use std::array::from_fn;
 
+use nalgebra::DMatrix;
 use pulp::{Arch, Simd, WithSimd};
 
 use super::aerodynamics::COEFFICIENTS;
@@ -30,15 +31,12 @@ pub enum Parameter {
     Derivative(usize),
 }
 
-/// History of each output.
-pub type Histories = [Vec<f64>; COUNT];
-
 /// A run with the slopes of its outputs along parameters.
 #[derive(Clone, Debug)]
 pub struct RunWithSensitivities {
     pub run: FreeRun,
-    /// Histories of the slopes, in the order of the parameters, up to a departure.
-    pub slopes: Vec<Histories>,
+    /// Slopes of each output: parameters as rows, samples up to a departure as columns.
+    pub slopes: [DMatrix<f64>; COUNT],
 }
 
 impl Simulation<'_> {
@@ -56,7 +54,7 @@ impl Simulation<'_> {
         let run = self.fly_with(start, (samples, stride), &mut slopes);
         RunWithSensitivities {
             run,
-            slopes: slopes.histories(),
+            slopes: slopes.of_outputs(),
         }
     }
 }
@@ -78,8 +76,8 @@ struct RunSlopes<'a> {
     outputs: AlignedBuffer,
     /// Number of the parameters, padded to whole vectors.
     width: usize,
-    /// Slopes of the outputs, sample by sample.
-    recorded: Vec<f64>,
+    /// Slopes of each output: sample by sample, each parameter.
+    recorded: [Vec<f64>; COUNT],
 }
 
 /// Slopes of the equations at a stage.
@@ -119,29 +117,17 @@ impl<'a> RunSlopes<'a> {
             states,
             outputs: AlignedBuffer::zeros(COUNT * width),
             width,
-            recorded: Vec::with_capacity(steps * COUNT * width),
+            recorded: from_fn(|_| Vec::with_capacity(steps * parameters.len())),
         }
     }
 
-    /// Histories of each parameter's slopes. A vector of parameters at a time: writing all histories side by
-    /// side at each sample would exceed the processor's first cache.
-    fn histories(&self) -> Vec<Histories> {
-        let row = COUNT * self.width;
-        let samples = self.recorded.len() / row.max(1);
-        let empty = |_| from_fn(|_| Vec::with_capacity(samples));
-        let mut histories: Vec<Histories> = self.parameters.iter().map(empty).collect();
-        for (group, histories) in histories.chunks_mut(VECTOR).enumerate() {
-            for output in 0..COUNT {
-                let first = output * self.width + group * VECTOR;
-                for sample in 0..samples {
-                    let values = &self.recorded[sample * row + first..][..VECTOR];
-                    for (history, value) in histories.iter_mut().zip(values) {
-                        history[output].push(*value);
-                    }
-                }
-            }
-        }
-        histories
+    /// Slopes of each output: parameters as rows, samples as columns.
+    fn of_outputs(self) -> [DMatrix<f64>; COUNT] {
+        let parameters = self.parameters.len();
+        self.recorded.map(|slopes| {
+            let samples = slopes.len() / parameters.max(1);
+            DMatrix::from_vec(parameters, samples, slopes)
+        })
     }
 }
 
@@ -184,7 +170,10 @@ impl StageObserver for RunSlopes<'_> {
             width: self.width,
             outputs: self.outputs.slice_mut(),
         });
-        self.recorded.extend_from_slice(self.outputs.slice());
+        let outputs = self.outputs.slice().chunks_exact(self.width);
+        for (recorded, slopes) in self.recorded.iter_mut().zip(outputs) {
+            recorded.extend_from_slice(&slopes[..self.parameters.len()]);
+        }
     }
 
     fn after_step(&mut self, end: &BodyState) {

@@ -4,7 +4,7 @@
 use nalgebra::DMatrix;
 
 use super::free_run::{FreeRun, STATES, Simulation};
-use super::linear_run::{Histories, Parameter, RunWithSensitivities};
+use super::linear_run::{Parameter, RunWithSensitivities};
 use super::maneuver_recording::ManeuverRecording;
 use super::outputs::{COUNT, Outputs};
 use super::start::MatchedStart;
@@ -25,8 +25,8 @@ const EXPLAINED_DEVIATIONS: f64 = 2.0;
 pub struct MeanRun {
     pub stride: usize,
     pub run: FreeRun,
-    /// Slopes along the derivatives, and after them along the start's own parameters.
-    pub slopes: Vec<Histories>,
+    /// Slopes of each output: derivatives and then parameters of the start as rows, samples as columns.
+    pub slopes: [DMatrix<f64>; COUNT],
     /// Indices of the derivatives, among the values of the posterior and in the build-up.
     pub derivatives: Vec<(usize, usize)>,
     /// Covariance of the start's own parameters.
@@ -58,21 +58,6 @@ impl MeanRun {
             derivatives,
             start_covariance: of_places(covariance, &own),
         })
-    }
-
-    /// Slopes along the derivatives, and along the parameters of the start.
-    #[must_use]
-    pub fn slopes_by_kind(&self) -> (&[Histories], &[Histories]) {
-        self.slopes.split_at(self.derivatives.len())
-    }
-
-    /// Slopes of an output: each sample as a row, each derivative and then each parameter of the start
-    /// as a column.
-    #[must_use]
-    pub fn slopes_of(&self, output: usize) -> DMatrix<f64> {
-        let samples = self.run.outputs.len();
-        let values = self.slopes.iter().flat_map(|own| &own[output]).copied();
-        DMatrix::from_iterator(samples, self.slopes.len(), values)
     }
 
     /// Deficiency of the run with the outputs `mean`, at every `stride`-th sample: measured less
@@ -109,11 +94,11 @@ impl MeanRun {
 
     /// Variance of an output by the deviations of derivatives and start, summed over some samples.
     fn variance(&self, output: usize, samples: &[usize], covariance: &DMatrix<f64>) -> f64 {
-        let slopes = self.slopes_of(output).select_rows(samples);
-        let (by_derivative, by_start) =
-            slopes.columns_range_pair(..self.derivatives.len(), self.derivatives.len()..);
-        let by_derivative = (by_derivative * covariance).dot(&by_derivative);
-        by_derivative + (by_start * &self.start_covariance).dot(&by_start)
+        let slopes = self.slopes[output].select_columns(samples);
+        let first = self.derivatives.len();
+        let (by_derivative, by_start) = slopes.rows_range_pair(..first, first..);
+        let by_derivative = (covariance * by_derivative).dot(&by_derivative);
+        by_derivative + (&self.start_covariance * by_start).dot(&by_start)
     }
 }
 
@@ -174,18 +159,14 @@ mod tests {
 
     #[test]
     fn the_variance_of_an_output_is_the_sum_over_samples_of_both_kinds_of_deviations() {
-        let history = |values: [f64; 3]| -> Histories { std::array::from_fn(|_| values.into()) };
+        let slopes = [1.0, 7.0, -3.0, 2.0, 7.0, 1.0, 1.0, 7.0, 5.0];
         let mean = MeanRun {
             stride: 1,
             run: FreeRun {
                 outputs: vec![[0.0; COUNT]; 3],
                 has_departed: false,
             },
-            slopes: vec![
-                history([1.0, 7.0, -3.0]),
-                history([2.0, 7.0, 1.0]),
-                history([1.0, 7.0, 5.0]),
-            ],
+            slopes: std::array::from_fn(|_| DMatrix::from_row_slice(3, 3, &slopes)),
             derivatives: vec![(0, 0), (1, 1)],
             start_covariance: DMatrix::from_element(1, 1, 9.0),
         };

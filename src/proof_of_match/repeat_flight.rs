@@ -93,7 +93,8 @@ pub fn repeats(
     let mut stream = RandomStream::new(SEED, &recording.start_s.to_string());
     let mut dutch_rolls = Vec::with_capacity(draws);
     // Deviations of the derivatives and of the start's parameters, a column for each repeat flight.
-    let mut deviations = DMatrix::zeros(about.slopes.len(), draws);
+    let parameters = root.nrows() + root_of_start.nrows();
+    let mut deviations = DMatrix::zeros(parameters, draws);
     for mut own in deviations.column_iter_mut() {
         let drawn = stream.deviations(&root);
         dutch_rolls.push(modes.and_then(|modes| {
@@ -113,7 +114,7 @@ pub fn repeats(
     let outputs: BTreeSet<usize> = outputs.collect();
     // The run with slopes may depart where that in short steps does not.
     let change = |output: usize| {
-        let own = about.slopes_of(output) * &deviations;
+        let own = about.slopes[output].transpose() * &deviations;
         own.resize_vertically(expected.len(), 0.0)
     };
     let changes = outputs.into_iter().map(|output| (output, change(output)));
@@ -227,11 +228,9 @@ struct SampleLimits {
     intervals: Vec<Interval>,
 }
 
-/// Samples between two samples of the effects.
+/// Samples between two samples of the differences; after the last one the difference stays.
 struct Interval {
-    /// Samples of the effects on either side.
-    ends: [usize; 2],
-    /// Size of both effects up to which noise moves none of the samples outside.
+    /// Size of both differences up to which noise moves none of the samples outside.
     certain: f64,
     samples: Vec<SampleLimit>,
 }
@@ -254,7 +253,6 @@ impl SampleLimits {
         stride: usize,
         required_pct: f64,
     ) -> SampleLimits {
-        let last = recording.samples.div_ceil(stride).saturating_sub(1);
         let noise = recording.noise[output];
         let limit = |sample: usize| SampleLimit {
             width: tolerance.width(recording.measured[sample][output]),
@@ -266,12 +264,13 @@ impl SampleLimits {
             let samples: Vec<SampleLimit> = counted.map(limit).collect();
             let least_width = samples.iter().map(|own| own.width).fold(f64::MAX, f64::min);
             Interval {
-                ends: [first, (first + 1).min(last)],
                 certain: (least_width - CERTAIN * noise) / BETWEEN,
                 samples,
             }
         };
-        let intervals: Vec<Interval> = (0..=last).map(interval).collect();
+        let intervals: Vec<Interval> = (0..recording.samples.div_ceil(stride))
+            .map(interval)
+            .collect();
         let counted = intervals.iter().map(|own| own.samples.len()).sum();
         SampleLimits {
             noise,
@@ -284,21 +283,22 @@ impl SampleLimits {
     /// sensors' noise. `bias` is the expected difference at each sample, `changes` are the deviations
     /// from it.
     fn inside(&self, bias: &[f64], changes: &DMatrix<f64>) -> Vec<f64> {
-        let mut doubtful = Vec::new();
-        let repeats = changes.column_iter();
-        let own =
-            |change: DVectorView<f64>| self.inside_of_one(bias, change.as_slice(), &mut doubtful);
-        repeats.map(own).collect()
+        let (mut differences, mut doubtful) = (Vec::with_capacity(bias.len()), Vec::new());
+        let own = |change: DVectorView<f64>| {
+            differences.clear();
+            differences.extend(bias.iter().zip(&change).map(|(bias, own)| bias + own));
+            self.inside_of_one(&differences, &mut doubtful)
+        };
+        changes.column_iter().map(own).collect()
     }
 
-    /// Probability of one repeat flight; the memory of `doubtful` is used again.
-    fn inside_of_one(&self, bias: &[f64], change: &[f64], doubtful: &mut Vec<(f64, f64)>) -> f64 {
+    /// Probability of one repeat flight with these differences; the memory of `doubtful` is used again.
+    fn inside_of_one(&self, differences: &[f64], doubtful: &mut Vec<(f64, f64)>) -> f64 {
         let noise = self.noise;
         let mut outside = 0;
         doubtful.clear();
-        for interval in &self.intervals {
-            let [first, last] = interval.ends;
-            let (a, b) = (bias[first] + change[first], bias[last] + change[last]);
+        for (first, (interval, a)) in self.intervals.iter().zip(differences).enumerate() {
+            let b = differences.get(first + 1).unwrap_or(a);
             if a.abs().max(b.abs()) <= interval.certain {
                 continue;
             }

@@ -85,8 +85,8 @@ impl StartSlopes {
         for (sample, repaired) in trim.enumerate() {
             for output in (0..COUNT).filter(|output| !repaired[*output]) {
                 let noise = recording.noise[output];
-                let own: [f64; PARAMETERS] =
-                    std::array::from_fn(|i| slopes[i][output][sample] / noise);
+                let own = slopes[output].column(sample);
+                let own: [f64; PARAMETERS] = std::array::from_fn(|i| own[i] / noise);
                 for (sums, slope) in information.iter_mut().zip(own) {
                     add_multiple(sums, slope, &own);
                 }

@@ -54,12 +54,13 @@ fn compare(simulation: &Simulation, aero_model: &AeroModel) {
         .collect();
     let linear = simulation.fly_with_slopes((&start, &parameters), STEPS);
     assert_eq!(linear.run, simulation.fly(&start, STEPS.0, STEPS.1));
-    for (parameter, slopes) in parameters.iter().zip(&linear.slopes) {
+    for (row, parameter) in parameters.iter().enumerate() {
         let by = deviation(*parameter);
         let [up, down] =
             [by, -by].map(|by| moved((simulation, &start), aero_model, *parameter, by));
-        for (output, slopes) in slopes.iter().enumerate() {
-            let largest = slopes.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
+        for (output, slopes) in linear.slopes.iter().enumerate() {
+            let slopes = slopes.row(row);
+            let largest = slopes.amax();
             for (k, slope) in slopes.iter().enumerate() {
                 let difference = up.outputs[k][output] - down.outputs[k][output];
                 // Rounding is 1e-13 of an output of 100.
