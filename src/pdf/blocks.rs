@@ -156,7 +156,7 @@ impl<'a> Blocks<'a> {
             "table" => (table::rows(node, width, self.fonts), 6.0),
             "svg" => (self.drawing(node, width), 1.0),
             "figcaption" => (self.children(node, width, small), 1.0),
-            "figure" => (vec![joined(&self.children(node, width, style))], 8.0),
+            "figure" => (vec![joined(self.children(node, width, style))], 8.0),
             "div" if has_class(node, "small") => (self.children(node, width, small), 2.0),
             "div" if has_class(node, "pairs") => (self.pairs(node, width, style), 2.0),
             _ => (self.children(node, width, style), 0.0),
@@ -216,12 +216,12 @@ impl<'a> Blocks<'a> {
         for entry in node.descendants() {
             if entry.has_tag_name("dt") {
                 let lines = self.children(entry, DEFINITION_INDENT - 6.0, term_style);
-                term = Some(joined(&lines));
+                term = Some(joined(lines));
             } else if entry.has_tag_name("dd") {
                 let lines = self.children(entry, width - DEFINITION_INDENT, style);
                 let mut lines = indented(lines, DEFINITION_INDENT);
                 if let Some(term) = term.take() {
-                    put_beside(&term, &mut lines);
+                    put_beside(term, &mut lines);
                 }
                 lines.push(Item::room(ENTRY_GAP));
                 items.extend(lines);
@@ -263,9 +263,9 @@ impl<'a> Blocks<'a> {
         for pair in children.chunks(2) {
             let mut row = Item::default();
             for (child, x) in pair.iter().zip([0.0, column + PAIR_GAP]) {
-                let cell = joined(&self.block(*child, column, style));
+                let cell = joined(self.block(*child, column, style));
                 row.height = row.height.max(cell.height);
-                row.absorb(&cell, x, 0.0);
+                row.absorb(cell, x, 0.0);
             }
             items.push(row);
         }
@@ -283,7 +283,7 @@ fn height_on_page(items: &[Item]) -> f32 {
 }
 
 /// Puts an item beside the first of some lines, with room below them if it is higher.
-fn put_beside(item: &Item, lines: &mut Vec<Item>) {
+fn put_beside(item: Item, lines: &mut Vec<Item>) {
     let missing = item.height - lines.iter().map(|i| i.height).sum::<f32>();
     if lines.is_empty() || missing > 0.0 {
         lines.push(Item {

@@ -126,17 +126,16 @@ impl Item {
     }
 
     /// Adds the marks of another item, moved.
-    pub fn absorb(&mut self, other: &Item, dx: f32, dy: f32) {
-        self.marks
-            .extend(other.marks.iter().map(|mark| mark.shifted_by(dx, dy)));
+    pub fn absorb(&mut self, other: Item, dx: f32, dy: f32) {
+        let marks = other.marks.into_iter();
+        self.marks.extend(marks.map(|mark| mark.shifted_by(dx, dy)));
     }
 }
 
 impl PlacedMark {
     /// The mark moved by a distance.
-    pub fn shifted_by(&self, dx: f32, dy: f32) -> PlacedMark {
-        let mut mark = self.clone();
-        match &mut mark {
+    pub fn shifted_by(mut self, dx: f32, dy: f32) -> PlacedMark {
+        match &mut self {
             PlacedMark::Text { x, y, .. }
             | PlacedMark::Drawing { x, y, .. }
             | PlacedMark::Fill { x, y, .. }
@@ -147,17 +146,17 @@ impl PlacedMark {
             }
             PlacedMark::Anchor { .. } | PlacedMark::Heading { .. } | PlacedMark::Contents => {}
         }
-        mark
+        self
     }
 }
 
 /// Joins items to one, which is not torn apart.
-pub fn joined(items: &[Item]) -> Item {
+pub fn joined(items: Vec<Item>) -> Item {
     let mut all = Item::default();
     for item in items {
-        let y = all.height;
+        let (y, height) = (all.height, item.height);
         all.absorb(item, 0.0, y);
-        all.height += item.height;
+        all.height += height;
     }
     all
 }
@@ -165,11 +164,8 @@ pub fn joined(items: &[Item]) -> Item {
 /// Moves items to the right.
 pub fn indented(mut items: Vec<Item>, indent: f32) -> Vec<Item> {
     for item in &mut items {
-        item.marks = item
-            .marks
-            .iter()
-            .map(|m| m.shifted_by(indent, 0.0))
-            .collect();
+        let marks = std::mem::take(&mut item.marks).into_iter();
+        item.marks = marks.map(|m| m.shifted_by(indent, 0.0)).collect();
     }
     items
 }

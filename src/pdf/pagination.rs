@@ -108,7 +108,7 @@ impl PagedDocument {
                 }
                 other => {
                     if let Some(last) = self.pages.last_mut() {
-                        last.marks.push(other.shifted_by(MARGIN, y));
+                        last.marks.push(other.clone().shifted_by(MARGIN, y));
                     }
                 }
             }
@@ -240,7 +240,7 @@ fn in_columns(lines: &[Item]) -> Vec<Item> {
         for (i, item) in left.iter().enumerate() {
             let mut row = item.clone();
             if let Some(beside) = right.get(i) {
-                row.absorb(beside, COLUMN + COLUMN_GAP, 0.0);
+                row.absorb(beside.clone(), COLUMN + COLUMN_GAP, 0.0);
             }
             rows.push(row);
         }

@@ -214,8 +214,9 @@ impl TableLayout {
             };
             let mut y = room;
             for line in lines(&cell.words, layout, fonts) {
-                item.absorb(&line, x, y);
-                y += line.height;
+                let height = line.height;
+                item.absorb(line, x, y);
+                y += height;
             }
             item.height = item.height.max(y + room);
             shades.extend(cell.shade.map(|colour| (x, *width, colour)));

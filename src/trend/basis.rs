@@ -99,16 +99,16 @@ impl Basis {
             .collect();
         for order in 1..=self.order {
             let share = |part: f64, whole: f64| if whole > 0.0 { part / whole } else { 0.0 };
-            values = (0..knots.len() - 1 - order)
-                .map(|i| {
-                    let rising = share(x - knots[i], knots[i + order] - knots[i]);
-                    let falling = share(
-                        knots[i + order + 1] - x,
-                        knots[i + order + 1] - knots[i + 1],
-                    );
-                    rising * values[i] + falling * values[i + 1]
-                })
-                .collect();
+            // The next function is still that of the order below.
+            for i in 0..knots.len() - 1 - order {
+                let rising = share(x - knots[i], knots[i + order] - knots[i]);
+                let falling = share(
+                    knots[i + order + 1] - x,
+                    knots[i + order + 1] - knots[i + 1],
+                );
+                values[i] = rising * values[i] + falling * values[i + 1];
+            }
+            values.pop();
         }
         RowDVector::from_vec(values)
     }
