@@ -17,14 +17,17 @@ pub fn extrapolations(
     comparison: &[ComparisonRow],
     tunnel: &WindTunnel,
 ) -> Vec<ExtrapolationRow> {
+    let mut estimated: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    for estimate in estimates {
+        let of_maneuver = estimated.entry(&estimate.maneuver_id).or_default();
+        of_maneuver.push(&estimate.derivative);
+    }
     let mut rows = Vec::new();
     for maneuver in maneuvers {
-        let of_maneuver = estimates
-            .iter()
-            .filter(|e| e.maneuver_id == maneuver.maneuver_id);
-        let names = of_maneuver.map(|e| e.derivative.as_str());
+        let id = maneuver.maneuver_id.as_str();
+        let names = estimated.get(id).into_iter().flatten().copied();
         rows.extend(extrapolations_at(
-            &maneuver.maneuver_id,
+            id,
             &maneuver.condition(tunnel),
             names,
             tunnel,

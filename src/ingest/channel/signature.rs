@@ -80,7 +80,7 @@ impl SignatureSamples {
     }
 }
 
-/// Hash of all signals at each time, in intervals.
+/// Hash of all signals at each time, in intervals, by rising time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Signature(Vec<(i64, u64)>);
 
@@ -109,8 +109,11 @@ impl Signature {
     /// The rows that two records share; `None` without any.
     #[must_use]
     pub fn overlap(&self, other: &Signature) -> Option<Overlap> {
-        let other: BTreeMap<i64, u64> = other.0.iter().copied().collect();
-        let is_equal = |(time, hash): &&(i64, u64)| other.get(time) == Some(hash);
+        let mut others = other.0.iter().peekable();
+        let is_equal = |own: &&(i64, u64)| {
+            while others.next_if(|other| other.0 < own.0).is_some() {}
+            others.peek() == Some(own)
+        };
         let mut common: Vec<(i64, u64)> = self.0.iter().filter(is_equal).copied().collect();
         let (first, last) = (common.first()?.0, common.last()?.0);
         let share = common.len() as f64 / self.0.len() as f64;
