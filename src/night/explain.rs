@@ -10,7 +10,9 @@ use crate::estimate::Estimated;
 use crate::flight::is_stretch;
 use crate::lineage::Stage;
 use crate::maneuver::{Maneuver, ManeuverOrigin, Status};
-use crate::pipeline::{Campaign, Conductor, EstimateStep, Flight, LazyRecord, Progress};
+use crate::pipeline::{
+    Campaign, Conductor, EstimateStep, Flight, LazyRecord, Progress, estimate_basis,
+};
 use crate::pipeline::{SegmentStep, Step};
 use crate::tables::{ChannelRow, EstimateRow, StartingValues};
 
@@ -47,6 +49,7 @@ fn explain_maneuver(
         .ok_or_else(|| Error::store(runner.store.folder(), &"the maneuver's flight is missing"))?;
     let step = EstimateStep {
         config,
+        basis: &estimate_basis(config),
         store: &runner.store,
         record: &LazyRecord::new(flight, &runner.store, &campaign.delays),
         maneuver,

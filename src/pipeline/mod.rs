@@ -30,7 +30,7 @@ pub(crate) use stages::model_stage::evidence;
 pub(crate) use stages::qualities_stage::flown_means;
 pub(crate) use stages::report_stage::{PAGE, PRINTED_PAGE, Report, make_report};
 pub(crate) use steps::estimate_step::{
-    EstimateStep, LazyRecord, estimate_maneuver, load_or_make_maneuvers,
+    EstimateStep, LazyRecord, estimate_basis, estimate_maneuver, load_or_make_maneuvers,
 };
 pub(crate) use steps::match_step::decisive_differences;
 pub(crate) use steps::segment_step::SegmentStep;

@@ -7,8 +7,7 @@ use serde::Serialize;
 
 use super::step::{Companion, ComputedArtefact, LoadedOrMade, Step};
 use super::step_runner::StepRunner;
-use crate::aero::{AeroModel, Axis, WindTunnel};
-use crate::aircraft::Aircraft;
+use crate::aero::Axis;
 use crate::config::Config;
 use crate::error::{ProblemStage, Result};
 use crate::estimate::{self, Context, Estimated};
@@ -21,7 +20,7 @@ use crate::pipeline::problems::problem;
 use crate::pipeline::records::ingested::Flight;
 use crate::report;
 use crate::store::record_file::RecordFile;
-use crate::store::{ArtefactName, Kind, Store};
+use crate::store::{ArtefactName, Fingerprint, Kind, Store};
 use crate::surfaces::DelayCorrection;
 
 /// Everything that decides the derivatives of a maneuver.
@@ -31,10 +30,8 @@ pub struct EstimateKey<'a> {
     ingest: &'a str,
     maneuver: &'a Maneuver,
     class: Option<&'a Class>,
-    aircraft: &'a Aircraft,
-    model: &'a AeroModel,
-    tunnel: &'a WindTunnel,
-    estimate: &'a estimate::Settings,
+    /// Fingerprint of what all maneuvers share ([`estimate_basis`]).
+    basis: &'a str,
     /// Corrections of the surfaces of the maneuver's axis.
     delays: Vec<&'a DelayCorrection>,
     /// Corrections of the flight's instruments from all flights together.
@@ -88,6 +85,8 @@ impl<'a> LazyRecord<'a> {
 /// Estimation of one maneuver.
 pub struct EstimateStep<'a> {
     pub config: &'a Config,
+    /// Fingerprint of what all maneuvers share ([`estimate_basis`]).
+    pub basis: &'a str,
     pub store: &'a Store,
     pub record: &'a LazyRecord<'a>,
     pub maneuver: &'a Maneuver,
@@ -110,10 +109,7 @@ impl<'a> Step for EstimateStep<'a> {
             ingest: &self.record.flight.fingerprint,
             maneuver: self.maneuver,
             class: config.class(&self.maneuver.class),
-            aircraft: &config.aircraft,
-            model: &config.aero_model,
-            tunnel: &config.tunnel,
-            estimate: &config.estimate,
+            basis: self.basis,
             delays: delays_of_axis(config, self.record.delays, self.maneuver.axis),
             corrections: self.record.flight.by_all_flights.as_deref(),
         }
@@ -135,6 +131,17 @@ impl<'a> Step for EstimateStep<'a> {
             digest: None,
         }]
     }
+}
+
+/// Fingerprint of the aircraft, its equations, the tunnel and the settings of the estimation.
+#[must_use]
+pub fn estimate_basis(config: &Config) -> String {
+    Fingerprint::of("basis", 1)
+        .with(&config.aircraft)
+        .with(&config.aero_model)
+        .with(&config.tunnel)
+        .with(&config.estimate)
+        .finish()
 }
 
 /// Corrections of the surfaces that act in an axis; other surfaces have no effect on its estimates.
@@ -228,12 +235,14 @@ pub fn load_or_make_maneuvers(
     maneuvers: &[&Maneuver],
     delays: &[DelayCorrection],
 ) -> Result<Vec<Option<LoadedOrMade<Estimated>>>> {
+    let basis = estimate_basis(runner.config);
     let of_flight = |flight: &Flight| {
         let record = LazyRecord::new(flight, &runner.store, delays);
         let of_flight = maneuvers.iter().filter(|m| m.flight_id == flight.id());
         let steps: Vec<EstimateStep> = of_flight
             .map(|maneuver| EstimateStep {
                 config: runner.config,
+                basis: &basis,
                 store: &runner.store,
                 record: &record,
                 maneuver,

@@ -8,8 +8,7 @@ use serde::Serialize;
 use super::estimate_step::LazyRecord;
 use super::step::{ComputedArtefact, Step};
 use super::step_runner::StepRunner;
-use crate::aero::{AeroModel, WindTunnel};
-use crate::aircraft::Aircraft;
+use crate::aero::WindTunnel;
 use crate::config::Config;
 use crate::error::Result;
 use crate::flight::Correction;
@@ -31,11 +30,8 @@ pub struct MatchKey<'a> {
     /// Fingerprint of the flight's ingest.
     ingest: &'a str,
     maneuver: &'a Maneuver,
-    aircraft: &'a Aircraft,
-    model: &'a AeroModel,
-    specification: &'a Specification,
-    /// Fingerprint of all models' derivatives, and of the posterior with its covariance.
-    derivatives: &'a str,
+    /// Fingerprint of what all maneuvers share.
+    basis: &'a str,
     /// The maneuver's own estimates and means, from which its Dutch roll follows.
     own: Option<(&'a Means, OwnEstimates)>,
     delays: &'a [DelayCorrection],
@@ -47,7 +43,9 @@ pub struct MatchKey<'a> {
 pub struct MatchStep<'a> {
     basis: &'a ProofInputs<'a>,
     posterior: &'a Model,
-    derivatives: &'a str,
+    /// Fingerprint of the aircraft, its equations, the tolerances, all models' derivatives, and the
+    /// posterior with its covariance.
+    fingerprint: &'a str,
     record: &'a LazyRecord<'a>,
     delays: &'a [DelayCorrection],
     maneuver: &'a Maneuver,
@@ -69,10 +67,7 @@ impl<'a> Step for MatchStep<'a> {
         MatchKey {
             ingest: &self.record.flight.fingerprint,
             maneuver: self.maneuver,
-            aircraft: self.basis.aircraft,
-            model: self.basis.aero_model,
-            specification: self.basis.specification,
-            derivatives: self.derivatives,
+            basis: self.fingerprint,
             own: self.own.clone(),
             delays: self.delays,
             corrections: self.record.flight.by_all_flights.as_deref(),
@@ -111,7 +106,10 @@ pub fn fly_again(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
         return Ok(());
     };
     let databases = Databases::new(runner.config, campaign, &specification.models);
-    let derivatives = Fingerprint::of("models", 1)
+    let fingerprint = Fingerprint::of("proof of match", 1)
+        .with(&runner.config.aircraft)
+        .with(&runner.config.aero_model)
+        .with(specification)
         .with(&databases.models)
         .with(&databases.tunnel)
         .with(&campaign.model.rows.posterior)
@@ -127,7 +125,7 @@ pub fn fly_again(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
             .map(|(i, maneuver)| MatchStep {
                 basis: &basis,
                 posterior: &campaign.model,
-                derivatives: &derivatives,
+                fingerprint: &fingerprint,
                 record: &record,
                 delays: &campaign.delays,
                 maneuver,

@@ -55,13 +55,14 @@ impl<'a> StepRunner<'a> {
     /// # Errors
     /// As [`Step::make`]; an artefact that cannot be saved.
     pub fn load_or_make<S: Step>(&self, step: &S) -> Result<Option<LoadedOrMade<S::Artefact>>> {
-        let result = match (self.load(step), self.absent) {
+        let name = step.name();
+        let result = match (self.load_as(step, &name), self.absent) {
             (Some(result), _) => result,
             (None, AbsentArtefacts::Report) => {
-                self.note_missing(step.name());
+                self.note_missing(name);
                 return Ok(None);
             }
-            (None, AbsentArtefacts::Make) => self.make(step)?,
+            (None, AbsentArtefacts::Make) => self.make(step, name)?,
         };
         if result.is_stored {
             self.store.require(&result.name);
@@ -74,20 +75,22 @@ impl<'a> StepRunner<'a> {
 
     /// Loads a step's artefact; `None` unless it and its companions are unchanged.
     pub fn load<S: Step>(&self, step: &S) -> Option<LoadedOrMade<S::Artefact>> {
-        let name = step.name();
-        let artefact = self.store.load(&name)?;
-        step.companions(&name, &artefact)
+        self.load_as(step, &step.name())
+    }
+
+    fn load_as<S: Step>(&self, step: &S, name: &ArtefactName) -> Option<LoadedOrMade<S::Artefact>> {
+        let artefact = self.store.load(name)?;
+        step.companions(name, &artefact)
             .iter()
             .all(|companion| self.has(companion))
-            .then_some(LoadedOrMade {
-                name,
+            .then(|| LoadedOrMade {
+                name: name.clone(),
                 artefact,
                 is_stored: true,
             })
     }
 
-    fn make<S: Step>(&self, step: &S) -> Result<LoadedOrMade<S::Artefact>> {
-        let name = step.name();
+    fn make<S: Step>(&self, step: &S, name: ArtefactName) -> Result<LoadedOrMade<S::Artefact>> {
         let (artefact, is_stored) = match step.make(&name)? {
             ComputedArtefact::Final(artefact) => {
                 self.store.save(&name, &artefact)?;
