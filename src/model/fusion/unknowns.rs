@@ -149,9 +149,7 @@ impl Unknowns {
     /// Root of the prior covariance of all unknowns; `least` as in [`Unknowns::root_of_others`].
     #[must_use]
     pub fn root(&self, terms: &[PosteriorTerm], scales: &[Scale], least: f64) -> BlockRoot {
-        let mut blocks = root_of_differences(terms, scales, least);
-        self.push_others(least, |_| true, &mut blocks);
-        blocks
+        self.root_of_observed(terms, scales, least, |_| true)
     }
 
     /// Root as by [`Unknowns::root`], with zero variance for unknowns on which no data depend. The
@@ -164,12 +162,7 @@ impl Unknowns {
         least: f64,
         is_observed: impl Fn(usize) -> bool,
     ) -> BlockRoot {
-        let mut blocks = BlockRoot::default();
-        for ((term, scale), start) in terms.iter().zip(scales).zip(&self.starts) {
-            let covariance = term.prior.covariance.for_scale(scale);
-            let observed = of_observed(covariance, |i| is_observed(start + i));
-            blocks.push(root(&observed, least));
-        }
+        let mut blocks = root_of_differences(terms, scales, least, &is_observed);
         self.push_others(least, is_observed, &mut blocks);
         blocks
     }
@@ -198,13 +191,23 @@ fn of_observed(mut covariance: DMatrix<f64>, is_observed: impl Fn(usize) -> bool
     covariance
 }
 
-/// Root of the prior covariance of the differences. Directions below `least` of a term's largest
-/// variance are ignored.
+/// Root of the prior covariance of the differences, with zero variance for those that are not
+/// observed. Directions below `least` of a term's largest variance are ignored.
 #[must_use]
-pub fn root_of_differences(terms: &[PosteriorTerm], scales: &[Scale], least: f64) -> BlockRoot {
+pub fn root_of_differences(
+    terms: &[PosteriorTerm],
+    scales: &[Scale],
+    least: f64,
+    is_observed: impl Fn(usize) -> bool,
+) -> BlockRoot {
     let mut blocks = BlockRoot::default();
+    let mut start = 0;
     for (term, scale) in terms.iter().zip(scales) {
-        blocks.push(root(&term.prior.covariance.for_scale(scale), least));
+        let covariance = term.prior.covariance.for_scale(scale);
+        let next = start + covariance.nrows();
+        let observed = of_observed(covariance, |i| is_observed(start + i));
+        blocks.push(root(&observed, least));
+        start = next;
     }
     blocks
 }

@@ -288,7 +288,7 @@ fn the_spread_over_open_scales_is_the_mean_square_over_draws_of_them() {
     let observed = observed(&terms, &data);
     let scales = most_probable(&observed, &scales());
     let mean = |at: &DVector<f64>| {
-        let root = root_of_differences(&terms, &scales_of(at), EXACT);
+        let root = root_of_differences(&terms, &scales_of(at), EXACT, |_| true);
         gaussian(&root, &own).unwrap().mean
     };
     let at = logarithms_of(&scales);
