@@ -2,7 +2,8 @@
 //! used.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
-use super::aerodynamics::{AeroInputs, Aerodynamics, SimulationTrim, TrimmedAerodynamics};
+use super::aerodynamics::{Aerodynamics, SimulationTrim, TrimmedAerodynamics};
+use super::factor::AeroInputs;
 use super::load_changes::LoadSlopes;
 use super::maneuver_recording::ManeuverRecording;
 use super::outputs::{Outputs, outputs};

@@ -8,7 +8,8 @@ use std::array::from_fn;
 
 use pulp::Simd;
 
-use super::aerodynamics::{AeroInputs, Aerodynamics, COEFFICIENTS, FORCE, FlowSlopes, MOMENT};
+use super::aerodynamics::{Aerodynamics, COEFFICIENTS, FORCE, MOMENT};
+use super::factor::{AeroInputs, FlowSlopes};
 use crate::numerics::vectors::lanes::{Lanes, combination, each};
 use crate::rigid_body::{AirChange, BodySlopes, Instant, StateChange};
 use crate::units::DEG;

@@ -2,7 +2,7 @@
 //! body with six degrees of freedom, and judged by the tolerances of a standard.
 //!
 //! - [`maneuver_recording`]: the maneuver as recorded, inputs and outputs;
-//! - [`derivative_table`] and [`aerodynamics`]: the model that flies it again;
+//! - [`derivative_table`], [`factor`] and [`aerodynamics`]: the model that flies it again;
 //! - [`free_run`]: the flight, and [`linear_run`]: the slopes of its outputs;
 //! - [`start`]: initial state and trim;
 //! - [`specification`]: tolerances, which are the analyst's data;
@@ -16,6 +16,7 @@
 mod specification;
 mod outputs;
 mod derivative_table;
+mod factor;
 mod aerodynamics;
 mod maneuver_recording;
 mod load_changes;

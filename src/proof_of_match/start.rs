@@ -7,7 +7,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::aerodynamics::{AeroInputs, COEFFICIENTS, SimulationTrim, TrimmedAerodynamics};
+use super::aerodynamics::{COEFFICIENTS, SimulationTrim, TrimmedAerodynamics};
+use super::factor::AeroInputs;
 use super::free_run::{FreeRun, STATES, Simulation, Start};
 use super::linear_run::{Parameter, RunWithSensitivities};
 use super::maneuver_recording::ManeuverRecording;
