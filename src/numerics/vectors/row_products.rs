@@ -32,8 +32,9 @@ impl Interleaved for Idle {
     fn advance(&mut self) {}
 }
 
-/// Rows of a tile between two steps of the interleaved work: about the latency of one step.
-const ROWS_BETWEEN: usize = 4;
+/// Rows of a tile between two steps of the interleaved work. The steps of a chunk then spread over most of its
+/// sums; closer steps would wait for each other, and the last sums would have no work beside them.
+const ROWS_BETWEEN: usize = 6;
 
 /// Rows of numbers, in vectors of [`VECTOR`] lanes.
 #[derive(Clone, Copy)]
