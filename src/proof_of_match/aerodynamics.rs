@@ -6,14 +6,20 @@
 //! sum is over all other regressors x, with the derivatives C_x at the present angle of attack. A
 //! derivative is a local slope, as estimated. Constants of the database do not enter, because
 //! C_trim is matched to the flight.
+#![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
+#![expect(
+    clippy::needless_range_loop,
+    reason = "plain indices become straight code for the vectors"
+)]
 
 use nalgebra::Vector3;
 
-use super::derivative_table::DerivativeTable;
-use super::factor::{AeroInputs, FLOW, Factor, Factors, FlowSlopes};
-use crate::aero::{AeroModel, Axis, Coefficient, Derivative};
+use super::derivative_table::{ALPHA_ROW, CoefficientLanes, DerivativePlace, DerivativeTable};
+use super::factor::{AeroInputs, FLOW, Factor, Factors};
+use crate::aero::{AeroModel, Axis, Coefficient, Condition, Derivative, WindTunnel};
 use crate::aircraft::Aircraft;
 use crate::flight::signal;
+use crate::numerics::vectors::simd::{VECTOR, vectorised};
 
 /// Number of coefficients: CN, Cm, CA, CY, Cl, Cn.
 pub const COEFFICIENTS: usize = 6;
@@ -40,23 +46,22 @@ pub fn recorded_signals(aero_model: &AeroModel) -> Vec<&str> {
     signals
 }
 
-/// Terms of the build-up with the derivatives of one model.
+/// Build-up with the derivatives of one model.
 #[derive(Clone, Debug)]
 pub struct Aerodynamics<'a> {
     aircraft: &'a Aircraft,
-    /// Coefficient and factor of each derivative, in the order of the build-up.
-    terms: Vec<(usize, Factor)>,
+    /// Factors of the derivatives, each once, in the order of the table's rows. Constants have none.
+    factors: Vec<Factor>,
     has_alpha_rate: bool,
     pub table: DerivativeTable,
 }
 
-/// Trim from which a simulation starts: coefficients, and factors of the derivatives.
+/// Trim from which a simulation starts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimulationTrim {
     pub coefficients: [f64; COEFFICIENTS],
-    /// Factors of the derivatives at the trim.
+    /// Factors of the build-up at the trim.
     pub factors: Vec<f64>,
-    pub alpha_deg: f64,
 }
 
 impl SimulationTrim {
@@ -68,38 +73,31 @@ impl SimulationTrim {
 }
 
 impl<'a> Aerodynamics<'a> {
+    /// Tabulates the derivatives of a model at a maneuver's condition. A derivative that the model
+    /// lacks is taken from the fallback, or is zero.
     #[must_use]
     pub fn new(
-        aircraft: &'a Aircraft,
-        aero_model: &AeroModel,
-        table: DerivativeTable,
+        (aircraft, aero_model): (&'a Aircraft, &AeroModel),
+        models: (&WindTunnel, &WindTunnel),
+        condition: &Condition,
     ) -> Aerodynamics<'a> {
-        let derivatives = aero_model.derivatives.iter();
-        let recorded = recorded_signals(aero_model);
-        let term = |d: &Derivative| {
-            let factors = Factors {
-                aircraft,
-                recorded: &recorded,
-                coefficient: d.coefficient,
-            };
-            (index(d.coefficient), factors.factor_of(&d.regressor))
-        };
+        let (factors, places) = build_up(aircraft, aero_model);
         Aerodynamics {
             aircraft,
-            terms: derivatives.map(term).collect(),
+            factors,
             has_alpha_rate: aero_model.along_alpha_rate().next().is_some(),
-            table,
+            table: DerivativeTable::new((aero_model, places), models, condition),
         }
     }
 
-    /// Factors of all derivatives in a flow, with the recorded signals.
+    /// Factors in a flow, with the recorded signals.
     pub fn factors<'b>(
         &'b self,
         flow: &'b AeroInputs,
         recorded: &'b [f64],
     ) -> impl Iterator<Item = f64> + 'b {
-        let terms = self.terms.iter();
-        terms.map(|(_, factor)| factor.value(flow, recorded))
+        let factors = self.factors.iter();
+        factors.map(|factor| factor.value(flow, recorded))
     }
 
     /// Force, lbf, and moment about the c.g., ft lbf, in body axes.
@@ -119,12 +117,6 @@ impl<'a> Aerodynamics<'a> {
         )
     }
 
-    /// Index of a derivative's coefficient.
-    #[must_use]
-    pub fn coefficient(&self, derivative: usize) -> usize {
-        self.terms[derivative].0
-    }
-
     /// Reference lengths of the moments about the body axes, ft.
     #[must_use]
     pub fn lengths(&self) -> [f64; 3] {
@@ -141,157 +133,163 @@ impl<'a> Aerodynamics<'a> {
     }
 }
 
-/// Aerodynamics about a trim, prepared for a run of thousands of instants. The coefficients at the
-/// trim are computed once; a factor that several derivatives have is computed once per instant.
-#[derive(Clone, Debug)]
-pub struct TrimmedAerodynamics<'a> {
-    table: &'a DerivativeTable,
-    /// Terms of each coefficient in the order of the build-up, without the constants.
-    terms: [Vec<TrimmedTerm>; COEFFICIENTS],
-    /// Factors of the terms, each once.
-    factors: Vec<&'a Factor>,
-    /// Values of the factors at the present instant.
-    values: Vec<f64>,
-    /// Slopes of the factors along the flow at the present instant; `None` for recorded signals.
-    slopes: Vec<Option<FlowSlopes>>,
-    /// Every derivative at the present angle of attack.
-    derivatives: Vec<f64>,
-    /// Slope of each derivative's coefficient along the derivative at the present instant.
-    by_derivative: Vec<f64>,
-    has_alpha_rate: bool,
-    trim_alpha_deg: f64,
+/// Factors of a build-up, each once, and the place of each derivative in their table.
+fn build_up(aircraft: &Aircraft, aero_model: &AeroModel) -> (Vec<Factor>, Vec<DerivativePlace>) {
+    let recorded = recorded_signals(aero_model);
+    let factor_of = |d: &Derivative| {
+        let factors = Factors {
+            aircraft,
+            recorded: &recorded,
+            coefficient: d.coefficient,
+        };
+        factors.factor_of(&d.regressor)
+    };
+    let mut factors = vec![Factor::Alpha];
+    for derivative in &aero_model.derivatives {
+        let factor = factor_of(derivative);
+        if factor != Factor::Constant && !factors.contains(&factor) {
+            factors.push(factor);
+        }
+    }
+    let place = |d: &Derivative| {
+        let factor = factor_of(d);
+        let known = factors.iter().position(|own| *own == factor);
+        DerivativePlace {
+            // Constants have a row behind the factors.
+            row: known.unwrap_or(factors.len()),
+            coefficient: index(d.coefficient),
+        }
+    };
+    let places = aero_model.derivatives.iter().map(place).collect();
+    (factors, places)
 }
 
-/// Term of a build-up about a trim.
+/// Aerodynamics about a trim, prepared for a run of thousands of instants. What does not change from
+/// the trim is computed once.
 #[derive(Clone, Debug)]
-struct TrimmedTerm {
-    derivative: usize,
-    /// Index of the term's factor in [`TrimmedAerodynamics::values`].
-    factor: usize,
-    is_along_alpha: bool,
-    /// Factor at the trim; along α the integral of the derivative there.
-    at_trim: f64,
+pub struct TrimmedAerodynamics<'a> {
+    aerodynamics: &'a Aerodynamics<'a>,
+    factors_at_trim: Vec<f64>,
+    /// Integrals of the derivatives along α at the trim.
+    integrals_at_trim: CoefficientLanes,
+    /// Change of each factor from the trim at the present instant.
+    moved: Vec<f64>,
+    /// Slopes of the factors along the flow at the present instant.
+    slopes_of_factors: Vec<FactorSlope>,
 }
 
 impl<'a> TrimmedAerodynamics<'a> {
     #[must_use]
     pub fn new(aerodynamics: &'a Aerodynamics, trim: &SimulationTrim) -> TrimmedAerodynamics<'a> {
-        let table = &aerodynamics.table;
-        let place = table.position_of(trim.alpha_deg);
-        let mut terms = [const { Vec::new() }; COEFFICIENTS];
-        let mut factors: Vec<&Factor> = Vec::new();
-        let own = aerodynamics.terms.iter().zip(&trim.factors).enumerate();
-        for (derivative, ((coefficient, factor), factor_at_trim)) in own {
-            if *factor == Factor::Constant {
-                continue;
-            }
-            let is_along_alpha = *factor == Factor::Alpha;
-            let known = factors.iter().position(|known| *known == factor);
-            terms[*coefficient].push(TrimmedTerm {
-                derivative,
-                factor: known.unwrap_or(factors.len()),
-                is_along_alpha,
-                at_trim: if is_along_alpha {
-                    table.entries(place).integral(derivative)
-                } else {
-                    *factor_at_trim
-                },
-            });
-            if known.is_none() {
-                factors.push(factor);
-            }
-        }
+        let factors_at_trim = trim.factors.clone();
+        let alpha_deg = factors_at_trim.get(ALPHA_ROW).copied().unwrap_or(f64::NAN);
         TrimmedAerodynamics {
-            table,
-            terms,
-            values: vec![0.0; factors.len()],
-            slopes: factors
-                .iter()
-                .map(|factor| factor.follows_flow().then_some([0.0; FLOW]))
-                .collect(),
-            derivatives: vec![0.0; table.derivatives()],
-            by_derivative: vec![0.0; table.derivatives()],
-            has_alpha_rate: aerodynamics.has_alpha_rate,
-            factors,
-            trim_alpha_deg: trim.alpha_deg,
+            aerodynamics,
+            integrals_at_trim: aerodynamics.table.entries(alpha_deg).integrals(),
+            moved: vec![0.0; factors_at_trim.len()],
+            factors_at_trim,
+            slopes_of_factors: vec![],
         }
     }
 
     /// `true` if the coefficients depend on the rate of the angle of attack.
     #[must_use]
     pub fn have_alpha_rate(&self) -> bool {
-        self.has_alpha_rate
+        self.aerodynamics.has_alpha_rate
     }
 
     /// Change of the coefficients from the trim.
     #[must_use]
     pub fn change(&mut self, flow: &AeroInputs, recorded: &[f64]) -> [f64; COEFFICIENTS] {
-        for (value, factor) in self.values.iter_mut().zip(&self.factors) {
-            *value = factor.value(flow, recorded);
-        }
-        let entries = self.table.entries(self.table.position_of(flow.alpha_deg));
-        entries.read_into(&mut self.derivatives);
-        let mut change = [0.0; COEFFICIENTS];
-        for (sum, terms) in change.iter_mut().zip(&self.terms) {
-            for term in terms {
-                *sum += if term.is_along_alpha {
-                    entries.integral(term.derivative) - term.at_trim
-                } else {
-                    self.derivatives[term.derivative] * (self.values[term.factor] - term.at_trim)
-                };
-            }
-        }
-        change
+        self.set_moved(flow, recorded);
+        let entries = self.aerodynamics.table.entries(flow.alpha_deg);
+        let change = vectorised(
+            #[inline(always)]
+            || {
+                let mut change = entries.integrals();
+                for c in 0..VECTOR {
+                    change[c] -= self.integrals_at_trim[c];
+                }
+                entries.add_products(&self.moved, &mut change);
+                change
+            },
+        );
+        std::array::from_fn(|i| change[i])
     }
 
-    /// Change of the coefficients from the trim, with its slopes along the flow and along each
-    /// derivative. A derivative is raised by the same amount at every angle of attack.
+    /// Slopes of the coefficients along the flow and along each derivative.
     #[must_use]
-    pub fn change_with_slopes(
-        &mut self,
-        flow: &AeroInputs,
-        recorded: &[f64],
-    ) -> CoefficientSlopes<'_> {
-        let change = self.change(flow, recorded);
-        let entries = self.table.entries(self.table.position_of(flow.alpha_deg));
-        for (slopes, factor) in self.slopes.iter_mut().zip(&self.factors) {
-            if let Some(slopes) = slopes {
-                *slopes = factor.slopes(flow, recorded);
-            }
-        }
-        let mut by_flow = [[0.0; FLOW]; COEFFICIENTS];
-        for (sums, terms) in by_flow.iter_mut().zip(&self.terms) {
-            for term in terms {
-                if term.is_along_alpha {
-                    sums[AeroInputs::ALPHA] += entries.integral_slope(term.derivative);
-                    self.by_derivative[term.derivative] = flow.alpha_deg - self.trim_alpha_deg;
-                    continue;
+    pub fn slopes(&mut self, flow: &AeroInputs, recorded: &[f64]) -> CoefficientSlopes<'_> {
+        self.set_moved(flow, recorded);
+        self.set_slopes_of_factors(flow, recorded);
+        let entries = self.aerodynamics.table.entries(flow.alpha_deg);
+        let by_flow = vectorised(
+            #[inline(always)]
+            || {
+                let mut by_flow = [[0.0; VECTOR]; FLOW];
+                let mut by_alpha = entries.integral_slopes();
+                for row in ALPHA_ROW + 1..self.moved.len() {
+                    add_multiple(&mut by_alpha, self.moved[row], &entries.value_slopes(row));
                 }
-                let moved = self.values[term.factor] - term.at_trim;
-                sums[AeroInputs::ALPHA] += entries.value_slope(term.derivative) * moved;
-                if let Some(slopes) = &self.slopes[term.factor] {
-                    let value = self.derivatives[term.derivative];
-                    for (sum, slope) in sums.iter_mut().zip(slopes) {
-                        *sum += value * slope;
-                    }
+                by_flow[AeroInputs::ALPHA] = by_alpha;
+                for along in &self.slopes_of_factors {
+                    let values = entries.values(along.row);
+                    add_multiple(&mut by_flow[along.quantity], along.slope, &values);
                 }
-                self.by_derivative[term.derivative] = moved;
-            }
-        }
+                by_flow
+            },
+        );
         CoefficientSlopes {
-            change,
             by_flow,
-            by_derivative: &self.by_derivative,
+            by_derivative: &self.moved,
+        }
+    }
+
+    fn set_moved(&mut self, flow: &AeroInputs, recorded: &[f64]) {
+        let factors = self.aerodynamics.factors.iter().zip(&self.factors_at_trim);
+        for (moved, (factor, at_trim)) in self.moved.iter_mut().zip(factors) {
+            *moved = factor.value(flow, recorded) - at_trim;
+        }
+    }
+
+    fn set_slopes_of_factors(&mut self, flow: &AeroInputs, recorded: &[f64]) {
+        self.slopes_of_factors.clear();
+        let factors = self.aerodynamics.factors.iter().enumerate();
+        for (row, factor) in factors.skip(ALPHA_ROW + 1) {
+            factor.slopes((flow, recorded), 1.0, &mut |quantity, slope| {
+                self.slopes_of_factors.push(FactorSlope {
+                    row,
+                    quantity,
+                    slope,
+                });
+            });
         }
     }
 }
 
-/// Change of the coefficients from the trim, with its slopes, at an instant.
+/// Slope of the factor of a row along one quantity of the flow.
+#[derive(Clone, Copy, Debug)]
+struct FactorSlope {
+    row: usize,
+    quantity: usize,
+    slope: f64,
+}
+
+/// Adds a multiple of the numbers of all coefficients.
+#[inline(always)]
+fn add_multiple(sums: &mut CoefficientLanes, factor: f64, numbers: &CoefficientLanes) {
+    for c in 0..VECTOR {
+        sums[c] = factor.mul_add(numbers[c], sums[c]);
+    }
+}
+
+/// Slopes of the coefficients at an instant.
 #[derive(Clone, Debug)]
 pub struct CoefficientSlopes<'a> {
-    pub change: [f64; COEFFICIENTS],
-    pub by_flow: [FlowSlopes; COEFFICIENTS],
-    /// Slope of each derivative's coefficient along the derivative.
+    /// Along each quantity of the flow.
+    pub by_flow: [CoefficientLanes; FLOW],
+    /// Along the derivatives of each row of the table. A derivative is raised by the same amount at
+    /// every angle of attack.
     pub by_derivative: &'a [f64],
 }
 

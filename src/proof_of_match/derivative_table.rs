@@ -1,8 +1,15 @@
 //! Derivatives of a model over angle of attack in the flight condition of one maneuver, tabulated
 //! closely for the inner loop.
+//!
+//! A row of the table has the derivatives of all coefficients along one factor, in the lanes of a vector.
+#![expect(
+    clippy::inline_always,
+    reason = "compiled into free runs for the processor at hand"
+)]
 
 use crate::aero::{AeroModel, Condition, Regressor, WindTunnel};
 use crate::numerics::series::trapezoid::running_integral;
+use crate::numerics::vectors::simd::VECTOR;
 
 /// Spacing of the table, deg. Between its points the table is linear, as most databases are.
 const STEP_DEG: f64 = 1.0;
@@ -11,23 +18,29 @@ const STEP_DEG: f64 = 1.0;
 /// constant.
 const REACH_DEG: f64 = 20.0;
 
-/// Derivatives over angle of attack. A derivative along α is tabulated as its integral from the
+/// Numbers of all coefficients side by side, padded to a whole vector.
+pub type CoefficientLanes = [f64; VECTOR];
+
+/// Row of the derivatives along α.
+pub const ALPHA_ROW: usize = 0;
+
+/// Place of a derivative in a table: row of its factor, and index of its coefficient.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DerivativePlace {
+    pub row: usize,
+    pub coefficient: usize,
+}
+
+/// Derivatives over angle of attack. Derivatives along α are tabulated as their integrals from the
 /// table's start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DerivativeTable {
     first_deg: f64,
-    nodes: usize,
-    /// Node by node, each derivative in the order of the build-up.
-    values: Vec<f64>,
-    derivatives: usize,
-}
-
-/// Position of an angle of attack in a table.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TablePosition {
-    row: usize,
-    /// Fraction of the interval; below 0 or above 1 beyond the table.
-    fraction: f64,
+    /// Node by node, factor by factor; zero where the build-up has no derivative.
+    values: Vec<CoefficientLanes>,
+    rows: usize,
+    /// Place of each derivative, in the order of the build-up.
+    pub places: Vec<DerivativePlace>,
 }
 
 impl DerivativeTable {
@@ -35,16 +48,16 @@ impl DerivativeTable {
     /// the fallback, or is zero.
     #[must_use]
     pub fn new(
-        aero_model: &AeroModel,
-        model: &WindTunnel,
-        fallback: &WindTunnel,
+        (aero_model, places): (&AeroModel, Vec<DerivativePlace>),
+        (model, fallback): (&WindTunnel, &WindTunnel),
         condition: &Condition,
     ) -> DerivativeTable {
         let first_deg = ((condition.alpha_deg - REACH_DEG) / STEP_DEG).floor() * STEP_DEG;
         let nodes = node_count();
-        let derivatives = aero_model.derivatives.len();
-        let mut values = vec![0.0; nodes * derivatives];
-        for (i, derivative) in aero_model.derivatives.iter().enumerate() {
+        let last = places.iter().map(|place| place.row).max();
+        let rows = last.unwrap_or(ALPHA_ROW) + 1;
+        let mut values = vec![[0.0; VECTOR]; nodes * rows];
+        for (derivative, place) in aero_model.derivatives.iter().zip(&places) {
             let name = &derivative.name;
             let source = model.reader(name).or_else(|| fallback.reader(name));
             let at = |node: usize| {
@@ -61,128 +74,139 @@ impl DerivativeTable {
                 column = running_integral(&column, STEP_DEG);
             }
             for (node, value) in column.into_iter().enumerate() {
-                values[node * derivatives + i] = value;
+                values[node * rows + place.row][place.coefficient] = value;
             }
         }
         DerivativeTable {
             first_deg,
-            nodes,
             values,
-            derivatives,
+            rows,
+            places,
         }
     }
 
     /// Raises one derivative by a constant.
     #[cfg(test)]
-    pub fn raise(&mut self, derivative: usize, regressor: &Regressor, by: f64) {
-        for (node, row) in self.values.chunks_mut(self.derivatives).enumerate() {
-            let distance = if *regressor == Regressor::Alpha {
+    pub fn raise(&mut self, derivative: usize, by: f64) {
+        let DerivativePlace { row, coefficient } = self.places[derivative];
+        for (node, rows) in self.values.chunks_mut(self.rows).enumerate() {
+            let distance = if row == ALPHA_ROW {
                 STEP_DEG * node as f64
             } else {
                 1.0
             };
-            row[derivative] += by * distance;
+            rows[row][coefficient] += by * distance;
         }
     }
 
-    /// Number of its derivatives.
-    #[must_use]
-    pub fn derivatives(&self) -> usize {
-        self.derivatives
-    }
-
+    /// Entries on both sides of an angle of attack.
     #[inline]
     #[must_use]
-    pub fn position_of(&self, alpha_deg: f64) -> TablePosition {
+    pub fn entries(&self, alpha_deg: f64) -> Entries<'_> {
         let steps = (alpha_deg - self.first_deg) / STEP_DEG;
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "not negative; what is no number becomes 0"
         )]
-        let row = (steps.max(0.0) as usize).min(self.nodes - 2);
-        TablePosition {
-            row,
-            fraction: steps - row as f64,
-        }
-    }
-
-    /// Entries of all derivatives on both sides of a position.
-    #[inline]
-    #[must_use]
-    pub fn entries(&self, place: TablePosition) -> Entries<'_> {
-        let both = &self.values[place.row * self.derivatives..][..2 * self.derivatives];
-        let (low, high) = both.split_at(self.derivatives);
+        let node = (steps.max(0.0) as usize).min(node_count() - 2);
+        let both = &self.values[node * self.rows..][..2 * self.rows];
+        let (low, high) = both.split_at(self.rows);
+        let fraction = steps - node as f64;
         Entries {
             low,
             high,
-            fraction: place.fraction,
-            fraction_inside: place.fraction.clamp(0.0, 1.0),
+            fraction,
+            fraction_inside: fraction.clamp(0.0, 1.0),
         }
     }
 
-    /// Derivative at a position, constant beyond the table.
+    /// Derivative at an angle of attack, constant beyond the table.
     #[must_use]
-    pub fn value(&self, place: TablePosition, derivative: usize) -> f64 {
-        self.entries(place).value(derivative)
+    pub fn value(&self, alpha_deg: f64, derivative: usize) -> f64 {
+        let DerivativePlace { row, coefficient } = self.places[derivative];
+        self.entries(alpha_deg).values(row)[coefficient]
     }
 }
 
-/// Entries of a table on both sides of a place.
+/// Entries of a table on both sides of an angle of attack.
 #[derive(Clone, Copy, Debug)]
 pub struct Entries<'a> {
-    low: &'a [f64],
-    high: &'a [f64],
+    low: &'a [CoefficientLanes],
+    high: &'a [CoefficientLanes],
+    /// Fraction of the interval; below 0 or above 1 beyond the table.
     fraction: f64,
     /// Fraction of the interval, limited to the table.
     fraction_inside: f64,
 }
 
 impl Entries<'_> {
-    /// Derivative, constant beyond the table.
-    #[inline]
+    /// Derivatives along a factor, constant beyond the table.
+    #[inline(always)]
     #[must_use]
-    pub fn value(&self, derivative: usize) -> f64 {
-        self.between(self.fraction_inside, derivative)
+    pub fn values(&self, row: usize) -> CoefficientLanes {
+        self.between(self.fraction_inside, row)
     }
 
-    /// Reads all derivatives as [`Entries::value`] does.
-    #[inline]
-    pub fn read_into(&self, values: &mut [f64]) {
-        let both = self.low.iter().zip(self.high);
-        for (value, (low, high)) in values.iter_mut().zip(both) {
-            *value = low + self.fraction_inside * (high - low);
+    /// Adds the products of numbers, one for each row, with the derivatives of the row. Those along α are left
+    /// out.
+    #[inline(always)]
+    pub fn add_products(&self, numbers: &[f64], sums: &mut CoefficientLanes) {
+        let rows = numbers.len();
+        let (low, high) = (&self.low[..rows], &self.high[..rows]);
+        for row in ALPHA_ROW + 1..rows {
+            for c in 0..VECTOR {
+                let rise = high[row][c] - low[row][c];
+                let value = self.fraction_inside.mul_add(rise, low[row][c]);
+                sums[c] = numbers[row].mul_add(value, sums[c]);
+            }
         }
     }
 
-    /// Integral of a derivative along α; beyond the table the derivative is constant.
-    #[inline]
+    /// Integrals of the derivatives along α; beyond the table a derivative is constant.
+    #[inline(always)]
     #[must_use]
-    pub fn integral(&self, derivative: usize) -> f64 {
-        self.between(self.fraction, derivative)
+    pub fn integrals(&self) -> CoefficientLanes {
+        self.between(self.fraction, ALPHA_ROW)
     }
 
-    /// Slope of the derivative along α, per deg.
+    /// Slopes of a factor's derivatives along α, per deg.
+    #[inline(always)]
     #[must_use]
-    pub fn value_slope(&self, derivative: usize) -> f64 {
+    pub fn value_slopes(&self, row: usize) -> CoefficientLanes {
         let is_inside = (0.0..=1.0).contains(&self.fraction);
         if is_inside {
-            self.integral_slope(derivative)
+            self.slopes(row)
         } else {
-            0.0
+            [0.0; VECTOR]
         }
     }
 
-    /// Slope of the integral of a derivative along α, per deg.
+    /// Slopes of the integrals along α, per deg.
+    #[inline(always)]
     #[must_use]
-    pub fn integral_slope(&self, derivative: usize) -> f64 {
-        (self.high[derivative] - self.low[derivative]) / STEP_DEG
+    pub fn integral_slopes(&self) -> CoefficientLanes {
+        self.slopes(ALPHA_ROW)
     }
 
-    #[inline]
-    fn between(&self, fraction: f64, derivative: usize) -> f64 {
-        let (low, high) = (self.low[derivative], self.high[derivative]);
-        low + fraction * (high - low)
+    #[inline(always)]
+    fn slopes(&self, row: usize) -> CoefficientLanes {
+        let (low, high) = (&self.low[row], &self.high[row]);
+        let mut slopes = [0.0; VECTOR];
+        for c in 0..VECTOR {
+            slopes[c] = (high[c] - low[c]) / STEP_DEG;
+        }
+        slopes
+    }
+
+    #[inline(always)]
+    fn between(&self, fraction: f64, row: usize) -> CoefficientLanes {
+        let (low, high) = (&self.low[row], &self.high[row]);
+        let mut values = *low;
+        for c in 0..VECTOR {
+            values[c] = fraction.mul_add(high[c] - low[c], values[c]);
+        }
+        values
     }
 }
 

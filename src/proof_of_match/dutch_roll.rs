@@ -137,8 +137,8 @@ impl LateralModes {
     }
 
     fn values(&self, table: &DerivativeTable) -> DVector<f64> {
-        let place = table.position_of(self.alpha_deg);
-        let values = self.derivatives.iter().map(|i| table.value(place, *i));
+        let values = self.derivatives.iter();
+        let values = values.map(|derivative| table.value(self.alpha_deg, *derivative));
         DVector::from_iterator(self.own.len(), values)
     }
 

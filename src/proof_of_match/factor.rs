@@ -1,4 +1,8 @@
 //! Factors of the derivatives in a build-up, and the flow that they follow.
+#![expect(
+    clippy::inline_always,
+    reason = "compiled into the loop over all factors"
+)]
 
 use crate::aero::{Coefficient, Regressor};
 use crate::aircraft::Aircraft;
@@ -44,9 +48,6 @@ impl AeroInputs {
 
 /// Number of the quantities of a flow, in their order, along which coefficients have slopes.
 pub const FLOW: usize = 9;
-
-/// Slopes along the quantities of a flow.
-pub type FlowSlopes = [f64; FLOW];
 
 /// Factor of a derivative, with the constants that it needs.
 #[derive(Clone, Debug, PartialEq)]
@@ -125,7 +126,7 @@ impl Factors<'_> {
 
 impl Factor {
     /// Value in a flow, with the recorded signals.
-    #[inline]
+    #[inline(always)]
     pub fn value(&self, flow: &AeroInputs, recorded: &[f64]) -> f64 {
         let at = |place: &usize| recorded.get(*place).copied().unwrap_or(0.0);
         match self {
@@ -138,52 +139,55 @@ impl Factor {
             Factor::AlphaRate { half_length } => flow.alpha_rate * half_length / flow.velocity,
             Factor::Recorded(place) => at(place),
             Factor::Vane { place, size } => at(place) / (flow.qbar * size),
-            Factor::Magnitude(of) => of.value(flow, recorded).abs(),
-            Factor::Product(both) => both[0].value(flow, recorded) * both[1].value(flow, recorded),
+            Factor::Magnitude(of) => of.inner_value(flow, recorded).abs(),
+            Factor::Product(both) => {
+                let [a, b] = both.as_ref();
+                a.inner_value(flow, recorded) * b.inner_value(flow, recorded)
+            }
         }
     }
 
-    /// `false` if the factor has only recorded signals, and thus no slope along the flow.
-    pub fn follows_flow(&self) -> bool {
-        match self {
-            Factor::Constant | Factor::Recorded(_) => false,
-            Factor::Magnitude(of) => of.follows_flow(),
-            Factor::Product(both) => both.iter().any(Factor::follows_flow),
-            _ => true,
-        }
+    /// Value of a factor within another one. [`Factor::value`] is inlined, as it does not call itself.
+    fn inner_value(&self, flow: &AeroInputs, recorded: &[f64]) -> f64 {
+        self.value(flow, recorded)
     }
 
-    /// Slopes along the flow.
-    pub fn slopes(&self, flow: &AeroInputs, recorded: &[f64]) -> FlowSlopes {
-        let mut slopes = [0.0; FLOW];
-        match self {
-            Factor::Constant | Factor::Recorded(_) => {}
-            Factor::Alpha => slopes[AeroInputs::ALPHA] = 1.0,
-            Factor::Beta => slopes[AeroInputs::BETA] = 1.0,
-            Factor::Velocity => slopes[AeroInputs::VELOCITY] = 1.0,
-            Factor::Mach => slopes[AeroInputs::MACH] = 1.0,
+    /// Hands each slope along a quantity of the flow, times a multiple, to `take`; recorded signals have
+    /// none.
+    pub fn slopes(
+        &self,
+        (flow, recorded): (&AeroInputs, &[f64]),
+        multiple: f64,
+        take: &mut impl FnMut(usize, f64),
+    ) {
+        let at = (flow, recorded);
+        let along = match self {
+            Factor::Constant | Factor::Recorded(_) => return,
+            Factor::Alpha => (AeroInputs::ALPHA, 1.0),
+            Factor::Beta => (AeroInputs::BETA, 1.0),
+            Factor::Velocity => (AeroInputs::VELOCITY, 1.0),
+            Factor::Mach => (AeroInputs::MACH, 1.0),
             Factor::Rate { axis, half_length } => {
-                slopes[AeroInputs::RATES + axis] = half_length / flow.velocity;
-                slopes[AeroInputs::VELOCITY] = -self.value(flow, recorded) / flow.velocity;
+                let value = self.value(flow, recorded);
+                take(AeroInputs::VELOCITY, -multiple * value / flow.velocity);
+                (AeroInputs::RATES + axis, half_length / flow.velocity)
             }
             Factor::AlphaRate { half_length } => {
-                slopes[AeroInputs::ALPHA_RATE] = half_length / flow.velocity;
-                slopes[AeroInputs::VELOCITY] = -self.value(flow, recorded) / flow.velocity;
+                let value = self.value(flow, recorded);
+                take(AeroInputs::VELOCITY, -multiple * value / flow.velocity);
+                (AeroInputs::ALPHA_RATE, half_length / flow.velocity)
             }
-            Factor::Vane { .. } => {
-                slopes[AeroInputs::QBAR] = -self.value(flow, recorded) / flow.qbar;
-            }
+            Factor::Vane { .. } => (AeroInputs::QBAR, -self.value(flow, recorded) / flow.qbar),
             Factor::Magnitude(of) => {
                 let sign = of.value(flow, recorded).signum();
-                slopes = of.slopes(flow, recorded).map(|slope| sign * slope);
+                return of.slopes(at, sign * multiple, take);
             }
             Factor::Product(both) => {
-                let [a, b] = [&both[0], &both[1]];
-                let values = [a.value(flow, recorded), b.value(flow, recorded)];
-                let (by_a, by_b) = (a.slopes(flow, recorded), b.slopes(flow, recorded));
-                slopes = std::array::from_fn(|i| by_a[i] * values[1] + values[0] * by_b[i]);
+                let [a, b] = both.as_ref();
+                a.slopes(at, b.value(flow, recorded) * multiple, take);
+                return b.slopes(at, a.value(flow, recorded) * multiple, take);
             }
-        }
-        slopes
+        };
+        take(along.0, multiple * along.1);
     }
 }

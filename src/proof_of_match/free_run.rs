@@ -236,8 +236,8 @@ impl RunEquations<'_> {
         self.instant_at(alpha_rate, state, point)
     }
 
-    /// Slopes of the loads at an instant, and slope of each derivative's coefficient along the
-    /// derivative.
+    /// Slopes of the loads at an instant, and slope of a coefficient along the derivatives of each row
+    /// of the table.
     pub fn load_slopes(&mut self, instant: &Instant, point: usize) -> (LoadSlopes, &[f64]) {
         let has_alpha_rate = self.aerodynamics.have_alpha_rate();
         let state = &instant.state;
@@ -248,11 +248,12 @@ impl RunEquations<'_> {
         };
         let flow = AeroInputs::new(&instant.air, state.rates.into(), alpha_rate);
         let recorded = self.simulation.recording.signals(point);
-        let slopes = self.aerodynamics.change_with_slopes(&flow, recorded);
+        let change = self.aerodynamics.change(&flow, recorded);
+        let slopes = self.aerodynamics.slopes(&flow, recorded);
         let loads = LoadSlopes::new(
             &self.simulation.aerodynamics,
             instant,
-            &self.start.trim.plus(slopes.change),
+            &self.start.trim.plus(change),
             slopes.by_flow,
             has_alpha_rate,
         );

@@ -62,9 +62,8 @@ impl Simulation<'_> {
 /// Slopes along a run, up to the present step.
 struct RunSlopes<'a> {
     simulation: &'a Simulation<'a>,
-    parameters: &'a [Parameter],
-    /// Coefficient that each parameter changes directly.
-    coefficients: Vec<Option<usize>>,
+    /// Coefficient that each parameter changes directly, if any.
+    changes: Vec<Option<DirectChange>>,
     step_s: f64,
     stages: [Option<StageSlopes>; STAGES],
     /// Direct change of the coefficients by the parameters at each stage: coefficient by
@@ -80,6 +79,14 @@ struct RunSlopes<'a> {
     recorded: [Vec<f64>; COUNT],
 }
 
+/// Coefficient that a parameter changes directly.
+#[derive(Clone, Copy, Debug)]
+struct DirectChange {
+    coefficient: usize,
+    /// Row of a derivative in the table; a coefficient at the trim has none.
+    row: Option<usize>,
+}
+
 /// Slopes of the equations at a stage.
 #[derive(Clone, Copy, Debug)]
 struct StageSlopes {
@@ -91,7 +98,7 @@ struct StageSlopes {
 impl<'a> RunSlopes<'a> {
     fn new(
         simulation: &'a Simulation<'a>,
-        (start, parameters): (&Start, &'a [Parameter]),
+        (start, parameters): (&Start, &[Parameter]),
         (steps, step_s): (usize, f64),
     ) -> RunSlopes<'a> {
         let width = parameters.len().next_multiple_of(VECTOR);
@@ -103,14 +110,22 @@ impl<'a> RunSlopes<'a> {
                 }
             }
         }
-        let coefficient = |parameter: &Parameter| match parameter {
-            Parameter::Start(place) => place.checked_sub(STATES),
-            Parameter::Derivative(place) => Some(simulation.aerodynamics.coefficient(*place)),
+        let change = |parameter: &Parameter| match parameter {
+            Parameter::Start(place) => Some(DirectChange {
+                coefficient: place.checked_sub(STATES)?,
+                row: None,
+            }),
+            Parameter::Derivative(place) => {
+                let place = simulation.aerodynamics.table.places.get(*place)?;
+                Some(DirectChange {
+                    coefficient: place.coefficient,
+                    row: Some(place.row),
+                })
+            }
         };
         RunSlopes {
             simulation,
-            parameters,
-            coefficients: parameters.iter().map(coefficient).collect(),
+            changes: parameters.iter().map(change).collect(),
             step_s,
             stages: [None; STAGES],
             direct: from_fn(|_| AlignedBuffer::zeros(COEFFICIENTS * width)),
@@ -123,7 +138,7 @@ impl<'a> RunSlopes<'a> {
 
     /// Slopes of each output: parameters as rows, samples as columns.
     fn of_outputs(self) -> [DMatrix<f64>; COUNT] {
-        let parameters = self.parameters.len();
+        let parameters = self.changes.len();
         self.recorded.map(|slopes| {
             let samples = slopes.len() / parameters.max(1);
             DMatrix::from_vec(parameters, samples, slopes)
@@ -147,13 +162,10 @@ impl StageObserver for RunSlopes<'_> {
             ),
         });
         let direct = self.direct[stage].slice_mut();
-        let parameters = self.parameters.iter().zip(&self.coefficients);
-        for (column, (parameter, coefficient)) in parameters.enumerate() {
-            if let Some(coefficient) = coefficient {
-                direct[coefficient * self.width + column] = match parameter {
-                    Parameter::Start(_) => 1.0,
-                    Parameter::Derivative(place) => by_derivative[*place],
-                };
+        for (column, change) in self.changes.iter().enumerate() {
+            if let Some(DirectChange { coefficient, row }) = change {
+                let slope = row.map_or(Some(&1.0), |row| by_derivative.get(row));
+                direct[coefficient * self.width + column] = slope.copied().unwrap_or(0.0);
             }
         }
     }
@@ -172,7 +184,7 @@ impl StageObserver for RunSlopes<'_> {
         });
         let outputs = self.outputs.slice().chunks_exact(self.width);
         for (recorded, slopes) in self.recorded.iter_mut().zip(outputs) {
-            recorded.extend_from_slice(&slopes[..self.parameters.len()]);
+            recorded.extend_from_slice(&slopes[..self.changes.len()]);
         }
     }
 

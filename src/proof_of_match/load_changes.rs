@@ -9,7 +9,8 @@ use std::array::from_fn;
 use pulp::Simd;
 
 use super::aerodynamics::{Aerodynamics, COEFFICIENTS, FORCE, MOMENT};
-use super::factor::{AeroInputs, FlowSlopes};
+use super::derivative_table::CoefficientLanes;
+use super::factor::{AeroInputs, FLOW};
 use crate::numerics::vectors::lanes::{Lanes, combination, each};
 use crate::rigid_body::{AirChange, BodySlopes, Instant, StateChange};
 use crate::units::DEG;
@@ -24,8 +25,9 @@ pub struct LoadsChange<S: Simd> {
 /// Slopes of the aerodynamic loads at an instant.
 #[derive(Clone, Copy, Debug)]
 pub struct LoadSlopes {
-    /// Slopes of the coefficients, along angles in rad and relative changes of dynamic pressure.
-    coefficients: [FlowSlopes; COEFFICIENTS],
+    /// Slopes of the coefficients along each quantity of the flow: angles in rad, relative changes of dynamic
+    /// pressure.
+    coefficients: [CoefficientLanes; FLOW],
     /// Aerodynamic force and moment, which are proportional to dynamic pressure.
     force: [f64; 3],
     moment: [f64; 3],
@@ -53,16 +55,20 @@ impl LoadSlopes {
         aerodynamics: &Aerodynamics,
         instant: &Instant,
         coefficients: &[f64; COEFFICIENTS],
-        mut by_flow: [FlowSlopes; COEFFICIENTS],
+        mut by_flow: [CoefficientLanes; FLOW],
         has_alpha_rate: bool,
     ) -> LoadSlopes {
         let qbar = instant.air.qbar_psf;
         let area = qbar * aerodynamics.area();
         let (force, moment) = aerodynamics.loads(coefficients, qbar);
-        for slopes in &mut by_flow {
-            slopes[AeroInputs::ALPHA] *= DEG;
-            slopes[AeroInputs::BETA] *= DEG;
-            slopes[AeroInputs::QBAR] *= qbar;
+        for (quantity, unit) in [
+            (AeroInputs::ALPHA, DEG),
+            (AeroInputs::BETA, DEG),
+            (AeroInputs::QBAR, qbar),
+        ] {
+            for slope in &mut by_flow[quantity] {
+                *slope *= unit;
+            }
         }
         let mut slopes = LoadSlopes {
             coefficients: by_flow,
@@ -79,9 +85,9 @@ impl LoadSlopes {
     /// Slopes of α̇ = (u ẇ − w u̇)/(u² + w²), with u and w the velocities along body x and z. u̇
     /// and ẇ are linear in α̇.
     fn alpha_rate_term(&self, instant: &Instant) -> AlphaRateTerm {
-        let along = |i: usize| self.coefficients[i][AeroInputs::ALPHA_RATE];
-        let force: [f64; 3] = from_fn(|i| self.force_by_coefficient[i] * along(FORCE[i].0));
-        let moment = from_fn(|i| self.moment_by_coefficient[i] * along(MOMENT[i]));
+        let along = self.coefficients[AeroInputs::ALPHA_RATE];
+        let force: [f64; 3] = from_fn(|i| self.force_by_coefficient[i] * along[FORCE[i].0]);
+        let moment = from_fn(|i| self.moment_by_coefficient[i] * along[MOMENT[i]]);
         let [u, _, w]: [f64; 3] = instant.state.velocity.into();
         let [u_rate, _, w_rate]: [f64; 3] = instant.rate.velocity.into();
         let per_square = 1.0 / (u * u + w * w);
@@ -115,9 +121,10 @@ impl LoadSlopes {
         let coefficients: [Lanes<S>; COEFFICIENTS] = each(
             #[inline(always)]
             |i| {
-                let [alpha, beta, velocity, mach, p, q, r, _, qbar] = self.coefficients[i];
-                let along_flow = combination(&[alpha, beta, velocity, mach, p, q, r], &flow);
-                direct[i] + along_flow.plus(qbar, air.relative_qbar)
+                let [alpha, beta, velocity, mach, p, q, r, _, qbar] = &self.coefficients;
+                let along = [alpha[i], beta[i], velocity[i], mach[i], p[i], q[i], r[i]];
+                let along_flow = combination(&along, &flow);
+                direct[i] + along_flow.plus(qbar[i], air.relative_qbar)
             },
         );
         let mut loads = LoadsChange {

@@ -4,7 +4,6 @@ use serde::{Deserialize, Serialize};
 
 use super::aerodynamics::Aerodynamics;
 use super::decisive_difference::{DecisiveDifference, PredictedDutchRoll};
-use super::derivative_table::DerivativeTable;
 use super::dutch_roll::{LateralModes, OwnEstimates};
 use super::free_run::{FreeRun, Simulation};
 use super::judgement::{self, Judged, Simulated, ToleranceFinding};
@@ -266,11 +265,14 @@ impl<'a> RepeatableManeuver<'a> {
     fn trimmed(&self, database: &WindTunnel) -> Trimmed<'_> {
         let basis = self.basis;
         let condition = self.maneuver.condition(basis.tunnel);
-        let table = DerivativeTable::new(basis.aero_model, database, basis.tunnel, &condition);
         let simulation = Simulation {
             aircraft: basis.aircraft,
             recording: &self.recording,
-            aerodynamics: Aerodynamics::new(basis.aircraft, basis.aero_model, table),
+            aerodynamics: Aerodynamics::new(
+                (basis.aircraft, basis.aero_model),
+                (database, basis.tunnel),
+                &condition,
+            ),
         };
         let start = start::matched(&simulation);
         Trimmed { simulation, start }

@@ -131,7 +131,6 @@ fn as_measured(simulation: &Simulation) -> Start {
     let mut trim = SimulationTrim {
         coefficients: [0.0; COEFFICIENTS],
         factors: mean_factors(simulation),
-        alpha_deg: mean(motions.iter().map(|m| DEG * m.alpha)),
     };
     let mut about_trim = TrimmedAerodynamics::new(&simulation.aerodynamics, &trim);
     let implied: Vec<[f64; COEFFICIENTS]> = motions
@@ -184,7 +183,7 @@ fn flow(simulation: &Simulation, motion: &Motion) -> AeroInputs {
     }
 }
 
-/// Means of the derivatives' factors over the trim.
+/// Means of the build-up's factors over the trim.
 fn mean_factors(simulation: &Simulation) -> Vec<f64> {
     let recording = simulation.recording;
     let share = 1.0 / recording.motions.len().max(1) as f64;

@@ -57,7 +57,7 @@ impl<'a> Step for MatchStep<'a> {
     type Artefact = Matched;
 
     const KIND: Kind = Kind::Match;
-    const VERSION: u32 = 9;
+    const VERSION: u32 = 10;
 
     fn item(&self) -> &str {
         &self.maneuver.maneuver_id

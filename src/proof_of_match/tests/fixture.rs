@@ -13,7 +13,6 @@ use crate::lab::campaign::SimulatedCampaign;
 use crate::lab::simulator::{FlownManeuver, Instrument, Instruments, TrueDerivative};
 use crate::model::LocalPosterior;
 use crate::proof_of_match::aerodynamics::Aerodynamics;
-use crate::proof_of_match::derivative_table::DerivativeTable;
 use crate::proof_of_match::free_run::Simulation;
 use crate::proof_of_match::maneuver_recording::ManeuverRecording;
 use crate::proof_of_match::{
@@ -162,10 +161,9 @@ pub fn simulation<'a>(
         third: None,
     };
     let aero_model: &AeroModel = &shipped().config.aero_model;
-    let table = DerivativeTable::new(aero_model, tunnel, tunnel, &condition);
     Simulation {
         aircraft,
         recording,
-        aerodynamics: Aerodynamics::new(aircraft, aero_model, table),
+        aerodynamics: Aerodynamics::new((aircraft, aero_model), (tunnel, tunnel), &condition),
     }
 }

@@ -5,7 +5,6 @@ use crate::aero::{Condition, Regressor};
 use crate::lab::simulator::FlownManeuver;
 use crate::lab::simulator::tests::{shipped_campaign, with_lag};
 use crate::proof_of_match::aerodynamics::Aerodynamics;
-use crate::proof_of_match::derivative_table::DerivativeTable;
 use crate::proof_of_match::free_run::Simulation;
 use crate::proof_of_match::maneuver_recording::ManeuverRecording;
 use crate::proof_of_match::start;
@@ -33,11 +32,10 @@ fn a_lag_is_flown_again() {
             let is_lag = derivative.regressor == Regressor::AlphaRate;
             own.value * if is_lag { factor } else { 1.0 }
         });
-        let table = DerivativeTable::new(aero_model, &model, &model, &condition);
         let simulation = Simulation {
             aircraft,
             recording: &recording,
-            aerodynamics: Aerodynamics::new(aircraft, aero_model, table),
+            aerodynamics: Aerodynamics::new((aircraft, aero_model), (&model, &model), &condition),
         };
         let start = start::matched(&simulation).start;
         let run = simulation.fly(&start, recording.samples, 1);

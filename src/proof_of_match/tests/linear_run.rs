@@ -7,7 +7,6 @@ use crate::aero::{AeroModel, Condition, Regressor, WindTunnel};
 use crate::lab::simulator::FlownManeuver;
 use crate::lab::simulator::tests::{shipped_campaign, with_lag};
 use crate::proof_of_match::aerodynamics::Aerodynamics;
-use crate::proof_of_match::derivative_table::DerivativeTable;
 use crate::proof_of_match::free_run::{FreeRun, Simulation, Start};
 use crate::proof_of_match::linear_run::Parameter;
 use crate::proof_of_match::maneuver_recording::ManeuverRecording;
@@ -26,18 +25,12 @@ fn deviation(parameter: Parameter) -> f64 {
 }
 
 /// Run with one parameter changed.
-fn moved(
-    (simulation, start): (&Simulation, &Start),
-    aero_model: &AeroModel,
-    parameter: Parameter,
-    by: f64,
-) -> FreeRun {
+fn moved((simulation, start): (&Simulation, &Start), parameter: Parameter, by: f64) -> FreeRun {
     let (mut simulation, mut start) = (simulation.clone(), start.clone());
     match parameter {
         Parameter::Start(place) => start = start.with_change(place, by),
         Parameter::Derivative(place) => {
-            let regressor = &aero_model.derivatives[place].regressor;
-            simulation.aerodynamics.table.raise(place, regressor, by);
+            simulation.aerodynamics.table.raise(place, by);
         }
     }
     simulation.fly(&start, STEPS.0, STEPS.1)
@@ -56,8 +49,7 @@ fn compare(simulation: &Simulation, aero_model: &AeroModel) {
     assert_eq!(linear.run, simulation.fly(&start, STEPS.0, STEPS.1));
     for (row, parameter) in parameters.iter().enumerate() {
         let by = deviation(*parameter);
-        let [up, down] =
-            [by, -by].map(|by| moved((simulation, &start), aero_model, *parameter, by));
+        let [up, down] = [by, -by].map(|by| moved((simulation, &start), *parameter, by));
         for (output, slopes) in linear.slopes.iter().enumerate() {
             let slopes = slopes.row(row);
             let largest = slopes.amax();
@@ -100,11 +92,10 @@ fn slopes_of_an_aircraft_with_a_lag_are_those_of_free_runs() {
         third: None,
     };
     let model: WindTunnel = super::fixture::database(&flown, |own| own.value);
-    let table = DerivativeTable::new(aero_model, &model, &model, &condition);
     let simulation = Simulation {
         aircraft,
         recording: &recording,
-        aerodynamics: Aerodynamics::new(aircraft, aero_model, table),
+        aerodynamics: Aerodynamics::new((aircraft, aero_model), (&model, &model), &condition),
     };
     compare(&simulation, aero_model);
 }

@@ -1,5 +1,6 @@
 //! Free runs, judgement and probabilities, on maneuvers of the laboratory's simulator.
 
+mod aerodynamics;
 mod decisive_difference;
 mod dutch_roll;
 mod fixture;
