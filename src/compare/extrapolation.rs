@@ -17,15 +17,12 @@ pub fn extrapolations(
     comparison: &[ComparisonRow],
     tunnel: &WindTunnel,
 ) -> Vec<ExtrapolationRow> {
-    let mut estimated: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
-    for estimate in estimates {
-        let of_maneuver = estimated.entry(&estimate.maneuver_id).or_default();
-        of_maneuver.push(&estimate.derivative);
-    }
+    let estimates = EstimateRow::by_maneuver(estimates);
     let mut rows = Vec::new();
     for maneuver in maneuvers {
         let id = maneuver.maneuver_id.as_str();
-        let names = estimated.get(id).into_iter().flatten().copied();
+        let own = estimates.get(id).copied().unwrap_or_default();
+        let names = own.iter().map(|estimate| estimate.derivative.as_str());
         rows.extend(extrapolations_at(
             id,
             &maneuver.condition(tunnel),

@@ -1,5 +1,7 @@
 //! Tables of maneuvers' estimates: fits, derivatives, correlations, joint estimation.
 
+use std::collections::BTreeMap;
+
 use crate::maneuver::{Maneuver, Status};
 use crate::schema::{table, words};
 
@@ -242,6 +244,14 @@ table! {
 pub const JOINT_FLIGHT: &str = "joint";
 
 impl EstimateRow {
+    /// Rows of each maneuver, which are consecutive.
+    #[must_use]
+    pub fn by_maneuver(rows: &[EstimateRow]) -> BTreeMap<&str, &[EstimateRow]> {
+        rows.chunk_by(|a, b| a.maneuver_id == b.maneuver_id)
+            .map(|own| (own[0].maneuver_id.as_str(), own))
+            .collect()
+    }
+
     /// Reason why the maneuver's evidence holds the derivative.
     #[must_use]
     pub fn evidence_to_hold(&self) -> Option<&str> {

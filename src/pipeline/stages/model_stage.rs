@@ -41,8 +41,8 @@ pub fn fit_model(config: &Config, campaign: &mut Campaign) {
 
 /// Results of the maneuvers that converged, as evidence for the posterior.
 pub fn evidence(campaign: &Campaign) -> Vec<ManeuverResults<'_>> {
-    let estimates = by_maneuver(&campaign.estimates);
-    let combined = by_maneuver(&campaign.combined);
+    let estimates = EstimateRow::by_maneuver(&campaign.estimates);
+    let combined = EstimateRow::by_maneuver(&campaign.combined);
     let maneuvers = campaign.maneuvers.iter().zip(&campaign.covariances);
     let evidence = maneuvers.zip(&campaign.fits).filter_map(|(pair, fit)| {
         let (maneuver, covariance) = pair;
@@ -66,7 +66,7 @@ fn lift_and_drag(
     means: &BTreeMap<&str, &Means>,
     estimates: &[EstimateRow],
 ) -> Vec<LiftAndDragRow> {
-    let estimates = by_maneuver(estimates);
+    let estimates = EstimateRow::by_maneuver(estimates);
     let by_posterior = config.estimate.held_values == HeldValues::Posterior;
     let of_maneuver = |evidence: &ManeuverResults| {
         let id = evidence.maneuver.maneuver_id.as_str();
@@ -124,11 +124,4 @@ fn reason(failure: Failure) -> String {
              grid of {points} points for it, and at most {MOST_POINTS} are possible"
         ),
     }
-}
-
-/// Rows of each maneuver, which are consecutive.
-pub fn by_maneuver(rows: &[EstimateRow]) -> BTreeMap<&str, &[EstimateRow]> {
-    rows.chunk_by(|a, b| a.maneuver_id == b.maneuver_id)
-        .map(|own| (own[0].maneuver_id.as_str(), own))
-        .collect()
 }

@@ -16,7 +16,6 @@ use crate::maneuver::{Maneuver, Means};
 use crate::model::Model;
 use crate::pipeline::campaign::Campaign;
 use crate::pipeline::records::ingested::Flight;
-use crate::pipeline::stages::model_stage::by_maneuver;
 use crate::proof_of_match::{
     self, DecisiveDifference, Matched, OwnEstimates, ProofInputs, RecordedManeuver, Specification,
 };
@@ -116,7 +115,7 @@ pub fn fly_again(runner: &StepRunner, campaign: &mut Campaign) -> Result<()> {
         .with(&campaign.model.rows.covariance)
         .finish();
     let basis = databases.basis(runner.config, specification);
-    let estimates = by_maneuver(&campaign.estimates);
+    let estimates = EstimateRow::by_maneuver(&campaign.estimates);
     let of_flight = |flight: &Flight| {
         let record = LazyRecord::new(flight, &runner.store, &campaign.delays);
         let own = campaign.maneuvers.iter().enumerate();
@@ -158,7 +157,7 @@ pub fn decisive_differences(
     };
     let databases = Databases::new(runner.config, campaign, &[model]);
     let basis = databases.basis(runner.config, specification);
-    let estimates = by_maneuver(&campaign.estimates);
+    let estimates = EstimateRow::by_maneuver(&campaign.estimates);
     let of_flight = |flight: &Flight| {
         let record = LazyRecord::new(flight, &runner.store, &campaign.delays);
         let all = campaign.maneuvers.iter().enumerate();
