@@ -15,10 +15,28 @@ pub(crate) fn finite_places(values: &[f64]) -> impl Iterator<Item = usize> + '_ 
 pub(crate) fn finite_values(values: &[f64]) -> (Vec<usize>, Vec<f64>) {
     let count = values
         .chunks(WORD)
-        .map(|part| finite_bits(part).count_ones() as usize);
-    let mut places = Vec::with_capacity(count.sum());
-    places.extend(finite_places(values));
-    let finite = places.iter().map(|place| values[*place]).collect();
+        .map(|part| finite_bits(part).count_ones() as usize)
+        .sum();
+    let (mut places, mut finite) = (vec![0; count], vec![0.0; count]);
+    let mut end = 0;
+    for (n, part) in values.chunks(WORD).enumerate() {
+        let start = end;
+        let bits = finite_bits(part);
+        end += bits.count_ones() as usize;
+        let (places, finite) = (&mut places[start..end], &mut finite[start..end]);
+        // A word of a channel without gaps is copied whole.
+        if finite.len() == part.len() {
+            finite.copy_from_slice(part);
+            places
+                .iter_mut()
+                .zip(n * WORD..)
+                .for_each(|(place, k)| *place = k);
+        } else {
+            for ((place, finite), bit) in places.iter_mut().zip(finite).zip(SetBits(bits)) {
+                (*place, *finite) = (n * WORD + bit, part[bit]);
+            }
+        }
+    }
     (places, finite)
 }
 
