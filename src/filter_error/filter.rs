@@ -58,7 +58,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         model: &Model,
         biases: &[Option<f64>],
     ) -> Self {
-        let case = Case::new(aircraft, signals, measurements, &without_own(model));
+        let case = Case::for_passes(aircraft, signals, measurements, &without_own(model));
         Self::of_case(case, model, biases, None)
     }
 

@@ -137,12 +137,8 @@ impl<'t, 'a, const NX: usize, E: Equations<NX>> Choosing<'t, 'a, NX, E> {
                 .filter_map(at_tunnel_value),
         );
         model.free.retain(|d| !is_held(d));
-        Case::new(
-            self.task.context.aircraft,
-            &self.signals,
-            self.wide.measurements.clone(),
-            &model,
-        )
+        let aircraft = self.task.context.aircraft;
+        self.wide.with_model(aircraft, &self.signals, &model)
     }
 
     /// Information on all parameters of `wide`, at the values of a fit with some held.

@@ -180,7 +180,7 @@ impl StandardCase {
     #[must_use]
     pub fn case(&self, signals: &ManeuverSignals) -> Case<3, Longitudinal> {
         let measurements = self.file.measurements(&self.record);
-        let mut case = Case::new(&self.aircraft, signals, measurements, &self.model());
+        let mut case = Case::for_passes(&self.aircraft, signals, measurements, &self.model());
         case.start_from_mean_of(self.file.x0_samples);
         case
     }

@@ -87,6 +87,18 @@ impl<const NX: usize, E: Equations<NX>> Case<NX, E> {
         Case::of_motion(motion, aircraft, signals, measurements, model)
     }
 
+    /// Prepares a maneuver for passes alone: equation error cannot use it.
+    #[must_use]
+    pub fn for_passes(
+        aircraft: &Aircraft,
+        signals: &ManeuverSignals,
+        measurements: Measurements,
+        model: &Model,
+    ) -> Self {
+        let motion = Arc::new(PreparedMotion::for_passes(aircraft, signals));
+        Case::of_motion(motion, aircraft, signals, measurements, model)
+    }
+
     /// Prepares the same maneuver with another model. `signals` may have other surfaces than the
     /// signals of this case, but the same motion.
     #[must_use]
