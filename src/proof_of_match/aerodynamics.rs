@@ -14,7 +14,9 @@
 
 use nalgebra::Vector3;
 
-use super::derivative_table::{ALPHA_ROW, CoefficientLanes, DerivativePlace, DerivativeTable};
+use super::derivative_table::{
+    ALPHA_ROW, CoefficientLanes, DerivativePlace, DerivativeTable, FIRST_ROW,
+};
 use super::factor::{AeroInputs, FLOW, Factor, Factors};
 use crate::aero::{AeroModel, Axis, Coefficient, Condition, Derivative, WindTunnel};
 use crate::aircraft::Aircraft;
@@ -50,7 +52,7 @@ pub fn recorded_signals(aero_model: &AeroModel) -> Vec<&str> {
 #[derive(Clone, Debug)]
 pub struct Aerodynamics<'a> {
     aircraft: &'a Aircraft,
-    /// Factors of the derivatives, each once, in the order of the table's rows. Constants have none.
+    /// Factors of the derivatives in the order of the table's rows.
     factors: Vec<Factor>,
     has_alpha_rate: bool,
     pub table: DerivativeTable,
@@ -133,7 +135,7 @@ impl<'a> Aerodynamics<'a> {
     }
 }
 
-/// Factors of a build-up, each once, and the place of each derivative in their table.
+/// Factors of a build-up, and the place of each derivative in their table.
 fn build_up(aircraft: &Aircraft, aero_model: &AeroModel) -> (Vec<Factor>, Vec<DerivativePlace>) {
     let recorded = recorded_signals(aero_model);
     let factor_of = |d: &Derivative| {
@@ -144,23 +146,20 @@ fn build_up(aircraft: &Aircraft, aero_model: &AeroModel) -> (Vec<Factor>, Vec<De
         };
         factors.factor_of(&d.regressor)
     };
-    let mut factors = vec![Factor::Alpha];
+    let mut factors = vec![Factor::Alpha, Factor::Constant];
+    let mut places: Vec<DerivativePlace> = Vec::with_capacity(aero_model.derivatives.len());
     for derivative in &aero_model.derivatives {
-        let factor = factor_of(derivative);
-        if factor != Factor::Constant && !factors.contains(&factor) {
+        let (factor, coefficient) = (factor_of(derivative), index(derivative.coefficient));
+        // A second derivative of a coefficient along the same factor has a row of its own.
+        let is_free =
+            |row: usize| row < FIRST_ROW || !places.contains(&DerivativePlace { row, coefficient });
+        let row = (0..factors.len()).find(|row| factors[*row] == factor && is_free(*row));
+        let row = row.unwrap_or_else(|| {
             factors.push(factor);
-        }
+            factors.len() - 1
+        });
+        places.push(DerivativePlace { row, coefficient });
     }
-    let place = |d: &Derivative| {
-        let factor = factor_of(d);
-        let known = factors.iter().position(|own| *own == factor);
-        DerivativePlace {
-            // Constants have a row behind the factors.
-            row: known.unwrap_or(factors.len()),
-            coefficient: index(d.coefficient),
-        }
-    };
-    let places = aero_model.derivatives.iter().map(place).collect();
     (factors, places)
 }
 
@@ -228,7 +227,7 @@ impl<'a> TrimmedAerodynamics<'a> {
             || {
                 let mut by_flow = [[0.0; VECTOR]; FLOW];
                 let mut by_alpha = entries.integral_slopes();
-                for row in ALPHA_ROW + 1..self.moved.len() {
+                for row in FIRST_ROW..self.moved.len() {
                     add_multiple(&mut by_alpha, self.moved[row], &entries.value_slopes(row));
                 }
                 by_flow[AeroInputs::ALPHA] = by_alpha;
@@ -255,7 +254,7 @@ impl<'a> TrimmedAerodynamics<'a> {
     fn set_slopes_of_factors(&mut self, flow: &AeroInputs, recorded: &[f64]) {
         self.slopes_of_factors.clear();
         let factors = self.aerodynamics.factors.iter().enumerate();
-        for (row, factor) in factors.skip(ALPHA_ROW + 1) {
+        for (row, factor) in factors.skip(FIRST_ROW) {
             factor.slopes((flow, recorded), 1.0, &mut |quantity, slope| {
                 self.slopes_of_factors.push(FactorSlope {
                     row,

@@ -24,6 +24,9 @@ pub type CoefficientLanes = [f64; VECTOR];
 /// Row of the derivatives along α.
 pub const ALPHA_ROW: usize = 0;
 
+/// First row of the other derivatives. The constants are before it, as no change contains them.
+pub const FIRST_ROW: usize = 2;
+
 /// Place of a derivative in a table: row of its factor, and index of its coefficient.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DerivativePlace {
@@ -54,8 +57,8 @@ impl DerivativeTable {
     ) -> DerivativeTable {
         let first_deg = ((condition.alpha_deg - REACH_DEG) / STEP_DEG).floor() * STEP_DEG;
         let nodes = node_count();
-        let last = places.iter().map(|place| place.row).max();
-        let rows = last.unwrap_or(ALPHA_ROW) + 1;
+        let ends = places.iter().map(|place| place.row + 1);
+        let rows = ends.fold(FIRST_ROW, usize::max);
         let mut values = vec![[0.0; VECTOR]; nodes * rows];
         for (derivative, place) in aero_model.derivatives.iter().zip(&places) {
             let name = &derivative.name;
@@ -74,7 +77,7 @@ impl DerivativeTable {
                 column = running_integral(&column, STEP_DEG);
             }
             for (node, value) in column.into_iter().enumerate() {
-                values[node * rows + place.row][place.coefficient] = value;
+                values[node * rows + place.row][place.coefficient] += value;
             }
         }
         DerivativeTable {
@@ -148,13 +151,12 @@ impl Entries<'_> {
         self.between(self.fraction_inside, row)
     }
 
-    /// Adds the products of numbers, one for each row, with the derivatives of the row. Those along α are left
-    /// out.
+    /// Adds the products of numbers, one for each row, with the derivatives of the rows from [`FIRST_ROW`] on.
     #[inline(always)]
     pub fn add_products(&self, numbers: &[f64], sums: &mut CoefficientLanes) {
         let rows = numbers.len();
         let (low, high) = (&self.low[..rows], &self.high[..rows]);
-        for row in ALPHA_ROW + 1..rows {
+        for row in FIRST_ROW..rows {
             for c in 0..VECTOR {
                 let rise = high[row][c] - low[row][c];
                 let value = self.fraction_inside.mul_add(rise, low[row][c]);

@@ -3,7 +3,7 @@
 use approx::assert_relative_eq;
 
 use super::fixture::shipped;
-use crate::aero::{Condition, Derivative, Regressor};
+use crate::aero::{AeroModel, Condition, Derivative, Regressor};
 use crate::aircraft::Aircraft;
 use crate::proof_of_match::aerodynamics::{
     Aerodynamics, COEFFICIENTS, SimulationTrim, TrimmedAerodynamics, recorded_signals,
@@ -59,8 +59,25 @@ fn regressor(
 
 #[test]
 fn the_change_from_the_trim_is_the_sum_over_the_derivatives() {
+    compare(&shipped().config.aero_model);
+}
+
+#[test]
+fn a_second_derivative_of_a_coefficient_along_the_same_factor_counts_as_well() {
+    let mut aero_model = shipped().config.aero_model.clone();
+    for (copied, name) in [("Cm_q", "CN_q"), ("CN_alpha", "Cm_alpha")] {
+        let derivative = aero_model.derivative(copied).unwrap().clone();
+        aero_model.derivatives.push(Derivative {
+            name: name.to_owned(),
+            ..derivative
+        });
+    }
+    compare(&aero_model);
+}
+
+fn compare(aero_model: &AeroModel) {
     let config = &shipped().config;
-    let (aircraft, aero_model, tunnel) = (&config.aircraft, &config.aero_model, &config.tunnel);
+    let (aircraft, tunnel) = (&config.aircraft, &config.tunnel);
     let at = |alpha_deg: f64| Condition {
         alpha_deg,
         mach: 0.4,
