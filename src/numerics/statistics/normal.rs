@@ -31,7 +31,13 @@ static TABLE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| {
 /// read from a table, as repeat flights need it at each of their samples.
 #[must_use]
 pub fn within(width: f64, mean: f64, deviation: f64) -> f64 {
-    tabulated_below((width - mean) / deviation) - tabulated_below((-width - mean) / deviation)
+    let mean = mean.abs();
+    let inside_nearer_limit = tabulated_below((width - mean) / deviation);
+    let farther = width + mean;
+    if farther >= ROUNDS_TO_ONE * deviation {
+        return inside_nearer_limit;
+    }
+    inside_nearer_limit - tabulated_below(-farther / deviation)
 }
 
 /// As [`below`], by the cubics of the table.
