@@ -148,7 +148,7 @@ impl Entries<'_> {
     #[inline(always)]
     #[must_use]
     pub fn values(&self, row: usize) -> CoefficientLanes {
-        self.between(self.fraction_inside, row)
+        self.row_between(self.fraction_inside, row)
     }
 
     /// Adds the products of numbers, one for each row, with the derivatives of the rows from [`FIRST_ROW`] on.
@@ -158,8 +158,7 @@ impl Entries<'_> {
         let (low, high) = (&self.low[..rows], &self.high[..rows]);
         for row in FIRST_ROW..rows {
             for c in 0..VECTOR {
-                let rise = high[row][c] - low[row][c];
-                let value = self.fraction_inside.mul_add(rise, low[row][c]);
+                let value = between(self.fraction_inside, low[row][c], high[row][c]);
                 sums[c] = numbers[row].mul_add(value, sums[c]);
             }
         }
@@ -169,7 +168,7 @@ impl Entries<'_> {
     #[inline(always)]
     #[must_use]
     pub fn integrals(&self) -> CoefficientLanes {
-        self.between(self.fraction, ALPHA_ROW)
+        self.row_between(self.fraction, ALPHA_ROW)
     }
 
     /// Slopes of a factor's derivatives along α, per deg.
@@ -202,14 +201,20 @@ impl Entries<'_> {
     }
 
     #[inline(always)]
-    fn between(&self, fraction: f64, row: usize) -> CoefficientLanes {
+    fn row_between(&self, fraction: f64, row: usize) -> CoefficientLanes {
         let (low, high) = (&self.low[row], &self.high[row]);
-        let mut values = *low;
+        let mut values = [0.0; VECTOR];
         for c in 0..VECTOR {
-            values[c] = fraction.mul_add(high[c] - low[c], values[c]);
+            values[c] = between(fraction, low[c], high[c]);
         }
         values
     }
+}
+
+/// Value at a fraction of an interval.
+#[inline(always)]
+fn between(fraction: f64, low: f64, high: f64) -> f64 {
+    fraction.mul_add(high - low, low)
 }
 
 fn node_count() -> usize {
