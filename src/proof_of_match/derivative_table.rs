@@ -7,7 +7,7 @@
     reason = "compiled into free runs for the processor at hand"
 )]
 
-use crate::aero::{AeroModel, Condition, Regressor, WindTunnel};
+use crate::aero::{AeroModel, Condition, WindTunnel};
 use crate::numerics::series::trapezoid::running_integral;
 use crate::numerics::vectors::simd::VECTOR;
 
@@ -73,7 +73,7 @@ impl DerivativeTable {
                 read.map_or(0.0, |v| v.value)
             };
             let mut column: Vec<f64> = (0..nodes).map(at).collect();
-            if derivative.regressor == Regressor::Alpha {
+            if place.row == ALPHA_ROW {
                 column = running_integral(&column, STEP_DEG);
             }
             for (node, value) in column.into_iter().enumerate() {
