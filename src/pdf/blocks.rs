@@ -1,7 +1,9 @@
-//! Block elements as items: headings, paragraphs, lists, figures, children side by side.
+//! Block elements as items: headings, paragraphs, lists, figures, children side by side. Neighbours are
+//! made in parallel.
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
 use roxmltree::Node;
 
 use super::elements::{has_class, is_block, is_screen_only, plain_text};
@@ -32,112 +34,162 @@ const ENTRY_GAP: f32 = 1.5;
 const LEAST_SHRINKING: f32 = 0.7;
 
 /// Maker of items from elements.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Blocks<'a> {
     fonts: &'a Fonts,
-    /// Ids of open elements that have no item yet.
-    pending_anchors: Vec<String>,
     /// Height of a page, pt.
     page_height: f32,
     /// Scale of drawings over that of their column.
     shrinking: f32,
-    /// Height of all drawings so far, pt.
+}
+
+/// Items of some elements.
+#[derive(Debug, Default)]
+pub struct Made {
+    pub items: Vec<Item>,
+    /// Ids of elements without an item; the next item is their place.
+    anchors: Vec<String>,
+    /// Height of all drawings, pt.
     drawn_height: f32,
+}
+
+impl Made {
+    fn of(items: Vec<Item>) -> Made {
+        Made {
+            items,
+            ..Made::default()
+        }
+    }
+
+    /// Adds what follows. Its first item is the place of the anchors without one.
+    fn add(&mut self, mut next: Made) {
+        if let Some(first) = next.items.iter_mut().find(|i| !i.is_room) {
+            let anchors = self.anchors.drain(..);
+            first
+                .marks
+                .extend(anchors.map(|id| PlacedMark::Anchor { id }));
+        }
+        self.items.append(&mut next.items);
+        self.anchors.append(&mut next.anchors);
+        self.drawn_height += next.drawn_height;
+    }
+
+    /// Takes the items out, joined to one. Anchors without an item stay.
+    fn take_joined(&mut self) -> Item {
+        joined(std::mem::take(&mut self.items))
+    }
+
+    fn indented(self, indent: f32) -> Made {
+        Made {
+            items: indented(self.items, indent),
+            ..self
+        }
+    }
+}
+
+/// Part of an element's content that is made alone.
+enum Piece<'d, 'x> {
+    /// Neighbouring nodes of running text.
+    Text(Vec<Node<'d, 'x>>),
+    Block(Node<'d, 'x>),
+}
+
+/// Content of an element in pieces.
+fn pieces<'d, 'x>(node: Node<'d, 'x>) -> Vec<Piece<'d, 'x>> {
+    let mut pieces = Vec::new();
+    for child in node.children() {
+        if child.is_element() && is_block(child) {
+            pieces.push(Piece::Block(child));
+        } else if let Some(Piece::Text(text)) = pieces.last_mut() {
+            text.push(child);
+        } else {
+            pieces.push(Piece::Text(vec![child]));
+        }
+    }
+    pieces
 }
 
 impl<'a> Blocks<'a> {
     pub fn new(fonts: &'a Fonts, page_height: f32) -> Self {
         Blocks {
             fonts,
-            pending_anchors: Vec::new(),
             page_height,
             shrinking: 1.0,
-            drawn_height: 0.0,
         }
     }
 
     /// Items of an element's children, in a column of a width (pt).
-    pub fn children(&mut self, node: Node, width: f32, style: Style) -> Vec<Item> {
-        let mut items = Vec::new();
+    pub fn children(&self, node: Node, width: f32, style: Style) -> Made {
+        let made: Vec<Made> = pieces(node)
+            .into_par_iter()
+            .map(|piece| match piece {
+                Piece::Text(nodes) => Made::of(self.text(&nodes, width, style)),
+                Piece::Block(block) => self.block(block, width, style),
+            })
+            .collect();
+        let mut all = Made::default();
+        for part in made {
+            all.add(part);
+        }
+        all
+    }
+
+    fn text(&self, nodes: &[Node], width: f32, style: Style) -> Vec<Item> {
         let mut reader = InlineReader::new(self.fonts);
-        for child in node.children() {
-            if child.is_element() && is_block(child) {
-                let text = std::mem::replace(&mut reader, InlineReader::new(self.fonts));
-                self.add_text(text, width, style, &mut items);
-                let block = self.block(child, width, style);
-                items.extend(block);
-            } else {
-                reader.read(child, style, None);
-            }
+        for node in nodes {
+            reader.read(*node, style, None);
         }
-        self.add_text(reader, width, style, &mut items);
-        items
-    }
-
-    fn add_text(&mut self, text: InlineReader, width: f32, style: Style, items: &mut Vec<Item>) {
         let layout = LineLayout::left(width, style.size);
-        let lines = lines(&text.words(), layout, self.fonts);
-        self.add(lines, items);
-    }
-
-    /// Adds items, the first of them with the pending anchors.
-    fn add(&mut self, mut new: Vec<Item>, items: &mut Vec<Item>) {
-        if let Some(first) = new.iter_mut().find(|i| !i.is_room) {
-            let anchors = self.pending_anchors.drain(..);
-            first
-                .marks
-                .extend(anchors.map(|id| PlacedMark::Anchor { id }));
-        }
-        items.append(&mut new);
+        lines(&reader.words(), layout, self.fonts)
     }
 
     /// Items of a block element with the space after it.
-    fn block(&mut self, node: Node, width: f32, style: Style) -> Vec<Item> {
+    fn block(&self, node: Node, width: f32, style: Style) -> Made {
         if is_screen_only(node) {
-            return Vec::new();
+            return Made::default();
         }
-        self.pending_anchors
-            .extend(node.attribute("id").map(str::to_owned));
-        let mut items = Vec::new();
+        let mut made = Made {
+            anchors: node
+                .attribute("id")
+                .map(str::to_owned)
+                .into_iter()
+                .collect(),
+            ..Made::default()
+        };
         if has_class(node, "new-page") {
-            items.push(Item::page_break());
+            made.items.push(Item::page_break());
         }
         if node.tag_name().name() == "nav" {
-            items.push(Item {
+            made.items.push(Item {
                 marks: vec![PlacedMark::Contents],
                 ..Item::default()
             });
         } else {
-            let (made, space_after) = if has_class(node, "one-page") {
+            let (element, space_after) = if has_class(node, "one-page") {
                 self.on_one_page(node, width, style)
             } else {
                 self.element(node, width, style)
             };
-            self.add(made, &mut items);
-            items.push(Item::room(space_after));
+            made.add(element);
+            made.items.push(Item::room(space_after));
         }
-        items
+        made
     }
 
     /// Items of an element, with smaller drawings where it then fits on one page.
-    fn on_one_page(&mut self, node: Node, width: f32, style: Style) -> (Vec<Item>, f32) {
-        let (anchors, drawn_before) = (self.pending_anchors.clone(), self.drawn_height);
+    fn on_one_page(&self, node: Node, width: f32, style: Style) -> (Made, f32) {
         let made = self.element(node, width, style);
-        let drawn = self.drawn_height - drawn_before;
-        let excess = height_on_page(&made.0) - self.page_height;
+        let drawn = made.0.drawn_height;
+        let excess = height_on_page(&made.0.items) - self.page_height;
         let shrinking = self.shrinking * (drawn - excess) / drawn.max(1.0);
         if excess <= 0.0 || shrinking < LEAST_SHRINKING {
             return made;
         }
-        self.pending_anchors = anchors;
-        let usual = std::mem::replace(&mut self.shrinking, shrinking);
-        let smaller = self.element(node, width, style);
-        self.shrinking = usual;
-        smaller
+        Blocks { shrinking, ..*self }.element(node, width, style)
     }
 
     /// Items of an element, and the space after it (pt).
-    fn element(&mut self, node: Node, width: f32, style: Style) -> (Vec<Item>, f32) {
+    fn element(&self, node: Node, width: f32, style: Style) -> (Made, f32) {
         let small = Style::of_size(SMALL_SIZE);
         let note = Style {
             colour: SOFT,
@@ -152,11 +204,15 @@ impl<'a> Blocks<'a> {
             "p" => (self.children(node, width, style), 5.0),
             "ul" => (self.list(node, width, style), 4.0),
             "dl" => (self.definitions(node, width, style), 5.0),
-            "pre" => (self.preserved(node, width), 5.0),
-            "table" => (table::rows(node, width, self.fonts), 6.0),
+            "pre" => (Made::of(self.preserved(node, width)), 5.0),
+            "table" => (Made::of(table::rows(node, width, self.fonts)), 6.0),
             "svg" => (self.drawing(node, width), 1.0),
             "figcaption" => (self.children(node, width, small), 1.0),
-            "figure" => (vec![joined(self.children(node, width, style))], 8.0),
+            "figure" => {
+                let mut made = self.children(node, width, style);
+                made.items = vec![made.take_joined()];
+                (made, 8.0)
+            }
             "div" if has_class(node, "small") => (self.children(node, width, small), 2.0),
             "div" if has_class(node, "pairs") => (self.pairs(node, width, style), 2.0),
             _ => (self.children(node, width, style), 0.0),
@@ -164,9 +220,10 @@ impl<'a> Blocks<'a> {
     }
 
     /// A bold heading that stays with what follows. Level 0 is a chapter, under a rule.
-    fn heading(&mut self, node: Node, width: f32, size: f32, level: Option<usize>) -> Vec<Item> {
-        let mut lines = self.children(node, width, Style::of_size(size).bold());
-        for line in &mut lines {
+    fn heading(&self, node: Node, width: f32, size: f32, level: Option<usize>) -> Made {
+        let mut made = self.children(node, width, Style::of_size(size).bold());
+        let lines = &mut made.items;
+        for line in &mut *lines {
             line.keep = true;
         }
         if let (Some(first), Some(level)) = (lines.first_mut(), level) {
@@ -183,15 +240,15 @@ impl<'a> Blocks<'a> {
             }
         }
         lines.insert(0, Item::room(0.7 * size));
-        lines
+        made
     }
 
-    fn list(&mut self, node: Node, width: f32, style: Style) -> Vec<Item> {
-        let mut items = Vec::new();
+    fn list(&self, node: Node, width: f32, style: Style) -> Made {
+        let mut all = Made::default();
         for entry in node.children().filter(|n| n.has_tag_name("li")) {
-            let lines = self.children(entry, width - LIST_INDENT, style);
-            let mut lines = indented(lines, LIST_INDENT);
-            if let Some(first) = lines.first_mut() {
+            let made = self.children(entry, width - LIST_INDENT, style);
+            let mut made = made.indented(LIST_INDENT);
+            if let Some(first) = made.items.first_mut() {
                 first.marks.push(PlacedMark::Text {
                     x: 2.0,
                     y: style.size * 1.02,
@@ -199,38 +256,39 @@ impl<'a> Blocks<'a> {
                     text: "\u{2022}".to_owned(),
                 });
             }
-            lines.push(Item::room(ENTRY_GAP));
-            items.extend(lines);
+            made.items.push(Item::room(ENTRY_GAP));
+            all.add(made);
         }
-        items
+        all
     }
 
     /// Terms with their definitions beside them.
-    fn definitions(&mut self, node: Node, width: f32, style: Style) -> Vec<Item> {
+    fn definitions(&self, node: Node, width: f32, style: Style) -> Made {
         let term_style = Style {
             colour: SOFT,
             ..style
         };
-        let mut items: Vec<Item> = Vec::new();
+        let mut all = Made::default();
         let mut term = None;
         for entry in node.descendants() {
             if entry.has_tag_name("dt") {
-                let lines = self.children(entry, DEFINITION_INDENT - 6.0, term_style);
-                term = Some(joined(lines));
+                let mut made = self.children(entry, DEFINITION_INDENT - 6.0, term_style);
+                term = Some(made.take_joined());
+                all.add(made);
             } else if entry.has_tag_name("dd") {
-                let lines = self.children(entry, width - DEFINITION_INDENT, style);
-                let mut lines = indented(lines, DEFINITION_INDENT);
+                let made = self.children(entry, width - DEFINITION_INDENT, style);
+                let mut made = made.indented(DEFINITION_INDENT);
                 if let Some(term) = term.take() {
-                    put_beside(term, &mut lines);
+                    put_beside(term, &mut made.items);
                 }
-                lines.push(Item::room(ENTRY_GAP));
-                items.extend(lines);
+                made.items.push(Item::room(ENTRY_GAP));
+                all.add(made);
             }
         }
-        items
+        all
     }
 
-    fn preserved(&mut self, node: Node, width: f32) -> Vec<Item> {
+    fn preserved(&self, node: Node, width: f32) -> Vec<Item> {
         let mut reader = InlineReader::preserving(self.fonts);
         for child in node.children() {
             reader.read(child, Style::of_size(CODE_SIZE), None);
@@ -239,12 +297,12 @@ impl<'a> Blocks<'a> {
         lines(&reader.words(), layout, self.fonts)
     }
 
-    fn drawing(&mut self, node: Node, width: f32) -> Vec<Item> {
+    fn drawing(&self, node: Node, width: f32) -> Made {
         let drawing = svg::drawing(node, self.fonts);
         let scale = (width / drawing.width.max(1.0)).min(LARGEST_UNIT) * self.shrinking;
-        self.drawn_height += drawing.height * scale;
-        vec![Item {
-            height: drawing.height * scale,
+        let height = drawing.height * scale;
+        let item = Item {
+            height,
             marks: vec![PlacedMark::Drawing {
                 x: 0.0,
                 y: 0.0,
@@ -252,24 +310,30 @@ impl<'a> Blocks<'a> {
                 drawing: Arc::new(drawing),
             }],
             ..Item::default()
-        }]
+        };
+        Made {
+            drawn_height: height,
+            ..Made::of(vec![item])
+        }
     }
 
     /// Children two by two, each pair as high as the higher one.
-    fn pairs(&mut self, node: Node, width: f32, style: Style) -> Vec<Item> {
+    fn pairs(&self, node: Node, width: f32, style: Style) -> Made {
         let column = 0.5 * (width - PAIR_GAP);
         let children: Vec<Node> = node.children().filter(Node::is_element).collect();
-        let mut items = Vec::new();
+        let mut all = Made::default();
         for pair in children.chunks(2) {
             let mut row = Item::default();
             for (child, x) in pair.iter().zip([0.0, column + PAIR_GAP]) {
-                let cell = joined(self.block(*child, column, style));
+                let mut made = self.block(*child, column, style);
+                let cell = made.take_joined();
                 row.height = row.height.max(cell.height);
                 row.absorb(cell, x, 0.0);
+                all.add(made);
             }
-            items.push(row);
+            all.add(Made::of(vec![row]));
         }
-        items
+        all
     }
 }
 
@@ -298,7 +362,17 @@ fn put_beside(item: Item, lines: &mut Vec<Item>) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::pagination::{PAGE_HEIGHT, paginate};
     use super::*;
+
+    /// Items of a page in a column of 400 pt on pages of a height, pt.
+    fn items(page: &str, page_height: f32) -> Vec<Item> {
+        let xml = roxmltree::Document::parse(page).unwrap();
+        let fonts = Fonts::load().unwrap();
+        let blocks = Blocks::new(&fonts, page_height);
+        let made = blocks.children(xml.root_element(), 400.0, Style::of_size(TEXT_SIZE));
+        made.items
+    }
 
     /// Height of the drawing, and of everything, of an element of one page of 300 pt with a drawing of 270 pt.
     fn heights(paragraphs: usize) -> (f32, f32) {
@@ -306,10 +380,7 @@ mod tests {
             r#"<html><div class="one-page"><svg viewBox="0 0 300 270"/>{}</div></html>"#,
             "<p>text</p>".repeat(paragraphs)
         );
-        let xml = roxmltree::Document::parse(&page).unwrap();
-        let fonts = Fonts::load().unwrap();
-        let mut blocks = Blocks::new(&fonts, 300.0);
-        let items = blocks.children(xml.root_element(), 400.0, Style::of_size(TEXT_SIZE));
+        let items = items(&page, 300.0);
         let drawing = items.iter().find(|item| {
             item.marks
                 .iter()
@@ -332,5 +403,41 @@ mod tests {
             (drawing - 270.0).abs() < 0.1 && all > 500.0,
             "too much in any case"
         );
+    }
+
+    #[test]
+    fn each_of_many_elements_of_one_page_has_its_page() {
+        let element = |k: u16| {
+            let drawing = 560.0 + 0.3 * f32::from(k);
+            format!(
+                r#"<div class="new-page one-page"><svg viewBox="0 0 300 {drawing}"/>{}</div>"#,
+                "<p>text</p>".repeat(12)
+            )
+        };
+        let elements: String = (0..500).map(element).collect();
+        let items = items(&format!("<html>{elements}</html>"), PAGE_HEIGHT);
+        let set_high = |item: &&Item| item.height > 500.0 && item.height < 559.0;
+        assert!(items.iter().filter(set_high).count() > 0, "some shrink");
+        let document = paginate(items, &Fonts::load().unwrap());
+        assert_eq!(document.pages.len(), 500);
+    }
+
+    #[test]
+    fn an_element_without_an_item_has_its_anchor_at_the_next_item() {
+        let page =
+            r#"<html><div id="a"></div><div><p id="b">text</p></div><div id="c">text</div></html>"#;
+        let anchors: Vec<Vec<String>> = items(page, 300.0)
+            .into_iter()
+            .map(|item| item.marks)
+            .filter(|marks| !marks.is_empty())
+            .map(|marks| {
+                let ids = marks.into_iter().filter_map(|mark| match mark {
+                    PlacedMark::Anchor { id } => Some(id),
+                    _ => None,
+                });
+                ids.collect()
+            })
+            .collect();
+        assert_eq!(anchors, [vec!["b", "a"], vec!["c"]]);
     }
 }

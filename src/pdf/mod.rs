@@ -83,7 +83,7 @@ pub fn pdf(html: &str) -> Result<Vec<u8>, String> {
         .find(|n| n.has_tag_name("body"))
         .unwrap_or(root);
     let style = Style::of_size(blocks::TEXT_SIZE);
-    let items = Blocks::new(&fonts, PAGE_HEIGHT).children(body, WIDTH - 2.0 * MARGIN, style);
-    let document = pagination::paginate(items, &fonts);
+    let made = Blocks::new(&fonts, PAGE_HEIGHT).children(body, WIDTH - 2.0 * MARGIN, style);
+    let document = pagination::paginate(made.items, &fonts);
     Ok(writer::write(&fonts, title, &document))
 }
