@@ -6,6 +6,7 @@
 //! bit. The bytes depend on the record alone: not on time, host, or the pieces in which it was
 //! written.
 
+mod columns;
 mod header;
 mod layout;
 mod outline;

@@ -19,10 +19,20 @@ impl PageFile {
         PageFile { file, length }
     }
 
+    /// Reads into memory that is not cleared before.
     #[cfg(unix)]
     fn read_at(&self, start: u64, length: usize) -> Result<Bytes> {
-        let mut bytes = vec![0; length];
-        std::os::unix::fs::FileExt::read_exact_at(&self.file, &mut bytes, start)?;
+        use rustix::{buffer::spare_capacity, io};
+        let mut bytes = Vec::with_capacity(length);
+        while bytes.len() < length {
+            let from = start + bytes.len() as u64;
+            let read =
+                io::retry_on_intr(|| io::pread(&self.file, spare_capacity(&mut bytes), from));
+            if read.map_err(std::io::Error::from)? == 0 {
+                return Err(beyond_end(start, length));
+            }
+        }
+        bytes.truncate(length);
         Ok(bytes.into())
     }
 
@@ -49,12 +59,16 @@ impl ChunkReader for PageFile {
         // Checked before so much memory is taken: a damaged file may state any length.
         let end = start.checked_add(length as u64);
         if end.is_none_or(|end| end > self.length) {
-            return Err(ParquetError::EOF(format!(
-                "{length} bytes from {start} on are beyond the file's end"
-            )));
+            return Err(beyond_end(start, length));
         }
         self.read_at(start, length)
     }
+}
+
+fn beyond_end(start: u64, length: usize) -> ParquetError {
+    ParquetError::EOF(format!(
+        "{length} bytes from {start} on are beyond the file's end"
+    ))
 }
 
 #[cfg(test)]
@@ -76,5 +90,12 @@ mod tests {
                 Err(ParquetError::EOF(_))
             ));
         }
+        std::fs::write(&path, b"01234").unwrap();
+        let cut = file.get_bytes(2, 8).unwrap_err();
+        assert!(
+            matches!(cut, ParquetError::EOF(_)),
+            "cut after it was opened"
+        );
+        assert!(file.get_bytes(10, 0).unwrap().is_empty());
     }
 }

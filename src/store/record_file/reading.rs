@@ -6,22 +6,17 @@ use std::fs::File;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use arrow::array::{Array, AsArray, RecordBatch};
-use arrow::buffer::NullBuffer;
-use arrow::datatypes::{Float64Type, UInt8Type};
-use parquet::arrow::ProjectionMask;
-use parquet::arrow::arrow_reader::{
-    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder, RowSelection,
-};
+use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
 use parquet::file::metadata::PageIndexPolicy;
 
+use super::columns::Columns;
 use super::header::RecordHeader;
-use super::layout::{MARK, PAGE};
 use super::page_file::PageFile;
 use crate::error::Error;
 use crate::flight::record::{Series, with_margin};
 use crate::flight::stand_in::GapExtent;
-use crate::flight::{Completion, Correction, Mark, Record};
+use crate::flight::{Completion, Correction, Record};
+use crate::store::archive::guarded;
 use crate::store::regular;
 
 /// A record on the disk, read by signals and windows of time.
@@ -44,7 +39,9 @@ pub fn open(path: &Path) -> Result<RecordFile, Error> {
     let file = regular::open(path).map_err(Error::io(path, "cannot open the record"))?;
     let bad = |what: &dyn Display| not_a_record(path, what);
     let options = ArrowReaderOptions::new().with_offset_index_policy(PageIndexPolicy::Optional);
-    let metadata = ArrowReaderMetadata::load(&file, options).map_err(|e| bad(&e))?;
+    let metadata = guarded(|| Ok(ArrowReaderMetadata::load(&file, options)))
+        .map_err(|_| bad(&FAILED))?
+        .map_err(|e| bad(&e))?;
     let header = RecordHeader::parse(metadata.schema().metadata()).map_err(|e| bad(&e))?;
     Ok(RecordFile {
         path: path.to_owned(),
@@ -54,6 +51,9 @@ pub fn open(path: &Path) -> Result<RecordFile, Error> {
         completion: Completion::default(),
     })
 }
+
+/// Reason for a panic of the Parquet reader.
+const FAILED: &str = "the Parquet reader failed on its bytes";
 
 fn not_a_record(path: &Path, what: &dyn Display) -> Error {
     Error::damaged(
@@ -190,30 +190,11 @@ impl RecordFile {
         let bad = |what: &dyn Display| not_a_record(&self.path, what);
         let file =
             File::open(&self.path).map_err(Error::io(&self.path, "cannot open the record"))?;
-        let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(
-            PageFile::new(file),
-            self.metadata.clone(),
-        );
-        let fields = builder.schema().fields().iter().enumerate();
-        let columns: Vec<usize> = fields
-            .filter(|(_, f)| wanted(f.name().strip_suffix(MARK).unwrap_or(f.name())))
-            .map(|(i, _)| i)
-            .collect();
+        let columns = Columns::new(PageFile::new(file), self.metadata.metadata());
         let count = samples.len();
-        if count == 0 || columns.is_empty() {
-            return Ok(());
-        }
-        let mask = ProjectionMask::roots(builder.parquet_schema(), columns);
-        let ranges = std::iter::once(samples);
-        let selection = RowSelection::from_consecutive_ranges(ranges, self.header.samples);
-        let reader = builder
-            .with_projection(mask)
-            .with_row_selection(selection)
-            .with_batch_size(PAGE)
-            .build();
-        for batch in reader.map_err(|e| bad(&e))? {
-            add_batch(record, &batch.map_err(|e| bad(&e))?, count).map_err(|e| bad(&e))?;
-        }
+        guarded(|| Ok(columns.add_to(record, &samples, wanted)))
+            .map_err(|_| bad(&FAILED))?
+            .map_err(|e| bad(&e))?;
         let whole = |s: &Series| s.values.len() == count && s.marks.len() == count;
         record
             .signals
@@ -224,30 +205,4 @@ impl RecordFile {
                 Err(bad(&format!("signal `{name}` has not {samples} samples")))
             })
     }
-}
-
-/// Adds the columns of a batch to the signals of a record.
-fn add_batch(record: &mut Record, batch: &RecordBatch, samples: usize) -> Result<(), String> {
-    for (field, array) in batch.schema().fields().iter().zip(batch.columns()) {
-        let name = field.name().strip_suffix(MARK).unwrap_or(field.name());
-        let empty = || Series {
-            values: Vec::with_capacity(samples),
-            marks: Vec::with_capacity(samples),
-        };
-        let series = record.signals.entry(name.to_owned()).or_insert_with(empty);
-        let other = || format!("column `{}` is of type {}", field.name(), field.data_type());
-        if field.name().ends_with(MARK) {
-            let marks = array.as_primitive_opt::<UInt8Type>().ok_or_else(other)?;
-            let first = series.marks.len();
-            series.marks.resize(first + marks.len(), Mark::Measured);
-            let all = NullBuffer::new_valid(marks.len());
-            for k in marks.nulls().unwrap_or(&all).valid_indices() {
-                series.marks[first + k] = Mark::from_u8(marks.value(k));
-            }
-        } else {
-            let values = array.as_primitive_opt::<Float64Type>().ok_or_else(other)?;
-            series.values.extend_from_slice(values.values());
-        }
-    }
-    Ok(())
 }

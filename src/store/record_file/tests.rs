@@ -2,8 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::sync::Arc;
 
-use super::layout::PAGE;
+use arrow::array::{ArrayRef, Float64Array, Int64Array, RecordBatch};
+use parquet::arrow::ArrowWriter;
+use parquet::file::properties::WriterProperties;
+
+use super::layout::{MARK, PAGE};
 use super::*;
 use crate::error::Error;
 use crate::flight::record::Series;
@@ -233,4 +238,50 @@ fn what_is_not_a_record_is_refused_and_named() {
         assert!(error.contains("record.parquet: not a record"), "{error}");
     }
     assert!(read(Path::new("no such record.parquet")).is_err());
+}
+
+#[test]
+fn a_column_of_another_type_is_refused_and_named() {
+    let header = RecordHeader {
+        samples: 2,
+        step_s: 0.1,
+        ..RecordHeader::default()
+    };
+    let values: ArrayRef = Arc::new(Float64Array::from(vec![1.0, 2.0]));
+    let codes =
+        |codes: [Option<i64>; 2]| -> ArrayRef { Arc::new(Int64Array::from(codes.to_vec())) };
+    let values_with_gap: ArrayRef = Arc::new(Float64Array::from(vec![Some(1.0), None]));
+    let marks = format!("q_deg_s{MARK}");
+    for (name, column) in [
+        ("q_deg_s", codes([Some(1), Some(2)])),
+        ("q_deg_s", values_with_gap),
+        (marks.as_str(), codes([None, Some(2)])),
+    ] {
+        let columns = [("theta_deg", values.clone()), (name, column)];
+        let batch = RecordBatch::try_from_iter(columns).expect("a batch");
+        let properties =
+            WriterProperties::builder().set_key_value_metadata(Some(header.metadata()));
+        let mut out = Vec::new();
+        let mut writer = ArrowWriter::try_new(&mut out, batch.schema(), Some(properties.build()))
+            .expect("a writer");
+        writer.write(&batch).expect("written");
+        writer.close().expect("closed");
+        let (_folder, path) = saved(&out);
+        let error = read(&path).expect_err("refused").to_string();
+        assert!(error.contains(&format!("column `{name}`")), "{error}");
+    }
+}
+
+#[test]
+fn a_record_with_a_damaged_byte_ends_no_program() {
+    let whole = bytes(&record());
+    for at in 0..whole.len() {
+        let mut spoilt = whole.clone();
+        spoilt[at] ^= 0x55;
+        let (_folder, path) = saved(&spoilt);
+        if let Ok(record) = read(&path) {
+            let samples = record.samples;
+            assert!(record.signals.values().all(|s| s.values.len() == samples));
+        }
+    }
 }
