@@ -9,7 +9,7 @@ use crate::pipeline::Campaign;
 use crate::store::table::{self, TableFolder};
 use crate::tables::{EstimateRow, FitRow, JointRow, MatchRow, MatchVerdictRow, PredictedRow};
 
-/// Writes the tables of all stages as far as `until` into a folder.
+/// Writes the tables of all stages as far as `until` into a folder, without the problems.
 ///
 /// # Errors
 /// [`crate::error::Error::Io`] naming the file that cannot be written.
@@ -42,7 +42,21 @@ pub fn publish_tables(
     if until >= Stage::Compare {
         publish_compare(&shelf(Stage::Compare), campaign)?;
     }
-    table::publish(&shelf(until), &campaign.problems)
+    Ok(())
+}
+
+/// Writes the table of the problems of all stages as far as `until` into a folder.
+///
+/// # Errors
+/// As [`publish_tables`].
+pub fn publish_problems(
+    campaign: &Campaign,
+    until: Stage,
+    folder: &Path,
+    lineage: &Lineage,
+) -> Result<()> {
+    let shelf = shelf_of_stage(folder, lineage, until);
+    table::publish(&shelf, &campaign.problems)
 }
 
 fn publish_ingest(shelf: &TableFolder, campaign: &Campaign) -> Result<()> {

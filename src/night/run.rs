@@ -8,7 +8,7 @@ use super::campaign_lineage::{campaign_lineage, rejection};
 use super::changes;
 use super::damaged_artefacts::damaged_artefacts;
 use super::published_night::{ManeuverWindow, NightTables};
-use super::published_tables::publish_tables;
+use super::published_tables::{publish_problems, publish_tables};
 use crate::config::Config;
 use crate::error::{Error, Problem, ProblemStage, Result};
 use crate::lineage::{Changes, Lineage, Stage};
@@ -135,12 +135,14 @@ impl NightRun<'_> {
     fn publish(&self) -> Result<RunOutcome> {
         let tonight = self.nights.tonight()?;
         let mut campaign = self.conductor.campaign(self.until)?;
-        let changes = if self.until >= Stage::Report {
-            self.place_report(&tonight, &mut campaign)?
-        } else {
-            Changes::default()
-        };
-        publish_tables(&campaign, self.until, &tonight, &self.lineage)?;
+        let (reported, published) = rayon::join(
+            || self.place_report(&tonight, &campaign),
+            || publish_tables(&campaign, self.until, &tonight, &self.lineage),
+        );
+        let (changes, problem) = reported?;
+        published?;
+        campaign.problems.extend(problem);
+        publish_problems(&campaign, self.until, &tonight, &self.lineage)?;
         let store = &self.conductor.runner.store;
         store.send_unsent()?;
         store.register_reports(&self.config().reports)?;
@@ -148,24 +150,33 @@ impl NightRun<'_> {
         self.publish_files(&self.manifest(&campaign, &changes))
     }
 
-    /// Places changes and report in tonight's folder. A report that cannot be printed is a problem
-    /// of the campaign.
-    fn place_report(&self, tonight: &Path, campaign: &mut Campaign) -> Result<Changes> {
+    /// Places changes and report in the folder of a night that has them. A report that cannot be printed
+    /// is a problem of the campaign.
+    fn place_report(
+        &self,
+        tonight: &Path,
+        campaign: &Campaign,
+    ) -> Result<(Changes, Option<Problem>)> {
+        if self.until < Stage::Report {
+            return Ok((Changes::default(), None));
+        }
         let changes = self.changes(campaign);
         let place = tonight.join(ALERT);
         let alert = serde_json::to_vec_pretty(&changes).map_err(|e| Error::store(&place, &e))?;
         atomic::place(&place, &alert)?;
         let Report { html, pdf } = make_report(&self.conductor, campaign, &changes)?;
         atomic::place(&tonight.join(PAGE), html.as_bytes())?;
-        match pdf {
-            Ok(bytes) => atomic::place(&tonight.join(PRINTED_PAGE), &bytes)?,
+        let problem = match pdf {
+            Ok(bytes) => {
+                atomic::place(&tonight.join(PRINTED_PAGE), &bytes)?;
+                None
+            }
             Err(why) => {
                 let reason = format!("not made: the template's page is no well-formed XML: {why}");
-                let problem = problem(ProblemStage::Report, "", PRINTED_PAGE, &reason);
-                campaign.problems.push(problem);
+                Some(problem(ProblemStage::Report, "", PRINTED_PAGE, &reason))
             }
-        }
-        Ok(changes)
+        };
+        Ok((changes, problem))
     }
 
     /// Changes since the last complete night, or those that a first night shows by itself.

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::NONE_PUBLISHED;
 use super::campaign_lineage::campaign_lineage;
 use super::damaged_artefacts::{damaged_artefacts, fetch_records};
-use super::published_tables::publish_tables;
+use super::published_tables::{publish_problems, publish_tables};
 use super::table_metadata::read_lineage;
 use crate::config::Config;
 use crate::error::{Error, ProblemStage, Result};
@@ -100,6 +100,7 @@ fn tables_with_other_rows(
     }
     let scratch = files::scratch_folder()?;
     publish_tables(&campaign, night.until, scratch.path(), lineage)?;
+    publish_problems(&campaign, night.until, scratch.path(), lineage)?;
     // A report that could not be printed is a problem of that run; places are of that archive.
     let archive = &conductor.runner.config.archive;
     let of_report = |p: &crate::error::Problem| p.stage == ProblemStage::Report;
