@@ -302,12 +302,11 @@ pub(super) fn rows<T: DeserializeOwned>(
     if let Some(what) = lacking(&header, columns) {
         return Err(Error::config(path, Some(1), what));
     }
-    let mut rows = Vec::new();
-    for record in reader.records() {
-        let line = |position: Option<&csv::Position>| {
-            position.and_then(|p| usize::try_from(p.line()).ok())
-        };
-        let record = record.map_err(|e| Error::config(path, line(e.position()), e.to_string()))?;
+    let line =
+        |position: Option<&csv::Position>| position.and_then(|p| usize::try_from(p.line()).ok());
+    let wrong = |e: csv::Error| Error::config(path, line(e.position()), e.to_string());
+    let (mut rows, mut record) = (Vec::new(), csv::StringRecord::new());
+    while reader.read_record(&mut record).map_err(wrong)? {
         let at = line(record.position());
         rows.push((
             at.unwrap_or(0),
