@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::step::{Companion, ComputedArtefact, LoadedOrMade, Step};
@@ -126,13 +127,8 @@ pub fn ingest(
     let config = runner.config;
     let threads = rayon::current_num_threads();
     let shares = MemoryShares::of(config.ingest.memory_mb, config.channels.len(), threads);
-    let bring = |files: &FlightFiles| {
-        let flight = bring_flight(runner, shares, files, contents);
-        runner.advance(&files.flight_id);
-        flight
-    };
     let flights = runner.with_progress("ingest", files.len(), || {
-        map_with_workers(shares.flights, files, bring)
+        bring_flights(runner, shares, files, contents)
     });
     campaign.problems.extend_from_slice(&contents.problems);
     for (files, flight) in files.iter().zip(flights) {
@@ -159,17 +155,55 @@ fn missing(flight_id: &str) -> MissingArtefact {
     }
 }
 
-/// Loads or makes the records of a flight. A flight whose files cannot be read is rejected, but the
-/// rejection is not saved.
-fn bring_flight(
+/// Flight with its records; `None` if it is missing and nothing is made.
+type BroughtFlight = Option<LoadedOrMade<IngestedFlight>>;
+
+/// Loads the records of flights by all threads, and makes the missing ones, as many at once as the memory
+/// allows. `None` for a flight whose thread panicked.
+fn bring_flights(
+    runner: &StepRunner,
+    shares: MemoryShares,
+    files: &[FlightFiles],
+    contents: &FlightContents,
+) -> Vec<Option<Result<BroughtFlight>>> {
+    let load = |files: &FlightFiles| {
+        let loaded = runner.load(&IngestStep {
+            runner,
+            shares,
+            files,
+            content: contents.fingerprint(&files.flight_id).ok()?,
+        })?;
+        runner.advance(&files.flight_id);
+        Some(loaded)
+    };
+    let loaded: Vec<BroughtFlight> = files.par_iter().map(load).collect();
+    let both = files.iter().zip(&loaded);
+    let missing: Vec<&FlightFiles> = both.filter(|(_, l)| l.is_none()).map(|(f, _)| f).collect();
+    let make = |files: &&FlightFiles| {
+        let made = make_flight(runner, shares, files, contents);
+        runner.advance(&files.flight_id);
+        made
+    };
+    let mut made = map_with_workers(shares.flights, &missing, make).into_iter();
+    let all = loaded.into_iter();
+    all.map(|loaded| match loaded {
+        Some(loaded) => Some(Ok(Some(loaded))),
+        None => made.next().flatten(),
+    })
+    .collect()
+}
+
+/// Makes the records of a flight. A flight whose files cannot be read is rejected, but the rejection is
+/// not saved.
+fn make_flight(
     runner: &StepRunner,
     shares: MemoryShares,
     files: &FlightFiles,
     contents: &FlightContents,
-) -> Result<Option<LoadedOrMade<IngestedFlight>>> {
+) -> Result<BroughtFlight> {
     let id = &files.flight_id;
     match contents.fingerprint(id) {
-        Ok(content) => runner.load_or_make(&IngestStep {
+        Ok(content) => runner.make_missing(&IngestStep {
             runner,
             shares,
             files,

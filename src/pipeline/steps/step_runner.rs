@@ -56,21 +56,10 @@ impl<'a> StepRunner<'a> {
     /// As [`Step::make`]; an artefact that cannot be saved.
     pub fn load_or_make<S: Step>(&self, step: &S) -> Result<Option<LoadedOrMade<S::Artefact>>> {
         let name = step.name();
-        let result = match (self.load_as(step, &name), self.absent) {
-            (Some(result), _) => result,
-            (None, AbsentArtefacts::Report) => {
-                self.note_missing(name);
-                return Ok(None);
-            }
-            (None, AbsentArtefacts::Make) => self.make(step, name)?,
-        };
-        if result.is_stored {
-            self.store.require(&result.name);
-            for companion in step.companions(&result.name, &result.artefact) {
-                self.store.require(&companion.name);
-            }
+        match self.load_as(step, &name) {
+            Some(loaded) => Ok(Some(loaded)),
+            None => self.make_or_note(step, name),
         }
-        Ok(Some(result))
     }
 
     /// Loads a step's artefact; `None` unless it and its companions are unchanged.
@@ -78,16 +67,50 @@ impl<'a> StepRunner<'a> {
         self.load_as(step, &step.name())
     }
 
+    /// Makes a step's artefact that [`StepRunner::load`] did not find; `None` if nothing is made.
+    ///
+    /// # Errors
+    /// As [`StepRunner::load_or_make`].
+    pub fn make_missing<S: Step>(&self, step: &S) -> Result<Option<LoadedOrMade<S::Artefact>>> {
+        self.make_or_note(step, step.name())
+    }
+
     fn load_as<S: Step>(&self, step: &S, name: &ArtefactName) -> Option<LoadedOrMade<S::Artefact>> {
-        let artefact = self.store.load(name)?;
-        step.companions(name, &artefact)
-            .iter()
-            .all(|companion| self.has(companion))
-            .then(|| LoadedOrMade {
-                name: name.clone(),
-                artefact,
-                is_stored: true,
-            })
+        let loaded = LoadedOrMade {
+            artefact: self.store.load(name)?,
+            name: name.clone(),
+            is_stored: true,
+        };
+        let companions = step.companions(name, &loaded.artefact);
+        if !companions.iter().all(|companion| self.has(companion)) {
+            return None;
+        }
+        self.require(name, &companions);
+        Some(loaded)
+    }
+
+    fn make_or_note<S: Step>(
+        &self,
+        step: &S,
+        name: ArtefactName,
+    ) -> Result<Option<LoadedOrMade<S::Artefact>>> {
+        if self.absent == AbsentArtefacts::Report {
+            self.note_missing(name);
+            return Ok(None);
+        }
+        let made = self.make(step, name)?;
+        if made.is_stored {
+            self.require(&made.name, &step.companions(&made.name, &made.artefact));
+        }
+        Ok(Some(made))
+    }
+
+    /// Notes that the run needs an artefact and its companions.
+    fn require(&self, name: &ArtefactName, companions: &[Companion]) {
+        self.store.require(name);
+        for companion in companions {
+            self.store.require(&companion.name);
+        }
     }
 
     fn make<S: Step>(&self, step: &S, name: ArtefactName) -> Result<LoadedOrMade<S::Artefact>> {
