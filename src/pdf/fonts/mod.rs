@@ -1,7 +1,7 @@
 //! The two embedded faces, regular and bold: a subset of Arimo (SIL Open Font License,
 //! `fonts/OFL.txt`) with Latin, Greek and mathematical signs.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use pdf_writer::types::{CidFontType, FontFlags, SystemInfo, UnicodeCmap};
 use pdf_writer::{Buf, Filter, Finish, Name, Pdf, Rect, Ref, Str};
@@ -38,8 +38,8 @@ impl Weight {
 struct FontFace {
     name: &'static str,
     file: &'static [u8],
-    /// Glyph and width in thousandths of the size, by character.
-    glyphs: BTreeMap<char, (u16, f32)>,
+    /// Glyph and width in thousandths of the size, at the code of a character.
+    glyphs: Vec<Option<(u16, f32)>>,
     widths: Vec<f32>,
     bounds: Rect,
     ascent: f32,
@@ -113,7 +113,7 @@ impl FontFace {
                     .unwrap_or(0),
             ) * unit
         };
-        let mut glyphs = BTreeMap::new();
+        let mut glyphs = Vec::new();
         for subtable in face
             .tables()
             .cmap
@@ -123,7 +123,9 @@ impl FontFace {
         {
             subtable.codepoints(|code| {
                 if let (Some(c), Some(glyph)) = (char::from_u32(code), subtable.glyph_index(code)) {
-                    glyphs.insert(c, (glyph.0, width(glyph.0)));
+                    let place = c as usize;
+                    glyphs.resize(glyphs.len().max(place + 1), None);
+                    glyphs[place] = Some((glyph.0, width(glyph.0)));
                 }
             });
         }
@@ -148,7 +150,8 @@ impl FontFace {
     /// Glyph and width of a character; the empty box if the face lacks it.
     fn glyph(&self, c: char) -> (u16, f32) {
         let missing = (0, self.widths.first().copied().unwrap_or(500.0));
-        self.glyphs.get(&c).copied().unwrap_or(missing)
+        let known = self.glyphs.get(c as usize).copied().flatten();
+        known.unwrap_or(missing)
     }
 
     /// Writes the face, from the reference `first` on.
@@ -209,9 +212,11 @@ impl FontFace {
         let mut map = UnicodeCmap::new(Name(b"Unicode"), system);
         // Hyphen and soft hyphen share a glyph, which stands for the hyphen: it comes first.
         let mut mapped = BTreeSet::new();
-        for (c, (glyph, _)) in &self.glyphs {
-            if mapped.insert(*glyph) {
-                map.pair(*glyph, *c);
+        for (code, glyph) in (0..).zip(&self.glyphs) {
+            if let (Some(c), Some((glyph, _))) = (char::from_u32(code), glyph)
+                && mapped.insert(*glyph)
+            {
+                map.pair(*glyph, c);
             }
         }
         map.finish()
