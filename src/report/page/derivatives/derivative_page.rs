@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::derivative_results::DerivativeResults;
@@ -61,11 +62,16 @@ pub fn groups(
     markers: &ClassMarkers,
 ) -> Vec<DerivativeGroup> {
     let alpha = alpha_scale(derivatives);
+    let numbered = derivatives.par_iter().enumerate();
+    let pages: Vec<DerivativePage> = numbered
+        .map(|(i, derivative)| {
+            let anchor = anchors.get(derivative.name).cloned().unwrap_or_default();
+            page(derivative, anchor, i + 1, alpha, markers)
+        })
+        .collect();
     let mut groups: Vec<DerivativeGroup> = Vec::new();
-    for (i, derivative) in derivatives.iter().enumerate() {
+    for (derivative, page) in derivatives.iter().zip(pages) {
         let title = derivative.coefficient.map_or("Instrument biases", title);
-        let anchor = anchors.get(derivative.name).cloned().unwrap_or_default();
-        let page = page(derivative, anchor, i + 1, alpha, markers);
         match groups.last_mut() {
             Some(group) if group.title == title => group.pages.push(page),
             _ => groups.push(DerivativeGroup {
