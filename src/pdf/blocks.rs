@@ -6,10 +6,11 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use roxmltree::Node;
 
+use super::block_items::BlockItems;
 use super::elements::{has_class, is_block, is_screen_only, plain_text};
 use super::fonts::Fonts;
 use super::inline_text::{InlineReader, LineLayout, lines};
-use super::item::{INK, Item, PlacedMark, SOFT, Style, indented, joined};
+use super::item::{INK, Item, PlacedMark, SOFT, Style};
 use super::svg;
 use super::table;
 
@@ -41,50 +42,6 @@ pub struct Blocks<'a> {
     page_height: f32,
     /// Scale of drawings over that of their column.
     shrinking: f32,
-}
-
-/// Items of some elements.
-#[derive(Debug, Default)]
-pub struct Made {
-    pub items: Vec<Item>,
-    /// Ids of elements without an item; the next item is their place.
-    anchors: Vec<String>,
-    /// Height of all drawings, pt.
-    drawn_height: f32,
-}
-
-impl Made {
-    fn of(items: Vec<Item>) -> Made {
-        Made {
-            items,
-            ..Made::default()
-        }
-    }
-
-    /// Adds what follows. Its first item is the place of the anchors without one.
-    fn add(&mut self, mut next: Made) {
-        if let Some(first) = next.items.iter_mut().find(|i| !i.is_room) {
-            let anchors = self.anchors.drain(..);
-            first
-                .marks
-                .extend(anchors.map(|id| PlacedMark::Anchor { id }));
-        }
-        self.items.append(&mut next.items);
-        self.anchors.append(&mut next.anchors);
-        self.drawn_height += next.drawn_height;
-    }
-
-    /// Takes the items out, joined to one. Anchors without an item stay.
-    fn take_joined(&mut self) -> Item {
-        joined(std::mem::take(&mut self.items))
-    }
-
-    fn indented(self, indent: f32) -> Made {
-        Made {
-            items: indented(self.items, indent),
-            ..self
-        }
-    }
 }
 
 /// Part of an element's content that is made alone.
@@ -119,15 +76,15 @@ impl<'a> Blocks<'a> {
     }
 
     /// Items of an element's children, in a column of a width (pt).
-    pub fn children(&self, node: Node, width: f32, style: Style) -> Made {
-        let made: Vec<Made> = pieces(node)
+    pub fn children(&self, node: Node, width: f32, style: Style) -> BlockItems {
+        let made: Vec<BlockItems> = pieces(node)
             .into_par_iter()
             .map(|piece| match piece {
-                Piece::Text(nodes) => Made::of(self.text(&nodes, width, style)),
+                Piece::Text(nodes) => BlockItems::of(self.text(&nodes, width, style)),
                 Piece::Block(block) => self.block(block, width, style),
             })
             .collect();
-        let mut all = Made::default();
+        let mut all = BlockItems::default();
         for part in made {
             all.add(part);
         }
@@ -144,18 +101,11 @@ impl<'a> Blocks<'a> {
     }
 
     /// Items of a block element with the space after it.
-    fn block(&self, node: Node, width: f32, style: Style) -> Made {
+    fn block(&self, node: Node, width: f32, style: Style) -> BlockItems {
         if is_screen_only(node) {
-            return Made::default();
+            return BlockItems::default();
         }
-        let mut made = Made {
-            anchors: node
-                .attribute("id")
-                .map(str::to_owned)
-                .into_iter()
-                .collect(),
-            ..Made::default()
-        };
+        let mut made = BlockItems::with_anchor(node.attribute("id"));
         if has_class(node, "new-page") {
             made.items.push(Item::page_break());
         }
@@ -177,7 +127,7 @@ impl<'a> Blocks<'a> {
     }
 
     /// Items of an element, with smaller drawings where it then fits on one page.
-    fn on_one_page(&self, node: Node, width: f32, style: Style) -> (Made, f32) {
+    fn on_one_page(&self, node: Node, width: f32, style: Style) -> (BlockItems, f32) {
         let made = self.element(node, width, style);
         let drawn = made.0.drawn_height;
         let excess = height_on_page(&made.0.items) - self.page_height;
@@ -189,7 +139,7 @@ impl<'a> Blocks<'a> {
     }
 
     /// Items of an element, and the space after it (pt).
-    fn element(&self, node: Node, width: f32, style: Style) -> (Made, f32) {
+    fn element(&self, node: Node, width: f32, style: Style) -> (BlockItems, f32) {
         let small = Style::of_size(SMALL_SIZE);
         let note = Style {
             colour: SOFT,
@@ -204,8 +154,8 @@ impl<'a> Blocks<'a> {
             "p" => (self.children(node, width, style), 5.0),
             "ul" => (self.list(node, width, style), 4.0),
             "dl" => (self.definitions(node, width, style), 5.0),
-            "pre" => (Made::of(self.preserved(node, width)), 5.0),
-            "table" => (Made::of(table::rows(node, width, self.fonts)), 6.0),
+            "pre" => (BlockItems::of(self.preserved(node, width)), 5.0),
+            "table" => (BlockItems::of(table::rows(node, width, self.fonts)), 6.0),
             "svg" => (self.drawing(node, width), 1.0),
             "figcaption" => (self.children(node, width, small), 1.0),
             "figure" => {
@@ -220,7 +170,7 @@ impl<'a> Blocks<'a> {
     }
 
     /// A bold heading that stays with what follows. Level 0 is a chapter, under a rule.
-    fn heading(&self, node: Node, width: f32, size: f32, level: Option<usize>) -> Made {
+    fn heading(&self, node: Node, width: f32, size: f32, level: Option<usize>) -> BlockItems {
         let mut made = self.children(node, width, Style::of_size(size).bold());
         let lines = &mut made.items;
         for line in &mut *lines {
@@ -243,8 +193,8 @@ impl<'a> Blocks<'a> {
         made
     }
 
-    fn list(&self, node: Node, width: f32, style: Style) -> Made {
-        let mut all = Made::default();
+    fn list(&self, node: Node, width: f32, style: Style) -> BlockItems {
+        let mut all = BlockItems::default();
         for entry in node.children().filter(|n| n.has_tag_name("li")) {
             let made = self.children(entry, width - LIST_INDENT, style);
             let mut made = made.indented(LIST_INDENT);
@@ -263,12 +213,12 @@ impl<'a> Blocks<'a> {
     }
 
     /// Terms with their definitions beside them.
-    fn definitions(&self, node: Node, width: f32, style: Style) -> Made {
+    fn definitions(&self, node: Node, width: f32, style: Style) -> BlockItems {
         let term_style = Style {
             colour: SOFT,
             ..style
         };
-        let mut all = Made::default();
+        let mut all = BlockItems::default();
         let mut term = None;
         for entry in node.descendants() {
             if entry.has_tag_name("dt") {
@@ -297,12 +247,11 @@ impl<'a> Blocks<'a> {
         lines(&reader.words(), layout, self.fonts)
     }
 
-    fn drawing(&self, node: Node, width: f32) -> Made {
+    fn drawing(&self, node: Node, width: f32) -> BlockItems {
         let drawing = svg::drawing(node, self.fonts);
         let scale = (width / drawing.width.max(1.0)).min(LARGEST_UNIT) * self.shrinking;
-        let height = drawing.height * scale;
         let item = Item {
-            height,
+            height: drawing.height * scale,
             marks: vec![PlacedMark::Drawing {
                 x: 0.0,
                 y: 0.0,
@@ -311,17 +260,14 @@ impl<'a> Blocks<'a> {
             }],
             ..Item::default()
         };
-        Made {
-            drawn_height: height,
-            ..Made::of(vec![item])
-        }
+        BlockItems::of_drawing(item)
     }
 
     /// Children two by two, each pair as high as the higher one.
-    fn pairs(&self, node: Node, width: f32, style: Style) -> Made {
+    fn pairs(&self, node: Node, width: f32, style: Style) -> BlockItems {
         let column = 0.5 * (width - PAIR_GAP);
         let children: Vec<Node> = node.children().filter(Node::is_element).collect();
-        let mut all = Made::default();
+        let mut all = BlockItems::default();
         for pair in children.chunks(2) {
             let mut row = Item::default();
             for (child, x) in pair.iter().zip([0.0, column + PAIR_GAP]) {
@@ -331,7 +277,7 @@ impl<'a> Blocks<'a> {
                 row.absorb(cell, x, 0.0);
                 all.add(made);
             }
-            all.add(Made::of(vec![row]));
+            all.add(BlockItems::of(vec![row]));
         }
         all
     }

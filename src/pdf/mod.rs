@@ -35,9 +35,10 @@
 //!
 //! In the order of use: `fonts`, `operand` (numbers and colours), `svg` and `svg_path` (drawings as
 //! operators), `item` (what pages are filled with), `elements` (questions about an element),
-//! `inline_text` and `table`, `blocks` (elements as items), `pagination` (items on pages),
-//! `page_content` (a page as operators), `writer` (the objects of the file).
+//! `inline_text` and `table`, `block_items` and `blocks` (elements as items), `pagination` (items on
+//! pages), `page_content` (a page as operators), `writer` (the objects of the file).
 
+mod block_items;
 mod blocks;
 mod elements;
 mod fonts;
