@@ -172,7 +172,7 @@ impl NightRun<'_> {
                 None
             }
             Err(why) => {
-                let reason = format!("not made: the template's page is no well-formed XML: {why}");
+                let reason = format!("not made: {why}");
                 Some(problem(ProblemStage::Report, "", PRINTED_PAGE, &reason))
             }
         };

@@ -59,10 +59,13 @@ use fonts::Fonts;
 use item::Style;
 use pagination::{MARGIN, PAGE_HEIGHT, WIDTH};
 
+/// Deepest nesting of elements. They are set recursively: each level takes some of a thread's stack.
+const DEEPEST: usize = 100;
+
 /// Sets a page as a PDF.
 ///
 /// # Errors
-/// If the page is not well-formed XML.
+/// If the page is not well-formed XML, or is nested deeper than [`DEEPEST`].
 pub fn pdf(html: &str) -> Result<Vec<u8>, String> {
     // A large report has a million nodes; none is deeply nested.
     let options = ParsingOptions {
@@ -70,7 +73,14 @@ pub fn pdf(html: &str) -> Result<Vec<u8>, String> {
         nodes_limit: u32::MAX,
         ..ParsingOptions::default()
     };
-    let xml = Document::parse_with_options(html, options).map_err(|e| e.to_string())?;
+    let xml = Document::parse_with_options(html, options)
+        .map_err(|e| format!("the page is no well-formed XML: {e}"))?;
+    let depth = depth(&xml);
+    if depth > DEEPEST {
+        return Err(format!(
+            "the page's elements are nested {depth} deep: {DEEPEST} are set at most"
+        ));
+    }
     let fonts = Fonts::load()?;
     let root = xml.root_element();
     let title = root
@@ -87,4 +97,36 @@ pub fn pdf(html: &str) -> Result<Vec<u8>, String> {
     let made = Blocks::new(&fonts, PAGE_HEIGHT).children(body, WIDTH - 2.0 * MARGIN, style);
     let document = pagination::paginate(made.items, &fonts);
     Ok(writer::write(&fonts, title, &document))
+}
+
+/// Number of levels of a document's elements.
+fn depth(xml: &Document) -> usize {
+    let mut depths: Vec<usize> = Vec::new();
+    for node in xml.descendants() {
+        let parent = node.parent().map(|parent| parent.id().get_usize());
+        let above = parent.and_then(|id| depths.get(id)).copied().unwrap_or(0);
+        depths.push(above + usize::from(node.is_element()));
+    }
+    depths.into_iter().max().unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn nested(levels: usize) -> Result<Vec<u8>, String> {
+        let (open, close) = ("<div><p>text</p>".repeat(levels), "</div>".repeat(levels));
+        pdf(&format!("<html><body>{open}{close}</body></html>"))
+    }
+
+    #[test]
+    fn a_page_nested_too_deep_is_refused() {
+        // Page, body and the innermost paragraph are three levels more.
+        assert!(nested(DEEPEST - 3).is_ok());
+        let refused = nested(100_000).unwrap_err();
+        assert!(
+            refused.contains("nested 100003 deep: 100 are set at most"),
+            "{refused}"
+        );
+    }
 }
