@@ -80,7 +80,10 @@ impl<'a> Blocks<'a> {
         let made: Vec<BlockItems> = pieces(node)
             .into_par_iter()
             .map(|piece| match piece {
-                Piece::Text(nodes) => BlockItems::of(self.text(&nodes, width, style)),
+                Piece::Text(nodes) => {
+                    let reader = InlineReader::new(self.fonts);
+                    BlockItems::of(self.text(reader, nodes, width, style))
+                }
                 Piece::Block(block) => self.block(block, width, style),
             })
             .collect();
@@ -91,10 +94,16 @@ impl<'a> Blocks<'a> {
         all
     }
 
-    fn text(&self, nodes: &[Node], width: f32, style: Style) -> Vec<Item> {
-        let mut reader = InlineReader::new(self.fonts);
+    /// Lines of running text.
+    fn text<'d, 'x: 'd>(
+        &self,
+        mut reader: InlineReader,
+        nodes: impl IntoIterator<Item = Node<'d, 'x>>,
+        width: f32,
+        style: Style,
+    ) -> Vec<Item> {
         for node in nodes {
-            reader.read(*node, style, None);
+            reader.read(node, style, None);
         }
         let layout = LineLayout::left(width, style.size);
         lines(&reader.words(), layout, self.fonts)
@@ -239,12 +248,8 @@ impl<'a> Blocks<'a> {
     }
 
     fn preserved(&self, node: Node, width: f32) -> Vec<Item> {
-        let mut reader = InlineReader::preserving(self.fonts);
-        for child in node.children() {
-            reader.read(child, Style::of_size(CODE_SIZE), None);
-        }
-        let layout = LineLayout::left(width, CODE_SIZE);
-        lines(&reader.words(), layout, self.fonts)
+        let reader = InlineReader::preserving(self.fonts);
+        self.text(reader, node.children(), width, Style::of_size(CODE_SIZE))
     }
 
     fn drawing(&self, node: Node, width: f32) -> BlockItems {

@@ -37,12 +37,10 @@ pub struct RecordFile {
 /// The file cannot be opened, is no Parquet file, or is not a record.
 pub fn open(path: &Path) -> Result<RecordFile, Error> {
     let file = regular::open(path).map_err(Error::io(path, "cannot open the record"))?;
-    let bad = |what: &dyn Display| not_a_record(path, what);
     let options = ArrowReaderOptions::new().with_offset_index_policy(PageIndexPolicy::Optional);
-    let metadata = guarded(|| Ok(ArrowReaderMetadata::load(&file, options)))
-        .map_err(|_| bad(&FAILED))?
-        .map_err(|e| bad(&e))?;
-    let header = RecordHeader::parse(metadata.schema().metadata()).map_err(|e| bad(&e))?;
+    let metadata = read_parquet(path, || ArrowReaderMetadata::load(&file, options))?;
+    let header =
+        RecordHeader::parse(metadata.schema().metadata()).map_err(|e| not_a_record(path, &e))?;
     Ok(RecordFile {
         path: path.to_owned(),
         metadata,
@@ -52,8 +50,15 @@ pub fn open(path: &Path) -> Result<RecordFile, Error> {
     })
 }
 
-/// Reason for a panic of the Parquet reader.
-const FAILED: &str = "the Parquet reader failed on its bytes";
+/// Runs the Parquet reader, whose error or panic is a fault of the file.
+fn read_parquet<T>(
+    path: &Path,
+    read: impl FnOnce() -> parquet::errors::Result<T>,
+) -> Result<T, Error> {
+    guarded(|| Ok(read()))
+        .map_err(|_| not_a_record(path, &"the Parquet reader failed on its bytes"))?
+        .map_err(|e| not_a_record(path, &e))
+}
 
 fn not_a_record(path: &Path, what: &dyn Display) -> Error {
     Error::damaged(
@@ -187,14 +192,11 @@ impl RecordFile {
         samples: Range<usize>,
         wanted: &dyn Fn(&str) -> bool,
     ) -> Result<(), Error> {
-        let bad = |what: &dyn Display| not_a_record(&self.path, what);
         let file =
             File::open(&self.path).map_err(Error::io(&self.path, "cannot open the record"))?;
         let columns = Columns::new(PageFile::new(file), self.metadata.metadata());
         let count = samples.len();
-        guarded(|| Ok(columns.add_to(record, &samples, wanted)))
-            .map_err(|_| bad(&FAILED))?
-            .map_err(|e| bad(&e))?;
+        read_parquet(&self.path, || columns.add_to(record, &samples, wanted))?;
         let whole = |s: &Series| s.values.len() == count && s.marks.len() == count;
         record
             .signals
@@ -202,7 +204,8 @@ impl RecordFile {
             .find(|(_, s)| !whole(s))
             .map_or(Ok(()), |(name, _)| {
                 let samples = self.header.samples;
-                Err(bad(&format!("signal `{name}` has not {samples} samples")))
+                let what = format!("signal `{name}` has not {samples} samples");
+                Err(not_a_record(&self.path, &what))
             })
     }
 }
