@@ -55,7 +55,7 @@ impl StartingPoints {
 
 /// Starting values with the tunnel's derivatives at the maneuver's mean angle of attack and Mach
 /// number; zero for one without a table.
-pub(super) fn start_from_tunnel<const NX: usize, E: Equations<NX>>(
+fn start_from_tunnel<const NX: usize, E: Equations<NX>>(
     task: &Task,
     case: &Case<NX, E>,
 ) -> Vec<f64> {

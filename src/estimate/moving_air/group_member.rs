@@ -4,7 +4,6 @@ use nalgebra::DVector;
 
 use super::maneuver_filter::{bias_uncertainties, least_deviations, new_filter, noisy_inputs};
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
-use crate::estimate::fitting::start_from_tunnel;
 use crate::estimate::prepared_case::{PreparedCase, all_free};
 use crate::estimate::slopes::alpha_slopes::AlphaSlopes;
 use crate::estimate::slopes::held_slopes::HeldSlopes;
@@ -117,12 +116,6 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>> GroupMember<'g, 'a, NX, E> {
             model: &model,
         };
         filter.gradient_shifts(parameters, &recorded, errors)
-    }
-
-    /// Starting values by equation error with the slopes held.
-    pub fn start_by_equation_error(&self, held: &HeldSlopes) -> Vec<f64> {
-        let case = self.case_with(&self.model_with_slopes(held));
-        equation_error::start(&case, &start_from_tunnel(&self.task, &self.prepared.case))
     }
 
     /// Equation error with the slopes over α that a fit holds; `None` without any.
