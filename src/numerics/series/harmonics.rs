@@ -1,4 +1,7 @@
 //! Fourier sums of several series at once, at some harmonics of their length.
+//!
+//! The samples n and N − n of N have the same cosine, and sines that differ in sign. Their sum and
+//! their difference therefore take the place of both, and halve the products.
 #![expect(clippy::inline_always, reason = "compiled for the processor at hand")]
 
 use std::f64::consts::TAU;
@@ -51,13 +54,11 @@ impl Harmonics {
     pub fn sums(&self, series: &[Vec<f64>]) -> DMatrix<f64> {
         let mut sums = DMatrix::zeros(2 * self.len(), series.len());
         for (block, series) in series.chunks(SIDE_BY_SIDE).enumerate() {
-            let rows: Vec<[f64; SIDE_BY_SIDE]> = (0..self.turn.len())
-                .map(|n| std::array::from_fn(|i| series.get(i).map_or(0.0, |x| x[n])))
-                .collect();
+            let mirrored = mirrored(series, self.turn.len());
             for first in (0..self.len()).step_by(TOGETHER) {
                 let parts = Arch::new().dispatch(HarmonicSums {
                     turn: &self.turn,
-                    rows: &rows,
+                    mirrored: &mirrored,
                     numbers: std::array::from_fn(|k| self.numbers.start + first + k),
                 });
                 for (row, [real, imaginary]) in (first..self.len()).zip(parts) {
@@ -73,11 +74,27 @@ impl Harmonics {
     }
 }
 
+/// Sums and differences of the samples n and N − n of each series, from n = 0 to the middle. A sample
+/// that mirrors itself counts once in the sum; its sine is zero.
+fn mirrored(series: &[Vec<f64>], samples: usize) -> Vec<[[f64; SIDE_BY_SIDE]; 2]> {
+    let value = |i: usize, n: usize| series.get(i).map_or(0.0, |x| x[n]);
+    let pair = |n: usize| match samples - n {
+        other if n == 0 || other == n => {
+            [std::array::from_fn(|i| value(i, n)), [0.0; SIDE_BY_SIDE]]
+        }
+        other => [
+            std::array::from_fn(|i| value(i, n) + value(i, other)),
+            std::array::from_fn(|i| value(i, n) - value(i, other)),
+        ],
+    };
+    (0..samples).take(samples / 2 + 1).map(pair).collect()
+}
+
 /// Real and imaginary parts of successive harmonics of series side by side, compiled for the processor
 /// at hand.
 struct HarmonicSums<'a> {
     turn: &'a [[f64; 2]],
-    rows: &'a [[f64; SIDE_BY_SIDE]],
+    mirrored: &'a [[[f64; SIDE_BY_SIDE]; 2]],
     numbers: [usize; TOGETHER],
 }
 
@@ -86,17 +103,17 @@ impl WithSimd for HarmonicSums<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
-        let samples = self.rows.len();
+        let samples = self.turn.len();
         let steps = self.numbers.map(|number| number % samples.max(1));
         let mut real = [[0.0; SIDE_BY_SIDE]; TOGETHER];
         let mut imaginary = real;
         let mut places = [0; TOGETHER];
-        for row in self.rows {
+        for [sum, difference] in self.mirrored {
             for k in 0..TOGETHER {
                 let [cosine, sine] = self.turn[places[k]];
                 for i in 0..SIDE_BY_SIDE {
-                    real[k][i] += cosine * row[i];
-                    imaginary[k][i] -= sine * row[i];
+                    real[k][i] = cosine.mul_add(sum[i], real[k][i]);
+                    imaginary[k][i] = (-sine).mul_add(difference[i], imaginary[k][i]);
                 }
                 places[k] += steps[k];
                 if places[k] >= samples {
@@ -115,7 +132,18 @@ mod tests {
 
     #[test]
     fn sums_of_many_series_are_those_of_the_definition() {
-        let samples = 57;
+        for samples in [57, 58, 1, 2] {
+            sums_are_those_of_the_definition(samples);
+        }
+    }
+
+    #[test]
+    fn series_without_samples_have_no_sums() {
+        let sums = Harmonics::new(0, 1..3).sums(&[vec![]]);
+        assert!(sums.iter().all(|sum| *sum == 0.0));
+    }
+
+    fn sums_are_those_of_the_definition(samples: usize) {
         let series: Vec<Vec<f64>> = (0..11)
             .map(|i| {
                 (0..samples)

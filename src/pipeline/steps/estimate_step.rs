@@ -97,7 +97,7 @@ impl<'a> Step for EstimateStep<'a> {
     type Artefact = Estimated;
 
     const KIND: Kind = Kind::Estimate;
-    const VERSION: u32 = 41;
+    const VERSION: u32 = 42;
 
     fn item(&self) -> &str {
         &self.maneuver.maneuver_id

@@ -45,7 +45,7 @@ impl<'a> Step for SurfacesStep<'a> {
     type Artefact = FlightEvidence;
 
     const KIND: Kind = Kind::Surfaces;
-    const VERSION: u32 = 5;
+    const VERSION: u32 = 6;
 
     fn item(&self) -> &str {
         self.flight.id()
