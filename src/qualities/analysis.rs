@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::judged_aircraft::JudgedAircraft;
-use super::levels;
+use super::levels::{self, value_of};
 use super::linear::Differentiation;
 use super::linear::{Controls, LinearModel, SteadyFlight};
 use super::quantities::AxisQuantities;
@@ -56,8 +56,8 @@ pub struct Analysis {
 /// probabilities vary as smoothly over α as the posterior.
 #[derive(Clone, Debug)]
 pub struct SharedDraws {
-    longitudinal: Vec<DVector<f64>>,
-    lateral: Vec<DVector<f64>>,
+    longitudinal: DMatrix<f64>,
+    lateral: DMatrix<f64>,
 }
 
 impl SharedDraws {
@@ -70,7 +70,7 @@ impl SharedDraws {
         }
     }
 
-    fn of_axis(&self, axis: Axis) -> &[DVector<f64>] {
+    fn of_axis(&self, axis: Axis) -> &DMatrix<f64> {
         match axis {
             Axis::Longitudinal => &self.longitudinal,
             Axis::Lateral => &self.lateral,
@@ -78,12 +78,12 @@ impl SharedDraws {
     }
 }
 
-/// Draws of independent standard normal deviates, one for each of an axis's values.
+/// Draws of independent standard normal deviates: a row for each of an axis's values, a column for
+/// each draw.
 #[must_use]
-pub fn standard_draws(axis: Axis, values: usize, draws: usize) -> Vec<DVector<f64>> {
+pub fn standard_draws(axis: Axis, values: usize, draws: usize) -> DMatrix<f64> {
     let mut stream = RandomStream::new(SEED, axis.name());
-    let draw = |_| DVector::from_fn(values, |_, _| stream.normal());
-    (0..draws).map(draw).collect()
+    DMatrix::from_fn(values, draws, |_, _| stream.normal())
 }
 
 /// An axis at one angle of attack, at the mean of the posterior and at draws from it.
@@ -93,7 +93,7 @@ pub struct AxisAnalysis {
     pub mean: AxisQuantities,
     pub covariance: DMatrix<f64>,
     /// Values of each draw; NaN if its equations have no finite roots.
-    pub draws: Vec<BTreeMap<FlyingQuality, f64>>,
+    pub draws: Vec<Vec<(FlyingQuality, f64)>>,
     /// Share of draws whose modes have another pattern than those at the mean.
     pub coalesced: f64,
 }
@@ -106,40 +106,31 @@ impl AxisAnalysis {
         axis: Axis,
         linear: &LinearModel,
         posterior: &LocalPosterior,
-        draws: &[DVector<f64>],
+        draws: &DMatrix<f64>,
     ) -> Option<AxisAnalysis> {
         let mean = linear.quantities(axis, &posterior.mean, Differentiation::Slopes)?;
-        let root = continuous_root(&posterior.covariance);
-        let drawn = draws.iter().map(|deviates| {
-            let values = &posterior.mean + &root * deviates;
-            linear.quantities(axis, &values, Differentiation::ValuesAlone)
-        });
-        let drawn: Vec<Option<AxisQuantities>> = drawn.collect();
-        let is_other = |d: &&Option<AxisQuantities>| {
-            d.as_ref().map(|d| &d.modes.pattern) != Some(&mean.modes.pattern)
-        };
-        let others = drawn.iter().filter(is_other).count();
-        let coalesced = others as f64 / drawn.len().max(1) as f64;
-        let values = |d: &Option<AxisQuantities>| match d {
-            Some(d) => d.quantities.iter().map(|(q, v)| (*q, v.value)).collect(),
-            None => mean
-                .quantities
-                .iter()
-                .map(|(q, _)| (*q, f64::NAN))
-                .collect(),
-        };
+        let deviations = continuous_root(&posterior.covariance) * draws;
+        let (mut drawn, mut others) = (Vec::with_capacity(draws.ncols()), 0);
+        for deviation in deviations.column_iter() {
+            let values = &posterior.mean + deviation;
+            let found = linear.quantities(axis, &values, Differentiation::ValuesAlone);
+            let pattern = found.as_ref().map(|found| found.modes.pattern);
+            others += usize::from(pattern != Some(mean.modes.pattern));
+            let without = || {
+                mean.quantities
+                    .iter()
+                    .map(|(q, _)| (*q, f64::NAN))
+                    .collect()
+            };
+            drawn.push(found.map_or_else(without, |found| found.values()));
+        }
         Some(AxisAnalysis {
             axis,
-            draws: drawn.iter().map(values).collect(),
+            coalesced: others as f64 / drawn.len().max(1) as f64,
+            draws: drawn,
             mean,
             covariance: posterior.covariance.clone(),
-            coalesced,
         })
-    }
-
-    fn values(&self) -> BTreeMap<FlyingQuality, f64> {
-        let quantities = self.mean.quantities.iter();
-        quantities.map(|(q, dual)| (*q, dual.value)).collect()
     }
 
     /// Covariance of two quantities from their slopes.
@@ -161,8 +152,8 @@ impl AxisAnalysis {
             upper: dual.value + NORMAL_95 * deviation,
             basis: DeviationBasis::Slopes,
         };
-        let values = self.draws.iter().filter_map(|d| d.get(&quantity));
-        let drawn = Drawn::of(values.copied(), self.draws.len());
+        let values = self.draws.iter().filter_map(|d| value_of(d, quantity));
+        let drawn = Drawn::of(values, self.draws.len());
         let holds = deviation.is_finite()
             && self.coalesced <= COALESCED
             && drawn.confirms(dual.value, &by_slopes);
@@ -371,12 +362,13 @@ impl JudgedFlight<'_> {
     /// paired at random.
     fn level_rows(&self, axes: &[AxisAnalysis], specification: &Specification) -> Vec<LevelRow> {
         let draws = axes.iter().map(|a| a.draws.len()).min().unwrap_or(0);
-        let means: Vec<BTreeMap<FlyingQuality, f64>> =
-            axes.iter().map(AxisAnalysis::values).collect();
-        let mean = levels_of(specification, &all_values(&means));
+        let means: Vec<_> = axes.iter().flat_map(|a| a.mean.values()).collect();
+        let mean = levels_of(specification, &means);
         let mut counts = vec![[0_usize; 4]; mean.len()];
+        let mut values = vec![];
         for draw in 0..draws {
-            let values = all_values(axes.iter().map(|a| &a.draws[draw]));
+            values.clear();
+            values.extend(axes.iter().flat_map(|a| &a.draws[draw]).copied());
             for (counts, level) in counts.iter_mut().zip(levels_of(specification, &values)) {
                 counts[level as usize] += 1;
             }
@@ -402,15 +394,6 @@ impl JudgedFlight<'_> {
         })
         .collect()
     }
-}
-
-fn all_values<'a>(
-    axes: impl IntoIterator<Item = &'a BTreeMap<FlyingQuality, f64>>,
-) -> Vec<(FlyingQuality, f64)> {
-    let values = axes.into_iter().flatten();
-    values
-        .map(|(quantity, value)| (*quantity, *value))
-        .collect()
 }
 
 /// Level of each requirement, then the worst level.

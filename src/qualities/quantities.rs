@@ -16,6 +16,15 @@ pub struct AxisQuantities {
     pub modes: Modes,
 }
 
+impl AxisQuantities {
+    /// Quantities without their slopes.
+    #[must_use]
+    pub fn values(&self) -> Vec<(FlyingQuality, f64)> {
+        let quantities = self.quantities.iter();
+        quantities.map(|(q, dual)| (*q, dual.value)).collect()
+    }
+}
+
 impl LinearModel {
     /// Modes at values of the derivatives; `None` if a value is not finite.
     #[must_use]

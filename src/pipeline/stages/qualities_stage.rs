@@ -8,7 +8,7 @@ use crate::pipeline::problems::problem;
 use crate::qualities::{self, JudgedAircraft};
 
 /// Version of the flying qualities.
-pub const QUALITIES_VERSION: u32 = 2;
+pub const QUALITIES_VERSION: u32 = 3;
 
 /// Computes the flying qualities of the posterior, where the pipeline has a specification.
 pub fn judge_qualities(config: &Config, campaign: &mut Campaign) {

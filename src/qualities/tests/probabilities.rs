@@ -43,13 +43,10 @@ fn the_95_percent_intervals_of_all_quantities_hold_in_1000_campaigns() {
     for axis in [Axis::Longitudinal, Axis::Lateral] {
         let truth = correlated(axis, 0.04);
         let linear = linear(axis, &truth);
+        let none = standard_draws(axis, truth.values.len(), 0);
         let of_truth = linear.quantities(axis, &truth.mean, Differentiation::ValuesAlone);
-        let of_truth: BTreeMap<FlyingQuality, f64> = of_truth
-            .unwrap()
-            .quantities
-            .into_iter()
-            .map(|(q, dual)| (q, dual.value))
-            .collect();
+        let of_truth: BTreeMap<FlyingQuality, f64> =
+            of_truth.unwrap().values().into_iter().collect();
         let root = root(&truth.covariance, EXACT);
         let mut stream = RandomStream::new(5, axis.name());
         let mut inside: BTreeMap<FlyingQuality, usize> = BTreeMap::new();
@@ -58,7 +55,7 @@ fn the_95_percent_intervals_of_all_quantities_hold_in_1000_campaigns() {
                 mean: drawn(&truth.mean, &root, &mut stream),
                 ..truth.clone()
             };
-            let found = AxisAnalysis::of(axis, &linear, &estimated, &[]).unwrap();
+            let found = AxisAnalysis::of(axis, &linear, &estimated, &none).unwrap();
             for (quantity, dual) in &found.mean.quantities {
                 let uncertainty = found.uncertainty(*quantity, dual);
                 let holds = (uncertainty.lower..=uncertainty.upper).contains(&of_truth[quantity]);
@@ -238,17 +235,9 @@ fn the_probability_of_level_1_comes_true() {
             values: prior.values.clone(),
         };
         let found = AxisAnalysis::of(axis, &linear, &estimated, &draws).unwrap();
-        let is_level_1 = |draw: &&BTreeMap<FlyingQuality, f64>| {
-            level_1(&draw.iter().map(|(q, v)| (*q, *v)).collect::<Vec<_>>())
-        };
-        let count = found.draws.iter().filter(is_level_1).count();
+        let count = found.draws.iter().filter(|draw| level_1(draw)).count();
         let of_truth = linear.quantities(axis, &truth, Differentiation::ValuesAlone);
-        let of_truth: Vec<(FlyingQuality, f64)> = of_truth
-            .unwrap()
-            .quantities
-            .into_iter()
-            .map(|(q, dual)| (q, dual.value))
-            .collect();
+        let of_truth = of_truth.unwrap().values();
         forecasts.push((count as f64 / found.draws.len() as f64, level_1(&of_truth)));
     }
     let sure = forecasts
