@@ -6,8 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::judged_aircraft::JudgedAircraft;
 use super::levels::{self, value_of};
-use super::linear::Differentiation;
-use super::linear::{Controls, LinearModel, SteadyFlight};
+use super::linear::{Controls, Differentiation, LinearModel, SteadyFlight};
 use super::quantities::AxisQuantities;
 use super::specification::Specification;
 use super::trim::Trim;
@@ -109,6 +108,8 @@ impl AxisAnalysis {
         draws: &DMatrix<f64>,
     ) -> Option<AxisAnalysis> {
         let mean = linear.quantities(axis, &posterior.mean, Differentiation::Slopes)?;
+        let quantities = mean.quantities.iter();
+        let without: Vec<_> = quantities.map(|(q, _)| (*q, f64::NAN)).collect();
         let deviations = continuous_root(&posterior.covariance) * draws;
         let (mut drawn, mut others) = (Vec::with_capacity(draws.ncols()), 0);
         for deviation in deviations.column_iter() {
@@ -116,13 +117,7 @@ impl AxisAnalysis {
             let found = linear.quantities(axis, &values, Differentiation::ValuesAlone);
             let pattern = found.as_ref().map(|found| found.modes.pattern);
             others += usize::from(pattern != Some(mean.modes.pattern));
-            let without = || {
-                mean.quantities
-                    .iter()
-                    .map(|(q, _)| (*q, f64::NAN))
-                    .collect()
-            };
-            drawn.push(found.map_or_else(without, |found| found.values()));
+            drawn.push(found.map_or_else(|| without.clone(), |found| found.values()));
         }
         Some(AxisAnalysis {
             axis,

@@ -66,8 +66,7 @@ pub fn at_mean(
     quantity: FlyingQuality,
 ) -> Option<QuantityAtMean> {
     let found = linear.quantities(axis, &posterior.mean, Differentiation::Slopes)?;
-    let quantities = found.quantities.iter();
-    let means: Vec<(FlyingQuality, f64)> = quantities.map(|(q, dual)| (*q, dual.value)).collect();
+    let means = found.values();
     let (_, dual) = found.quantities.into_iter().find(|(q, _)| *q == quantity)?;
     let is_finite = dual.value.is_finite()
         && dual.slopes.len() == posterior.values.len()

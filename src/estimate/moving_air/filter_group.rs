@@ -203,9 +203,9 @@ impl<'g, 'a, const NX: usize, E: Equations<NX>, const NG: usize, G: InGusts<NG>>
             noise: self.noise(slope_fit),
         };
         let filters = self.filters(&held, Some(&slope_fit.filters));
-        let found = self.minimum(&filters, &start).ok()?;
         let most = slope_fit.found.cost() + ALLOWED_RISE;
-        (found.cost() < most).then(|| self.slope_fit(held, filters, found))?
+        let found = self.minimum(&filters, &start).ok();
+        self.slope_fit(held, filters, found.filter(|found| found.cost() < most)?)
     }
 
     /// `true` if in a maneuver a rotary gust exceeds the share [`MOSTLY`] of the rate to which it adds.

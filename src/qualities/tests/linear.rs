@@ -360,12 +360,11 @@ fn the_fighter_has_every_mode() {
         let posterior = posterior(axis, 0.1);
         let linear = linear(axis, &posterior);
         let found = linear.quantities(axis, &posterior.mean, Differentiation::ValuesAlone);
-        found.unwrap().quantities
+        found.unwrap().values()
     };
     let all: BTreeMap<FlyingQuality, f64> = [Axis::Longitudinal, Axis::Lateral]
         .into_iter()
         .flat_map(quantities)
-        .map(|(q, dual)| (q, dual.value))
         .collect();
     let near = |quantity, range: std::ops::Range<f64>| {
         assert!(

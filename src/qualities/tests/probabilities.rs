@@ -13,7 +13,7 @@ use crate::numerics::linear_algebra::root::{EXACT, root};
 use crate::numerics::statistics::forecasts::reliability;
 use crate::numerics::statistics::random::RandomStream;
 use crate::qualities::analysis::{AxisAnalysis, Drawn, standard_draws};
-use crate::qualities::levels::level;
+use crate::qualities::levels::{level, value_of};
 use crate::qualities::linear::Differentiation;
 use crate::tables::{DeviationBasis, FlyingQuality, Level};
 
@@ -156,14 +156,8 @@ fn control_anticipation_beside_a_load_factor_of_zero_has_the_interval_of_its_dis
         values[place] = slope;
         linear.quantities(axis, &values, Differentiation::ValuesAlone)
     };
-    let value = |slope: f64, wanted: FlyingQuality| {
-        let found = at(slope).unwrap().quantities.into_iter();
-        found
-            .map(|(q, dual)| (q, dual.value))
-            .find(|own| own.0 == wanted)
-            .unwrap()
-            .1
-    };
+    let value =
+        |slope: f64, wanted: FlyingQuality| value_of(&at(slope).unwrap().values(), wanted).unwrap();
     // n/α is linear in the lift slope: its zero, and a mean three standard deviations above it.
     let load_factor = |slope: f64| value(slope, FlyingQuality::LoadFactorPerAlpha);
     let (low, high) = (load_factor(0.0), load_factor(0.05));
