@@ -24,7 +24,7 @@ use crate::tables::{ChannelVerdict, CheckRow};
 pub const PART_SAMPLES: usize = 1 << 17;
 
 /// Reads signals of a record over a range of its samples; `None` if they cannot be read.
-pub type RecordReader<'a> = dyn Fn(&BTreeSet<String>, Range<usize>) -> Option<Record> + 'a;
+pub type RecordReader<'a> = dyn Fn(&BTreeSet<String>, Range<usize>) -> Option<Record> + Sync + 'a;
 
 /// Inputs of the relation checks and of flight-path reconstruction.
 #[derive(Clone)]
@@ -410,22 +410,21 @@ impl Examination<'_> {
         }
     }
 
-    /// Estimates the instruments' errors by flight-path reconstruction, part by part of the
-    /// record, each part after `correct`.
-    fn reconstruct(&self, correct: impl Fn(&mut Record)) -> Findings {
+    /// Estimates the instruments' errors by flight-path reconstruction, from the parts of the
+    /// record, each after `correct`.
+    fn reconstruct(&self, correct: impl Fn(&mut Record) + Sync + Send) -> Findings {
         let samples = self.clock.samples;
         let count = samples.div_ceil(PART_SAMPLES);
         let signals = compatibility::signals();
-        let parts = (0..count).filter_map(|i| {
-            let range = i * PART_SAMPLES..((i + 1) * PART_SAMPLES).min(samples);
+        let read = |part: usize| {
+            let range = part * PART_SAMPLES..((part + 1) * PART_SAMPLES).min(samples);
             let mut record = (self.read)(&signals, range)?;
             self.completion.apply(&mut record, GapExtent::Samples);
             correct(&mut record);
             Some(record)
-        });
+        };
         compatibility::examine(
-            parts,
-            count,
+            (count, read),
             self.context.channels,
             &self.recorded,
             self.context.aircraft,

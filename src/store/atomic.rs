@@ -4,6 +4,7 @@
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::thread;
 
 use super::{Digest, regular};
 use crate::error::{Error, Result};
@@ -112,15 +113,33 @@ impl Draft {
         self.file.path()
     }
 
+    /// Does `work` while the disk takes what is in the draft, so that placing it waits less.
+    ///
+    /// # Errors
+    /// [`Error::Io`] naming the path.
+    pub fn sync_during<T>(&self, work: impl FnOnce() -> T) -> Result<T> {
+        thread::scope(|scope| {
+            let syncing = thread::Builder::new().spawn_scoped(scope, || self.sync());
+            let done = work();
+            // Without this thread placing the draft syncs it.
+            if let Ok(syncing) = syncing {
+                syncing.join().unwrap_or(Ok(()))?;
+            }
+            Ok(done)
+        })
+    }
+
+    fn sync(&self) -> Result<()> {
+        let synced = self.file.as_file().sync_all();
+        synced.map_err(Error::io(&self.path, "cannot write it to the disk"))
+    }
+
     /// Puts the whole file in its place.
     ///
     /// # Errors
     /// [`Error::Io`] naming the path.
     pub fn place(self) -> Result<()> {
-        self.file
-            .as_file()
-            .sync_all()
-            .map_err(Error::io(&self.path, "cannot write it to the disk"))?;
+        self.sync()?;
         let placed = self.file.persist(&self.path).or_else(|e| {
             // An empty folder at its path may be removed.
             let _ = fs::remove_dir(&self.path);

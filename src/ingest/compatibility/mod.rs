@@ -38,6 +38,8 @@ pub use findings::{Findings, InstrumentFinding};
 pub use row_correction::correction;
 pub use settings::{Action, Compatibility, OnFault};
 
+use rayon::prelude::*;
+
 use crate::aircraft::Aircraft;
 use crate::flight::{Channel, Record, signal};
 use window::Window;
@@ -72,11 +74,10 @@ fn leave_out_rare_heading(record: &mut Record) {
 }
 
 /// Examines the instruments of a record; `recorded` are the signals that come from channels. A long
-/// record comes in `count` parts, each of which has its share of the windows.
+/// record has `count` parts, each of which has its share of the windows; `read` reads a part.
 #[must_use]
 pub fn examine(
-    parts: impl Iterator<Item = Record>,
-    count: usize,
+    (count, read): (usize, impl Fn(usize) -> Option<Record> + Sync + Send),
     channels: &BTreeMap<String, Channel>,
     recorded: &[String],
     aircraft: &Aircraft,
@@ -86,12 +87,15 @@ pub fn examine(
         return Findings::default();
     }
     let share = settings.windows.div_ceil(count.max(1));
-    let mut windows = Vec::new();
-    for mut record in parts {
+    let windows_of = |mut record: Record| -> Vec<Window> {
         leave_out_rare_heading(&mut record);
         let ranges = choose_windows(&record, share, settings).into_iter();
-        windows.extend(ranges.map(|range| Window::of(&record, range, aircraft, settings)));
-    }
+        ranges
+            .map(|range| Window::of(&record, range, aircraft, settings))
+            .collect()
+    };
+    let parts = (0..count).into_par_iter().filter_map(read);
+    let windows: Vec<Window> = parts.flat_map_iter(windows_of).collect();
     let errors = joint_fit::fit(&windows, aircraft, settings);
     if windows.len() < FEWEST_TO_NAME {
         return Findings::of(errors.as_ref(), channels, recorded, settings).without_faults();

@@ -620,8 +620,7 @@ fn channels() -> (BTreeMap<String, Channel>, Vec<String>) {
 fn examined(record: &Record, settings: &Compatibility) -> Findings {
     let (channels, names) = channels();
     examine(
-        std::iter::once(record.clone()),
-        1,
+        (1, |_| Some(record.clone())),
         &channels,
         &names,
         &aircraft(),

@@ -102,9 +102,11 @@ impl RecordWriting<'_> {
             .iter()
             .map(|p| ChannelReader::new(p, stretch, &self.config.ingest))
             .collect();
-        let checked = self
-            .write(opened, stretch, &mut readers, &mut draft)
-            .and_then(|()| self.check(stretch, readers, &draft));
+        let written = self.write(opened, stretch, &mut readers, &mut draft);
+        let checked = match written {
+            Ok(()) => draft.sync_during(|| self.check(stretch, readers, &draft))?,
+            Err(stop) => Err(stop),
+        };
         let assessment = match checked {
             Ok(assessment) => assessment,
             Err(WriteStop::Rejected(problem)) => return Ok(IngestedStretch::rejected(id, problem)),
