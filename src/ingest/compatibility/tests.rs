@@ -1,6 +1,8 @@
 //! The equations against closed forms and finite differences, and the fit against flights whose
 //! errors are known.
 
+use std::ops::Range;
+
 use approx::{assert_abs_diff_eq, assert_relative_eq};
 use nalgebra::{Matrix3, Vector3};
 
@@ -994,22 +996,43 @@ fn one_window_has_bounds_that_hold() {
 }
 
 #[test]
-fn a_window_is_never_cut_across_a_gap_or_a_wrapped_angle() {
-    let mut record = flight(65.0);
-    record.signals.get_mut(s::Q).unwrap().values[800..810].fill(f64::NAN);
-    record.signals.get_mut(s::PSI).unwrap().values[1700..]
-        .iter_mut()
-        .for_each(|v| *v += 360.0);
-    let chosen = choose_windows(&record, 50, &settings());
-    assert!(chosen.len() >= 3);
-    assert!(
-        chosen.iter().all(|w| w.end <= 800 || w.start >= 810),
-        "{chosen:?}"
-    );
-    assert!(
-        chosen.iter().all(|w| w.end <= 1700 || w.start >= 1700),
-        "{chosen:?}"
-    );
+fn a_window_is_never_cut_across_a_gap_or_a_jump() {
+    let exact = flight(65.0);
+    let is_apart = |record: &Record, left_out: Range<usize>| {
+        let chosen = choose_windows(record, 50, &settings());
+        assert!(chosen.len() >= 3, "{chosen:?}");
+        let mut chosen = chosen.iter();
+        chosen.all(|w| w.end <= left_out.start || w.start >= left_out.end)
+    };
+    let moved = |name: &str, samples: Range<usize>, by: f64| {
+        let mut record = exact.clone();
+        let values = &mut record.signals.get_mut(name).unwrap().values;
+        values[samples].iter_mut().for_each(|v| *v += by);
+        record
+    };
+    assert!(is_apart(&moved(s::Q, 800..810, f64::NAN), 800..810));
+    assert!(is_apart(&moved(s::PSI, 1700..1701, 360.0), 1700..1701));
+    let jumps = [
+        (s::PSI, 360.0),
+        (s::THETA, 6.0),
+        (s::VELOCITY, 30.0),
+        (s::ALTITUDE, -300.0),
+    ];
+    for (name, by) in jumps {
+        let jumping = moved(name, 1700..exact.samples, by);
+        assert!(is_apart(&jumping, 1700..1700), "{name}");
+    }
+    let mut in_two = moved(s::ALTITUDE, 1700..exact.samples, -600.0);
+    in_two.signals.get_mut(s::ALTITUDE).unwrap().values[1700] += 300.0;
+    assert!(is_apart(&in_two, 1700..1701));
+    assert!(!is_apart(&exact, 1700..1700), "no jump, no cut");
+    let mut rolling = exact.clone();
+    let roll = &mut rolling.signals.get_mut(s::PHI).unwrap().values[1680..];
+    let by = (0..40)
+        .chain(std::iter::repeat(40))
+        .map(|k| 6.0 * f64::from(k));
+    roll.iter_mut().zip(by).for_each(|(phi, by)| *phi += by);
+    assert!(!is_apart(&rolling, 1700..1700), "a roll at 240 deg/s");
 }
 
 #[test]

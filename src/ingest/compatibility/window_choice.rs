@@ -1,5 +1,6 @@
 //! Choice of windows: the parts of a flight in which its instruments move most.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::decimation::decimation;
@@ -21,8 +22,23 @@ const LARGEST_BETA_DEG: f64 = 60.0;
 /// Least airspeed, ft/s: below it the vanes and the airspeed sensor do not respond.
 const SLOWEST_FT_S: f64 = 50.0;
 
-/// Change of an angle in one sample beyond which it has wrapped around, deg.
-const TURN_DEG: f64 = 90.0;
+/// States, with the change in one sample beyond which a state has jumped, if it hardly moves before and after: parts of
+/// a flight are joined there, frames are lost, or an instrument is set. Angles in deg, airspeed in ft/s, altitude in ft.
+const JUMPS: [(&str, f64); 5] = [
+    (s::PHI, 5.0),
+    (s::THETA, 5.0),
+    (s::PSI, 5.0),
+    (s::VELOCITY, 20.0),
+    (s::ALTITUDE, 200.0),
+];
+
+/// Ratio of a jump to the changes two samples before and after it. Between samples that are interpolated to the record's
+/// clock a jump takes two.
+const JUMP_RATIO: f64 = 5.0;
+
+/// Multiple of the sizes in [`JUMPS`] that is a jump whatever is around it: a quarter turn of an angle that wraps to and
+/// fro.
+const SURE_JUMP: f64 = 18.0;
 
 /// Chooses at most `most` windows of a record, in order of time. Each signal in turn proposes the
 /// remaining window in which it moves most.
@@ -97,7 +113,7 @@ fn usable_runs(record: &Record) -> Vec<Range<usize>> {
         values(s::ALPHA_VANE),
         values(s::BETA_VANE),
     );
-    let (velocity, phi, psi) = (values(s::VELOCITY), values(s::PHI), record.values(s::PSI));
+    let (velocity, psi) = (values(s::VELOCITY), record.values(s::PSI));
     let at = |values: &[f64], k: usize| values.get(k).copied().unwrap_or(f64::NAN);
     let is_usable = |k: usize| {
         finite.iter().all(|values| at(values, k).is_finite())
@@ -107,17 +123,34 @@ fn usable_runs(record: &Record) -> Vec<Range<usize>> {
             && at(velocity, k) > SLOWEST_FT_S
             && psi.is_none_or(|psi| at(psi, k).is_finite())
     };
-    let jumps =
-        |values: &[f64], k: usize| k > 0 && (at(values, k) - at(values, k - 1)).abs() > TURN_DEG;
-    let wraps = |k: usize| jumps(phi, k) || psi.is_some_and(|psi| jumps(psi, k));
+    let jumped = JUMPS
+        .iter()
+        .flat_map(|(name, size)| jumps(values(name), *size));
+    let jumped: BTreeSet<usize> = jumped.collect();
     let mut runs: Vec<Range<usize>> = Vec::new();
     for k in (0..record.samples).filter(|k| is_usable(*k)) {
         match runs.last_mut() {
-            Some(run) if run.end == k && !wraps(k) => run.end = k + 1,
+            Some(run) if run.end == k && !jumped.contains(&k) => run.end = k + 1,
             _ => runs.push(k..k + 1),
         }
     }
     runs
+}
+
+/// Samples to which a state jumps; `size` is that of its jumps.
+fn jumps(values: &[f64], size: f64) -> impl Iterator<Item = usize> {
+    let change = |k: usize| match (values.get(k.wrapping_sub(1)), values.get(k)) {
+        (Some(before), Some(after)) => (after - before).abs(),
+        _ => 0.0,
+    };
+    let is_jump = move |k: &usize| {
+        let own = change(*k);
+        own > size && {
+            let around = change(k.saturating_sub(2)).max(change(k + 2));
+            own > JUMP_RATIO * around || own > SURE_JUMP * size
+        }
+    };
+    (1..values.len()).filter(is_jump)
 }
 
 /// Activity of a signal in each window: the mean square of its change over a second.

@@ -50,7 +50,7 @@ impl<'a> Step for IngestStep<'a> {
     type Artefact = IngestedFlight;
 
     const KIND: Kind = Kind::Ingest;
-    const VERSION: u32 = 39;
+    const VERSION: u32 = 40;
 
     fn item(&self) -> &str {
         &self.files.flight_id
