@@ -39,7 +39,11 @@ pub(super) fn whole(
     if let Some(what) = config.no_class_left() {
         return Err(files.aircraft.error("channels", what));
     }
-    files.all().try_for_each(ranges::are_finite)?;
+    let without_ranges = [&files.aircraft, &files.model].into_iter();
+    let specifications = files.qualities.iter().chain(&files.proof_of_match);
+    without_ranges
+        .chain(specifications)
+        .try_for_each(ranges::are_finite)?;
     ranges::of_pipeline(&files.pipeline)?;
     files.classes.iter().try_for_each(ranges::of_class)
 }
