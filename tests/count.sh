@@ -22,7 +22,7 @@ if ! command -v valgrind >/dev/null; then
 fi
 
 work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
+trap 'kill $(jobs -p) 2>/dev/null || true; rm -rf "$work"' EXIT
 
 # Runs a command; 2 is the code of a run that rejected something.
 run() {
@@ -46,25 +46,34 @@ campaign() {
 # shellcheck disable=SC2046 # options without spaces
 one_flight() {
     for stage in ingest segment estimate; do
-        count $stage "$harvest" $stage $(campaign one data/demo/flights/flight_001.parquet reports)
+        count $stage "$harvest" $stage $(campaign flight data/demo/flights/flight_001.parquet reports)
     done
 }
 
-# Posterior and trends of the demonstration, whose maneuvers are estimated before, and its report, whose proof of match
-# is made before.
+# Posterior and trends of the demonstration, whose maneuvers are estimated before.
 # shellcheck disable=SC2046
-demonstration() {
-    local flights='data/demo/flights/*.parquet'
-    run "$harvest" estimate $(campaign demonstration "$flights" estimates)
-    count trend "$harvest" trend $(campaign demonstration "$flights" trends)
-    run "$harvest" match $(campaign demonstration "$flights" matches)
-    count report "$harvest" report $(campaign demonstration "$flights" report)
+trends() {
+    run "$harvest" estimate $(campaign trends 'data/demo/flights/*.parquet' estimates)
+    count trend "$harvest" trend $(campaign trends 'data/demo/flights/*.parquet' trends)
+}
+
+# Report of the demonstration, whose proof of match is made before.
+# shellcheck disable=SC2046
+report() {
+    run "$harvest" match $(campaign report 'data/demo/flights/*.parquet' matches)
+    count report "$harvest" report $(campaign report 'data/demo/flights/*.parquet' report)
 }
 
 set -f # the pattern of the archive is the program's to expand
-one_flight
-demonstration
+cases=()
+for chain in one_flight trends report; do
+    $chain &
+    cases+=($!)
+done
 count standard_case "$harvest" lab bench tests/data/standard_case.json --repetitions 0 --threads 1
+for case in "${cases[@]}"; do
+    wait "$case"
+done
 
 failed=0
 while IFS='|' read -r _ name _ committed _; do
