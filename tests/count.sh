@@ -43,6 +43,8 @@ campaign() {
     echo "--quiet --threads 1 --archive $2 --wind-tunnel data/demo/wt_tables.csv --store $work/$1 --reports $work/$1.$3"
 }
 
+flights='data/demo/flights/*.parquet'
+
 # shellcheck disable=SC2046 # options without spaces
 one_flight() {
     for stage in ingest segment estimate; do
@@ -53,26 +55,26 @@ one_flight() {
 # Posterior and trends of the demonstration, whose maneuvers are estimated before.
 # shellcheck disable=SC2046
 trends() {
-    run "$harvest" estimate $(campaign trends 'data/demo/flights/*.parquet' estimates)
-    count trend "$harvest" trend $(campaign trends 'data/demo/flights/*.parquet' trends)
+    run "$harvest" estimate $(campaign trends "$flights" estimates)
+    count trend "$harvest" trend $(campaign trends "$flights" trends)
 }
 
 # Report of the demonstration, whose proof of match is made before.
 # shellcheck disable=SC2046
 report() {
-    run "$harvest" match $(campaign report 'data/demo/flights/*.parquet' matches)
-    count report "$harvest" report $(campaign report 'data/demo/flights/*.parquet' report)
+    run "$harvest" match $(campaign report "$flights" matches)
+    count report "$harvest" report $(campaign report "$flights" report)
 }
 
 set -f # the pattern of the archive is the program's to expand
-cases=()
-for chain in one_flight trends report; do
-    $chain &
-    cases+=($!)
+running=()
+for cases in one_flight trends report; do
+    $cases &
+    running+=($!)
 done
 count standard_case "$harvest" lab bench tests/data/standard_case.json --repetitions 0 --threads 1
-for case in "${cases[@]}"; do
-    wait "$case"
+for process in "${running[@]}"; do
+    wait "$process"
 done
 
 failed=0
