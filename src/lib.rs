@@ -90,6 +90,7 @@ mod qualities;
 mod proof_of_match;
 mod compare;
 mod export;
+mod drawing_cache;
 mod pdf;
 mod report;
 

@@ -15,6 +15,7 @@ use super::kneeboard;
 use super::plan::{CampaignState, Plan, Rehearsal, plan};
 use super::rehearsal::{self, RehearsalBasis};
 use crate::config::Config;
+use crate::drawing_cache::DrawingCache;
 use crate::error::{Error, Problem, Result};
 use crate::lab::campaign::TestCards;
 use crate::lineage::Stage;
@@ -121,7 +122,8 @@ fn place_plan(plan: &Plan, page: &str, folder: &Path, shelf: &TableFolder) -> Re
     table::publish(shelf, &plan.goals)?;
     files::place_text(&folder.join(PAGE), page)?;
     let printed = folder.join(PRINTED_PAGE);
-    let bytes = pdf::pdf(page).map_err(|what| Error::store(&printed, &what))?;
+    let bytes = pdf::pdf(page, &DrawingCache::default());
+    let bytes = bytes.map_err(|what| Error::store(&printed, &what))?;
     atomic::place(&printed, &bytes)?;
     let names = [
         "next_cards.csv",

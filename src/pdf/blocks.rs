@@ -1,14 +1,12 @@
 //! Block elements as items: headings, paragraphs, lists, figures, children side by side. Neighbours are
 //! made in parallel.
 
-use std::sync::Arc;
-
 use rayon::prelude::*;
 use roxmltree::Node;
 
 use super::block_items::BlockItems;
+use super::drawing_stream::DrawingStreams;
 use super::elements::{has_class, is_block, is_screen_only, plain_text};
-use super::fonts::Fonts;
 use super::inline_text::{InlineReader, LineLayout, lines};
 use super::item::{INK, Item, PlacedMark, SOFT, Style};
 use super::svg;
@@ -37,7 +35,7 @@ const LEAST_SHRINKING: f32 = 0.7;
 /// Maker of items from elements.
 #[derive(Clone, Copy, Debug)]
 pub struct Blocks<'a> {
-    fonts: &'a Fonts,
+    drawings: DrawingStreams<'a>,
     /// Height of a page, pt.
     page_height: f32,
     /// Scale of drawings over that of their column.
@@ -67,9 +65,9 @@ fn pieces<'d, 'x>(node: Node<'d, 'x>) -> Vec<Piece<'d, 'x>> {
 }
 
 impl<'a> Blocks<'a> {
-    pub fn new(fonts: &'a Fonts, page_height: f32) -> Self {
+    pub fn new(drawings: DrawingStreams<'a>, page_height: f32) -> Self {
         Blocks {
-            fonts,
+            drawings,
             page_height,
             shrinking: 1.0,
         }
@@ -81,7 +79,7 @@ impl<'a> Blocks<'a> {
             .into_par_iter()
             .map(|piece| match piece {
                 Piece::Text(nodes) => {
-                    let reader = InlineReader::new(self.fonts);
+                    let reader = InlineReader::new(self.drawings.fonts);
                     BlockItems::of(self.text(reader, nodes, width, style))
                 }
                 Piece::Block(block) => self.block(block, width, style),
@@ -106,7 +104,7 @@ impl<'a> Blocks<'a> {
             reader.read(node, style, None);
         }
         let layout = LineLayout::left(width, style.size);
-        lines(&reader.words(), layout, self.fonts)
+        lines(&reader.words(), layout, self.drawings.fonts)
     }
 
     /// Items of a block element with the space after it.
@@ -164,7 +162,10 @@ impl<'a> Blocks<'a> {
             "ul" => (self.list(node, width, style), 4.0),
             "dl" => (self.definitions(node, width, style), 5.0),
             "pre" => (BlockItems::of(self.preserved(node, width)), 5.0),
-            "table" => (BlockItems::of(table::rows(node, width, self.fonts)), 6.0),
+            "table" => (
+                BlockItems::of(table::rows(node, width, self.drawings.fonts)),
+                6.0,
+            ),
             "svg" => (self.drawing(node, width), 1.0),
             "figcaption" => (self.children(node, width, small), 1.0),
             "figure" => {
@@ -248,20 +249,20 @@ impl<'a> Blocks<'a> {
     }
 
     fn preserved(&self, node: Node, width: f32) -> Vec<Item> {
-        let reader = InlineReader::preserving(self.fonts);
+        let reader = InlineReader::preserving(self.drawings.fonts);
         self.text(reader, node.children(), width, Style::of_size(CODE_SIZE))
     }
 
     fn drawing(&self, node: Node, width: f32) -> BlockItems {
-        let drawing = svg::drawing(node, self.fonts);
-        let scale = (width / drawing.width.max(1.0)).min(LARGEST_UNIT) * self.shrinking;
+        let [own_width, own_height] = svg::size(node);
+        let scale = (width / own_width.max(1.0)).min(LARGEST_UNIT) * self.shrinking;
         let item = Item {
-            height: drawing.height * scale,
-            marks: vec![PlacedMark::Drawing {
+            height: own_height * scale,
+            marks: vec![PlacedMark::DrawingStream {
                 x: 0.0,
                 y: 0.0,
                 scale,
-                drawing: Arc::new(drawing),
+                drawing: self.drawings.of(node),
             }],
             ..Item::default()
         };
@@ -313,14 +314,21 @@ fn put_beside(item: Item, lines: &mut Vec<Item>) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::fonts::Fonts;
     use super::super::pagination::{PAGE_HEIGHT, paginate};
     use super::*;
+    use crate::drawing_cache::DrawingCache;
 
     /// Items of a page in a column of 400 pt on pages of a height, pt.
     fn items(page: &str, page_height: f32) -> Vec<Item> {
         let xml = roxmltree::Document::parse(page).unwrap();
         let fonts = Fonts::load().unwrap();
-        let blocks = Blocks::new(&fonts, page_height);
+        let drawings = DrawingStreams {
+            fonts: &fonts,
+            cache: &DrawingCache::default(),
+            declarations: "",
+        };
+        let blocks = Blocks::new(drawings, page_height);
         let made = blocks.children(xml.root_element(), 400.0, Style::of_size(TEXT_SIZE));
         made.items
     }
@@ -335,7 +343,7 @@ mod tests {
         let drawing = items.iter().find(|item| {
             item.marks
                 .iter()
-                .any(|m| matches!(m, PlacedMark::Drawing { .. }))
+                .any(|m| matches!(m, PlacedMark::DrawingStream { .. }))
         });
         (drawing.unwrap().height, height_on_page(&items))
     }

@@ -4,6 +4,7 @@
 
 use std::sync::Arc;
 
+use super::drawing_stream::DrawingStream;
 use super::fonts::Weight;
 use super::operand::Colour;
 use super::svg::Drawing;
@@ -53,12 +54,19 @@ pub enum PlacedMark {
         style: Style,
         text: String,
     },
-    /// A scaled drawing from its upper left corner.
+    /// A scaled drawing within a line, from its upper left corner.
     Drawing {
         x: f32,
         y: f32,
         scale: f32,
         drawing: Arc<Drawing>,
+    },
+    /// A scaled drawing between paragraphs, from its upper left corner.
+    DrawingStream {
+        x: f32,
+        y: f32,
+        scale: f32,
+        drawing: DrawingStream,
     },
     /// A filled rectangle.
     Fill {
@@ -138,6 +146,7 @@ impl PlacedMark {
         match &mut self {
             PlacedMark::Text { x, y, .. }
             | PlacedMark::Drawing { x, y, .. }
+            | PlacedMark::DrawingStream { x, y, .. }
             | PlacedMark::Fill { x, y, .. }
             | PlacedMark::Link { x, y, .. }
             | PlacedMark::PageOf { x, y, .. } => {

@@ -34,12 +34,13 @@
 //! `fill-opacity`, `font-size`, `font-weight` and `text-anchor`.
 //!
 //! In the order of use: `fonts`, `operand` (numbers and colours), `svg` and `svg_path` (drawings as
-//! operators), `item` (what pages are filled with), `elements` (questions about an element),
-//! `inline_text` and `table`, `block_items` and `blocks` (elements as items), `pagination` (items on
-//! pages), `page_content` (a page as operators), `writer` (the objects of the file).
+//! operators), `drawing_stream` (a drawing compressed), `item` (what pages are filled with), `elements`
+//! (questions about an element), `inline_text` and `table`, `block_items` and `blocks` (elements as items),
+//! `pagination` (items on pages), `page_content` (a page as operators), `writer` (the objects of the file).
 
 mod block_items;
 mod blocks;
+mod drawing_stream;
 mod elements;
 mod fonts;
 mod inline_text;
@@ -55,18 +56,21 @@ mod writer;
 use roxmltree::{Document, ParsingOptions};
 
 use blocks::Blocks;
+use drawing_stream::DrawingStreams;
 use fonts::Fonts;
 use item::Style;
 use pagination::{MARGIN, PAGE_HEIGHT, WIDTH};
 
+use crate::drawing_cache::DrawingCache;
+
 /// Deepest nesting of elements. They are set recursively: each level takes some of a thread's stack.
 const DEEPEST: usize = 100;
 
-/// Sets a page as a PDF.
+/// Sets a page as a PDF; drawings that `cache` knows are not set again.
 ///
 /// # Errors
 /// If the page is not well-formed XML, or is nested deeper than [`DEEPEST`].
-pub fn pdf(html: &str) -> Result<Vec<u8>, String> {
+pub fn pdf(html: &str, cache: &DrawingCache) -> Result<Vec<u8>, String> {
     // A large report has a million nodes; none is deeply nested.
     let options = ParsingOptions {
         allow_dtd: true,
@@ -94,7 +98,12 @@ pub fn pdf(html: &str) -> Result<Vec<u8>, String> {
         .find(|n| n.has_tag_name("body"))
         .unwrap_or(root);
     let style = Style::of_size(blocks::TEXT_SIZE);
-    let made = Blocks::new(&fonts, PAGE_HEIGHT).children(body, WIDTH - 2.0 * MARGIN, style);
+    let drawings = DrawingStreams {
+        fonts: &fonts,
+        cache,
+        declarations: html.get(..root.range().start).unwrap_or_default(),
+    };
+    let made = Blocks::new(drawings, PAGE_HEIGHT).children(body, WIDTH - 2.0 * MARGIN, style);
     let document = pagination::paginate(made.items, &fonts);
     Ok(writer::write(&fonts, title, &document))
 }
@@ -116,7 +125,8 @@ mod tests {
 
     fn nested(levels: usize) -> Result<Vec<u8>, String> {
         let (open, close) = ("<div><p>text</p>".repeat(levels), "</div>".repeat(levels));
-        pdf(&format!("<html><body>{open}{close}</body></html>"))
+        let page = format!("<html><body>{open}{close}</body></html>");
+        pdf(&page, &DrawingCache::default())
     }
 
     #[test]

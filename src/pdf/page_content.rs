@@ -3,19 +3,37 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
+use super::drawing_stream::{DrawingStream, compressed};
 use super::fonts::Fonts;
 use super::item::{PlacedMark, RULE, SOFT, Style};
 use super::operand::{Colour, Number, Rgb};
 use super::pagination::{HEIGHT, MARGIN, PagedDocument, WIDTH};
-use super::svg::Drawing;
 
-/// Operators and resources of one page.
+/// Content streams and resources of one page.
 pub struct PageContent<'a> {
     fonts: &'a Fonts,
-    pub operators: String,
+    /// Compressed streams, which a reader joins.
+    pub streams: Vec<PageStream>,
+    /// Operators after the streams.
+    operators: String,
     /// Opacities used, percent.
     pub opacities: BTreeSet<u8>,
     pub links: Vec<Link>,
+}
+
+/// A compressed content stream.
+pub enum PageStream {
+    Operators(Vec<u8>),
+    Drawing(DrawingStream),
+}
+
+impl PageStream {
+    pub fn bytes(&self) -> &[u8] {
+        match self {
+            PageStream::Operators(bytes) => bytes,
+            PageStream::Drawing(drawing) => drawing.stream(),
+        }
+    }
 }
 
 /// A rectangle that leads to a place of the document; y from the top of the page.
@@ -39,6 +57,7 @@ impl<'a> PageContent<'a> {
     ) -> PageContent<'a> {
         let mut content = PageContent {
             fonts,
+            streams: Vec::new(),
             operators: String::new(),
             opacities: BTreeSet::from([100]),
             links: Vec::new(),
@@ -48,6 +67,7 @@ impl<'a> PageContent<'a> {
             content.mark(mark, document);
         }
         content.footer(title, number, document.pages.len());
+        content.end_stream();
         content
     }
 
@@ -66,7 +86,20 @@ impl<'a> PageContent<'a> {
                 y,
                 scale,
                 drawing,
-            } => self.drawing(*x, *y, *scale, drawing),
+            } => self.scaled(*x, *y, *scale, |own| {
+                own.operators.push_str(&drawing.operators);
+                own.opacities.extend(&drawing.opacities);
+            }),
+            PlacedMark::DrawingStream {
+                x,
+                y,
+                scale,
+                drawing,
+            } => self.scaled(*x, *y, *scale, |own| {
+                own.end_stream();
+                own.streams.push(PageStream::Drawing(drawing.clone()));
+                own.opacities.extend(drawing.opacities());
+            }),
             PlacedMark::Link {
                 x,
                 y,
@@ -109,14 +142,21 @@ impl<'a> PageContent<'a> {
         self.text(right - width, y, style, text);
     }
 
-    fn drawing(&mut self, x: f32, y: f32, scale: f32, drawing: &Drawing) {
+    /// Draws in the scaled coordinates of a drawing, whose y points down.
+    fn scaled(&mut self, x: f32, y: f32, scale: f32, draw: impl FnOnce(&mut Self)) {
         let [x, y] = [x, HEIGHT - y].map(Number);
         // Four decimals: the scale of a drawing is multiplied by its width.
         // Writing into a String cannot fail.
         let _ = writeln!(self.operators, "q {scale:.4} 0 0 -{scale:.4} {x} {y} cm");
-        self.operators.push_str(&drawing.operators);
+        draw(self);
         self.operators.push_str("Q\n");
-        self.opacities.extend(&drawing.opacities);
+    }
+
+    /// Ends the stream of the operators so far.
+    fn end_stream(&mut self) {
+        let stream = compressed(self.operators.as_bytes());
+        self.streams.push(PageStream::Operators(stream));
+        self.operators.clear();
     }
 
     fn link(&mut self, [x, y, width, height]: [f32; 4], (page, top): (usize, f32)) {

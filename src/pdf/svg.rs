@@ -121,23 +121,27 @@ fn numbers(text: &str) -> impl Iterator<Item = f32> {
         .filter_map(|n| n.parse().ok())
 }
 
-/// Converts an `svg` element.
-pub fn drawing(svg: Node, fonts: &Fonts) -> Drawing {
+/// Width and height of an `svg` element in its own coordinates.
+pub fn size(svg: Node) -> [f32; 2] {
     let of = |name: &str| svg.attribute(name).and_then(|v| v.parse::<f32>().ok());
     let view: Vec<f32> = svg
         .attribute("viewBox")
         .map_or_else(Vec::new, |v| numbers(v).collect());
-    let [width, height] = match view[..] {
+    match view[..] {
         [_, _, width, height] => [width, height],
         _ => [of("width").unwrap_or(0.0), of("height").unwrap_or(0.0)],
-    };
+    }
+}
+
+/// Converts an `svg` element.
+pub fn drawing(svg: Node, fonts: &Fonts) -> Drawing {
     let mut reader = SvgReader {
         fonts,
         clips: BTreeMap::new(),
         out: String::new(),
         graphics_state: String::new(),
         opacities: BTreeSet::new(),
-        size: [width, height],
+        size: size(svg),
     };
     for clip in svg
         .descendants()
@@ -158,6 +162,7 @@ pub fn drawing(svg: Node, fonts: &Fonts) -> Drawing {
         anchor: 0.0,
     };
     reader.children(svg, &Style::of(svg, &style));
+    let [width, height] = reader.size;
     Drawing {
         width,
         height,

@@ -1,14 +1,11 @@
 //! The objects of the PDF file: catalog, fonts, pages with their links, outline.
 
-use std::io::Write as _;
-
-use flate2::Compression;
-use flate2::write::ZlibEncoder;
 use pdf_writer::types::{ActionType, AnnotationType, PageMode};
 use pdf_writer::writers::{Annotation, ExtGraphicsState, OutlineItem, Page, Resources};
 use pdf_writer::{Filter, Finish, Name, Pdf, Rect, Ref, TextStr};
 use rayon::prelude::*;
 
+use super::drawing_stream::compressed;
 use super::fonts::{Fonts, Weight};
 use super::page_content::{Link, PageContent};
 use super::pagination::{HEIGHT, Heading, PagedDocument, WIDTH};
@@ -32,16 +29,17 @@ pub fn write(fonts: &Fonts, title: &str, document: &PagedDocument) -> Vec<u8> {
     for weight in Weight::ALL {
         fonts.write(&mut pdf, weight, font_ref(weight), &compressed);
     }
-    let contents: Vec<(PageContent, Vec<u8>)> = (1..=document.pages.len())
+    let contents: Vec<PageContent> = (1..=document.pages.len())
         .into_par_iter()
-        .map(|number| {
-            let content = PageContent::new(fonts, title, document, number);
-            let stream = compressed(content.operators.as_bytes());
-            (content, stream)
-        })
+        .map(|number| PageContent::new(fonts, title, document, number))
         .collect();
-    for (number, (content, stream)) in (1..).zip(&contents) {
-        write_page(&mut pdf, number, content, stream);
+    // Streams are numbered after pages and outline.
+    let mut next = page_ref(document.pages.len() + 1).get() + to_i32(document.headings.len());
+    for (number, content) in (1..).zip(&contents) {
+        let first = next;
+        next += to_i32(content.streams.len());
+        let streams: Vec<Ref> = (first..next).map(Ref::new).collect();
+        write_page(&mut pdf, number, content, &streams);
     }
     write_outline(&mut pdf, &document.headings, document.pages.len());
     pdf.finish()
@@ -51,9 +49,9 @@ fn to_i32(n: usize) -> i32 {
     i32::try_from(n).unwrap_or(i32::MAX)
 }
 
-/// Reference of a page; the next object is its content.
+/// Reference of a page of a number from one.
 fn page_ref(page: usize) -> Ref {
-    Ref::new(FIRST_PAGE + 2 * to_i32(page.saturating_sub(1)))
+    Ref::new(FIRST_PAGE + to_i32(page.saturating_sub(1)))
 }
 
 fn font_ref(weight: Weight) -> Ref {
@@ -61,13 +59,6 @@ fn font_ref(weight: Weight) -> Ref {
         Weight::Regular => Ref::new(FIRST_FONT),
         Weight::Bold => Ref::new(FIRST_FONT + FONT_OBJECTS),
     }
-}
-
-fn compressed(bytes: &[u8]) -> Vec<u8> {
-    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::new(4));
-    // Writing into a Vec cannot fail.
-    let _ = encoder.write_all(bytes);
-    encoder.finish().unwrap_or_default()
 }
 
 fn write_catalog(pdf: &mut Pdf, title: &str, pages: usize) {
@@ -89,17 +80,17 @@ fn write_catalog(pdf: &mut Pdf, title: &str, pages: usize) {
         .kids((1..=pages).map(page_ref));
 }
 
-fn write_page(pdf: &mut Pdf, number: usize, content: &PageContent, stream: &[u8]) {
-    let id = page_ref(number);
-    let stream_id = Ref::new(id.get() + 1);
-    let mut page = pdf.page(id);
+fn write_page(pdf: &mut Pdf, number: usize, content: &PageContent, streams: &[Ref]) {
+    let mut page = pdf.page(page_ref(number));
     page.media_box(Rect::new(0.0, 0.0, WIDTH, HEIGHT))
         .parent(Ref::new(TREE))
-        .contents(stream_id);
+        .contents_array(streams.iter().copied());
     write_resources(&mut page.resources(), content);
     write_links(&mut page, &content.links);
     page.finish();
-    pdf.stream(stream_id, stream).filter(Filter::FlateDecode);
+    for (id, stream) in streams.iter().zip(&content.streams) {
+        pdf.stream(*id, stream.bytes()).filter(Filter::FlateDecode);
+    }
 }
 
 fn write_resources(resources: &mut Resources, content: &PageContent) {
@@ -143,7 +134,7 @@ fn write_links(page: &mut Page, links: &[Link]) {
 
 /// Writes the headings as a tree of two levels: chapters, and their sections folded.
 fn write_outline(pdf: &mut Pdf, headings: &[Heading], pages: usize) {
-    let first = FIRST_PAGE + 2 * to_i32(pages);
+    let first = page_ref(pages + 1).get();
     let id = |i: usize| Ref::new(first + to_i32(i));
     let chapters: Vec<usize> = (0..headings.len())
         .filter(|i| headings[*i].level == 0)

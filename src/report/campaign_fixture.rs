@@ -1,8 +1,9 @@
 //! Fixture of the report's tests: a small campaign with every kind of row.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
-use super::contents::{ConfiguredClass, Contents};
+use super::contents::{ConfiguredClass, Contents, HistoryFigure};
+use super::page::draw_history;
 use super::provenance::{Provenance, SourceFile};
 use crate::aero::Axis;
 use crate::error::{Problem, ProblemStage};
@@ -43,6 +44,7 @@ pub struct Campaign {
     pub events: Vec<EventRow>,
     pub problems: Vec<Problem>,
     pub pages: BTreeSet<String>,
+    pub history_figures: BTreeMap<String, HistoryFigure>,
     pub histories: Vec<History>,
     pub provenance: Provenance,
     pub order: Vec<String>,
@@ -79,6 +81,7 @@ impl Campaign {
             events: &self.events,
             problems: &self.problems,
             pages: &self.pages,
+            history_figures: &self.history_figures,
             histories: &self.histories,
             typical_alpha_deg: 30.0,
             provenance: &self.provenance,
@@ -411,9 +414,10 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
     }
     campaign.maneuvers.push(maneuver);
     campaign.pages.insert(maneuver_id.clone());
-    campaign
-        .histories
-        .push(history(&maneuver_id, class, alpha_deg));
+    let history = history(&maneuver_id, class, alpha_deg);
+    let figure = draw_history(&history, format!("h-{maneuver_id}"));
+    campaign.history_figures.insert(maneuver_id.clone(), figure);
+    campaign.histories.push(history);
 }
 
 fn history(maneuver_id: &str, class: &str, alpha_deg: f64) -> History {

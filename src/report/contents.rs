@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use serde::{Deserialize, Serialize};
+
 use super::provenance::Provenance;
 use crate::aero::Axis;
 use crate::error::Problem;
@@ -22,6 +24,14 @@ pub struct ConfiguredClass {
     pub name: String,
     pub title: String,
     pub axis: Axis,
+}
+
+/// Time history of a maneuver, drawn.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct HistoryFigure {
+    pub svg: String,
+    /// `true` if it shows samples that are excluded from the cost.
+    pub has_excluded: bool,
 }
 
 /// Input of the report stage.
@@ -61,7 +71,10 @@ pub struct Contents<'a> {
     pub problems: &'a [Problem],
     /// Identifiers of the maneuvers that get a page (see [`super::maneuvers_with_page`]).
     pub pages: &'a BTreeSet<String>,
-    /// Time histories of the maneuvers with a page, reduced by [`super::thinned`].
+    /// Time histories of the maneuvers with a page, drawn, by maneuver.
+    pub history_figures: &'a BTreeMap<String, HistoryFigure>,
+    /// Time histories of the maneuvers that represent a class ([`super::representatives`]), reduced by
+    /// [`super::thinned`].
     pub histories: &'a [History],
     /// Angle of attack nearest to which the representative maneuver of a class lies, deg.
     pub typical_alpha_deg: f64,

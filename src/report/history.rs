@@ -55,7 +55,7 @@ fn rounded_at(samples: &[usize], values: &[f64]) -> Vec<f64> {
 pub fn representatives<'a>(contents: &Contents<'a>) -> Vec<&'a History> {
     let chosen = page_selection::representatives(
         contents.maneuvers,
-        &page_selection::converged(contents.fits),
+        contents.fits,
         contents.typical_alpha_deg,
     );
     let by_class = group_by(contents.histories, |h| &h.class);

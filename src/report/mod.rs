@@ -25,13 +25,14 @@ mod tests;
 use minijinja::value::Serde;
 use minijinja::{AutoEscape, Environment};
 
-pub use contents::{ConfiguredClass, Contents};
+pub use contents::{ConfiguredClass, Contents, HistoryFigure};
 pub use history::thinned;
 pub use notation::{
     angle, count, fixed, number, power_of_ten, symbol, unit, well_formed, without_unit,
 };
 use page::Page;
-pub use page_selection::maneuvers_with_page;
+pub use page::draw_history;
+pub use page_selection::{maneuvers_with_page, representatives};
 pub use provenance::{Provenance, SourceFile};
 pub use recording_page::recording_page;
 

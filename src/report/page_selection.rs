@@ -32,7 +32,7 @@ pub fn maneuvers_with_page(
         .chain(changes.estimates.iter().map(|moved| moved.of.as_str()))
         .collect();
     let all: Vec<&str> = maneuvers.iter().map(|m| m.maneuver_id.as_str()).collect();
-    let mut selected: BTreeSet<&str> = representatives(maneuvers, &converged, typical_alpha_deg);
+    let mut selected: BTreeSet<&str> = representatives(maneuvers, fits, typical_alpha_deg);
     let mut fill = |is_candidate: &dyn Fn(&str) -> bool, most: usize| {
         let candidates = all.iter().copied().filter(|id| is_candidate(id));
         add_evenly(&mut selected, candidates, most);
@@ -44,7 +44,7 @@ pub fn maneuvers_with_page(
 }
 
 /// Maneuvers whose fit converged.
-pub(super) fn converged(fits: &[FitRow]) -> BTreeSet<&str> {
+fn converged(fits: &[FitRow]) -> BTreeSet<&str> {
     fits.iter()
         .filter(|f| f.outcome == Outcome::Converged)
         .map(|f| f.maneuver_id.as_str())
@@ -53,11 +53,13 @@ pub(super) fn converged(fits: &[FitRow]) -> BTreeSet<&str> {
 
 /// Representative of each class: its converged maneuver nearest to an angle of attack. Ties go to
 /// the alphabetically first identifier.
-pub(super) fn representatives<'a>(
+#[must_use]
+pub fn representatives<'a>(
     maneuvers: &'a [Maneuver],
-    converged: &BTreeSet<&str>,
+    fits: &[FitRow],
     alpha_deg: f64,
 ) -> BTreeSet<&'a str> {
+    let converged = converged(fits);
     let distance = |m: &Maneuver| (m.alpha_deg - alpha_deg).abs();
     let mut nearest: BTreeMap<&str, &Maneuver> = BTreeMap::new();
     for maneuver in maneuvers

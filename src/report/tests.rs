@@ -4,6 +4,8 @@ use std::collections::BTreeSet;
 
 use super::campaign_fixture::{Campaign, campaign, problem};
 use super::*;
+use crate::drawing_cache::DrawingCache;
+use crate::pdf;
 use crate::tables::Outcome;
 
 fn render(campaign: &Campaign) -> String {
@@ -270,8 +272,13 @@ fn numbers_that_are_not_finite_do_not_break_the_page() {
 #[test]
 fn the_same_campaign_is_the_same_bytes() {
     assert_eq!(render(&campaign()), render(&campaign()));
-    let printed = || crate::pdf::pdf(&render(&campaign())).expect("a PDF");
-    assert!(printed() == printed());
+    let printed = |cache: &DrawingCache| pdf::pdf(&render(&campaign()), cache).expect("a PDF");
+    let cache = DrawingCache::default();
+    let first = printed(&cache);
+    assert!(first == printed(&DrawingCache::default()));
+    let known = DrawingCache::of_last_report(&cache.to_bytes());
+    assert!(first == printed(&known));
+    assert!(known.to_bytes() == cache.to_bytes());
 }
 
 #[test]

@@ -19,6 +19,7 @@ use super::input_digests::InputDigests;
 use super::lock::Lock;
 use super::regular;
 use super::shared::Shared;
+use crate::drawing_cache::DrawingCache;
 use crate::error::{Error, Result};
 
 /// An opened store, with the artefacts that this run requires and has made.
@@ -44,6 +45,11 @@ pub struct Store {
 
 /// File of the remembered digests of input files.
 const CONTENTS: &str = "contents.json";
+
+/// File of the last report's drawings, and the name under which it is sealed: another program makes all
+/// of them anew.
+const DRAWINGS: &str = "drawings.bin";
+const DRAWINGS_SEALED_AS: &str = concat!("drawings ", env!("HARVEST_SOURCE"));
 
 /// File that lists the folders of reports published from this store.
 const REPORTS: &str = "serves.json";
@@ -140,6 +146,25 @@ impl Store {
             shared.put(CONTENTS, objects)?;
         }
         contents.save()
+    }
+
+    /// Drawings of the last report from this store; none of a damaged file.
+    #[must_use]
+    pub fn drawings(&self) -> DrawingCache {
+        let bytes = regular::read(&self.folder.join(DRAWINGS)).unwrap_or_default();
+        let drawings = unsealed(DRAWINGS_SEALED_AS, &bytes);
+        drawings
+            .map(DrawingCache::of_last_report)
+            .unwrap_or_default()
+    }
+
+    /// Keeps the drawings of a report for the next one.
+    ///
+    /// # Errors
+    /// [`Error::Io`] naming the file.
+    pub fn keep_drawings(&self, cache: &DrawingCache) -> Result<()> {
+        let bytes = sealed(DRAWINGS_SEALED_AS, cache.to_bytes());
+        atomic::place(&self.folder.join(DRAWINGS), &bytes)
     }
 
     #[must_use]
@@ -403,6 +428,26 @@ mod tests {
         assert!(matches!(second, Error::Busy { .. }), "{second}");
         drop(first);
         assert!(Store::open(folder.path(), Duration::ZERO).is_ok());
+    }
+
+    #[test]
+    fn drawings_are_kept_and_damaged_ones_are_made_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path(), Duration::ZERO).unwrap();
+        let cache = store.drawings();
+        cache.get_or_draw("one", || Some(b"drawn".to_vec()));
+        store.keep_drawings(&cache).unwrap();
+        let known = store.drawings();
+        assert!(known.get_or_draw("one", || unreachable!()).is_some());
+        let path = folder.path().join(DRAWINGS);
+        let whole = std::fs::read(&path).unwrap();
+        for byte in 0..whole.len() {
+            let mut damaged = whole.clone();
+            damaged[byte] ^= 1;
+            std::fs::write(&path, damaged).unwrap();
+            let drawn = store.drawings().get_or_draw("one", || None);
+            assert_eq!(drawn, None, "byte {byte}");
+        }
     }
 
     #[test]

@@ -616,6 +616,27 @@ fn after_damage_to_any_file_the_next_run_ends_with_the_same_bytes() {
 }
 
 #[test]
+fn a_report_has_the_same_bytes_with_the_drawings_of_the_last_one_and_without() {
+    // The second night's report knows the drawings of the first.
+    let campaign = two_published_nights();
+    let expected = campaign.bytes("reports");
+    let drawings = campaign.path("store/drawings.bin");
+    let kept = fs::read(&drawings).unwrap();
+    for are_known in [false, true] {
+        if !are_known {
+            fs::remove_file(&drawings).unwrap();
+        }
+        for page in ["report.html", "report.pdf"] {
+            fs::remove_file(campaign.path("reports/current").join(page)).unwrap();
+        }
+        campaign.finishes("run");
+        let differing = differing(&campaign.bytes("reports"), &expected);
+        assert!(differing.is_empty(), "{are_known}: {differing:?}");
+        assert!(fs::read(&drawings).unwrap() == kept, "{are_known}");
+    }
+}
+
+#[test]
 fn gc_lists_then_removes_only_what_no_night_needs() {
     let campaign = two_published_nights();
     assert!(

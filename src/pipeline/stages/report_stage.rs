@@ -1,6 +1,11 @@
 //! The report of the campaign: the page and its printed form.
 
+use std::collections::{BTreeMap, BTreeSet};
+
+use rayon::prelude::*;
+
 use crate::config::Config;
+use crate::drawing_cache::DrawingCache;
 use crate::error::{Error, Result};
 use crate::lineage::Changes;
 use crate::maneuver::Class;
@@ -8,7 +13,8 @@ use crate::pdf;
 use crate::pipeline::campaign::Campaign;
 use crate::pipeline::conductor::{Conductor, step_versions};
 use crate::report;
-use crate::store::{ArtefactName, Kind};
+use crate::report::HistoryFigure;
+use crate::store::{ArtefactName, Kind, Store};
 use crate::tables::{EstimateRow, History};
 
 /// Published file of the page.
@@ -43,16 +49,14 @@ pub fn make_report(
         alpha_deg,
         config.report.maneuver_pages,
     );
-    let with_page = campaign
-        .maneuvers
-        .iter()
-        .zip(&campaign.estimate_names)
-        .filter(|(maneuver, _)| pages.contains(&maneuver.maneuver_id));
-    let history = |name: &ArtefactName| {
-        let name = name.sibling(Kind::History);
-        conductor.runner.store.load::<Option<History>>(&name)?
-    };
-    let histories: Vec<History> = with_page.filter_map(|(_, name)| history(name)).collect();
+    let store = &conductor.runner.store;
+    let drawings = store.drawings();
+    let history_figures = history_figures(store, &drawings, campaign, &pages);
+    let representatives = report::representatives(&campaign.maneuvers, &campaign.fits, alpha_deg);
+    let represent = estimates_of(campaign, |id| representatives.contains(id));
+    let histories: Vec<History> = represent
+        .filter_map(|(_, name)| history(store, name))
+        .collect();
     let classes = config.classes.iter().map(configured_class);
     let classes: Vec<report::ConfiguredClass> = classes.collect();
     let estimates: Vec<EstimateRow> = campaign.estimates_and_sums().cloned().collect();
@@ -83,6 +87,7 @@ pub fn make_report(
         events: &campaign.events,
         problems: &campaign.problems,
         pages: &pages,
+        history_figures: &history_figures,
         histories: &histories,
         typical_alpha_deg: alpha_deg,
         provenance: &provenance(conductor),
@@ -92,8 +97,44 @@ pub fn make_report(
     };
     let html = report::html(&contents, config.template.as_deref())
         .map_err(|e| Error::store(&config.reports.join(PAGE), &e))?;
-    let pdf = pdf::pdf(&html);
+    let pdf = pdf::pdf(&html, &drawings);
+    store.keep_drawings(&drawings)?;
     Ok(Report { html, pdf })
+}
+
+/// Chosen maneuvers with the names of their estimates.
+fn estimates_of(
+    campaign: &Campaign,
+    is_chosen: impl Fn(&str) -> bool,
+) -> impl Iterator<Item = (&str, &ArtefactName)> {
+    let names = campaign.estimate_names.iter();
+    let ids = campaign.maneuvers.iter().map(|m| m.maneuver_id.as_str());
+    ids.zip(names).filter(move |(id, _)| is_chosen(id))
+}
+
+/// Time history beside an estimate; `None` if no response was computed.
+fn history(store: &Store, estimate: &ArtefactName) -> Option<History> {
+    let name = estimate.sibling(Kind::History);
+    store.load::<Option<History>>(&name)?
+}
+
+/// Time histories of the maneuvers with a page, drawn. The name of an estimate decides its history.
+fn history_figures(
+    store: &Store,
+    drawings: &DrawingCache,
+    campaign: &Campaign,
+    pages: &BTreeSet<String>,
+) -> BTreeMap<String, HistoryFigure> {
+    let figure = |(id, name): (&str, &ArtefactName)| {
+        let drawn = drawings.get_or_draw(name.as_str(), || {
+            let svg_id = format!("h{}", name.fingerprint());
+            let figure = report::draw_history(&history(store, name)?, svg_id);
+            serde_json::to_vec(&figure).ok()
+        });
+        Some((id.to_owned(), serde_json::from_slice(&drawn?).ok()?))
+    };
+    let with_page: Vec<_> = estimates_of(campaign, |id| pages.contains(id)).collect();
+    with_page.into_par_iter().filter_map(figure).collect()
 }
 
 fn configured_class(class: &Class) -> report::ConfiguredClass {

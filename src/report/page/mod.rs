@@ -29,6 +29,7 @@ use derivatives::correlation_triangle::CorrelationTriangle;
 use derivatives::derivative_page::DerivativeGroup;
 use derivatives::derivative_results::DerivativeResults;
 use derivatives::verdict_table::VerdictGroup;
+pub use maneuvers::history_strips::draw_history;
 use maneuvers::maneuver_page::ManeuverPage;
 use proof_of_match::match_section::MatchSection;
 use qualities_section::QualitiesSection;

@@ -1,6 +1,7 @@
 //! Time history of a maneuver as strips: inputs, and outputs measured and computed with residuals,
 //! as in the paper's Figures 4 and 12.
 
+use crate::report::contents::HistoryFigure;
 use crate::report::figure::scale::{Scale, extent};
 use crate::report::figure::strip::{Strip, StripLine};
 use crate::report::figure::strip_figure::{self, StripFigure};
@@ -20,9 +21,9 @@ const SMALLEST_SHARE: f64 = 0.1;
 /// Largest number of inputs: more would make the figure longer than a page has room for.
 const MOST_INPUTS: usize = 9;
 
-/// Draws a maneuver: outputs with residuals, then inputs, in two columns.
+/// Draws a maneuver: outputs with residuals, then inputs, in two columns. `id` is unique in the page.
 #[must_use]
-pub fn draw(history: &History, id: String) -> String {
+pub fn draw_history(history: &History, id: String) -> HistoryFigure {
     let outputs = history.outputs.iter();
     let outputs = outputs.map(|output| output_strips(history, output).to_vec());
     let mut inputs = inputs(history);
@@ -30,14 +31,18 @@ pub fn draw(history: &History, id: String) -> String {
     let description = alternative_text(history, &inputs);
     let groups = outputs.chain(inputs.into_iter().map(|input| vec![input]));
     let columns = strip_figure::in_two_columns(groups.collect());
-    strip_figure::draw(&StripFigure {
+    let svg = strip_figure::draw(&StripFigure {
         id,
         title: format!("Time history of {}", history.maneuver_id),
         description,
         width: WIDTH,
         time: time_scale(history),
         columns,
-    })
+    });
+    HistoryFigure {
+        svg,
+        has_excluded: history.outputs.iter().any(|o| o.marked.contains(&true)),
+    }
 }
 
 fn alternative_text(history: &History, inputs: &[Strip]) -> String {

@@ -5,17 +5,16 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::history_strips;
 use crate::error::Problem;
 use crate::maneuver::{Maneuver, Status};
 use crate::proof_of_match::Matched;
-use crate::report::contents::{Contents, group_by};
+use crate::report::contents::{Contents, HistoryFigure, group_by};
 use crate::report::figure::legend::{self, LegendView};
 use crate::report::notation::{self, DASH, Digits, angle, count, fixed, number, outcome_in_words};
 use crate::report::page::classes::class_markers::ClassMarkers;
 use crate::report::page::proof_of_match::match_strips;
 use crate::report::table_view::TableView;
-use crate::tables::{AgreementRow, EstimateRow, FitRow, History, MatchVerdict};
+use crate::tables::{AgreementRow, EstimateRow, FitRow, MatchVerdict};
 
 /// Page of one maneuver.
 #[derive(Clone, Debug, Serialize)]
@@ -62,7 +61,7 @@ pub fn pages(contents: &Contents, markers: &ClassMarkers) -> Vec<ManeuverPage> {
     let rows = RowsByManeuver {
         markers,
         fits: contents.fits_by_maneuver(),
-        histories: group_by(contents.histories, |h| &h.maneuver_id),
+        history_figures: contents.history_figures,
         estimates: group_by(contents.estimates, |e| &e.maneuver_id),
         predictions: group_by(contents.predictions, |p| &p.maneuver_id),
         problems: group_by(contents.problems, |p| &p.place),
@@ -79,7 +78,7 @@ pub fn pages(contents: &Contents, markers: &ClassMarkers) -> Vec<ManeuverPage> {
 struct RowsByManeuver<'a> {
     markers: &'a ClassMarkers<'a>,
     fits: BTreeMap<&'a str, &'a FitRow>,
-    histories: BTreeMap<&'a str, Vec<&'a History>>,
+    history_figures: &'a BTreeMap<String, HistoryFigure>,
     estimates: BTreeMap<&'a str, Vec<&'a EstimateRow>>,
     predictions: BTreeMap<&'a str, Vec<&'a AgreementRow>>,
     problems: BTreeMap<&'a str, Vec<&'a Problem>>,
@@ -89,7 +88,7 @@ struct RowsByManeuver<'a> {
 impl RowsByManeuver<'_> {
     fn page(&self, maneuver: &Maneuver, number: usize) -> ManeuverPage {
         let id = maneuver.maneuver_id.as_str();
-        let history = self.histories.get(id).and_then(|h| h.first());
+        let figure = self.history_figures.get(id);
         let matched = self.matched.get(id).and_then(|m| m.first()).copied();
         let flown_again = matched.and_then(|m| Some((m, m.history.as_ref()?)));
         let drawn = flown_again.map(|(matched, history)| {
@@ -107,12 +106,9 @@ impl RowsByManeuver<'_> {
             marker: self.markers.key(&maneuver.class),
             token: self.markers.token(&maneuver.class),
             facts,
-            svg: history.map_or_else(String::new, |h| {
-                history_strips::draw(h, format!("h{number}"))
-            }),
-            legend: history.map_or_else(Vec::new, |h| {
-                legend::time_history(h.outputs.iter().any(|o| o.marked.contains(&true)))
-            }),
+            svg: figure.map_or_else(String::new, |figure| figure.svg.clone()),
+            legend: figure
+                .map_or_else(Vec::new, |figure| legend::time_history(figure.has_excluded)),
             match_legend: drawn.as_ref().map_or_else(Vec::new, |drawn| {
                 legend::flown_again(drawn.has_outside, drawn.has_excused)
             }),
@@ -298,7 +294,7 @@ mod tests {
             place: "1-OLON-10".into(),
             ..problem("it did not settle")
         });
-        campaign.histories.remove(1);
+        campaign.history_figures.remove("1-OLON-20");
         let contents = campaign.contents();
         let pages = made(&contents);
         assert_eq!(pages.len(), campaign.maneuvers.len());
