@@ -15,7 +15,7 @@ use crate::tables::FitRow;
 /// 1. the representative of each class ([`representatives`]),
 /// 2. those that changed since the previous night, up to half of `most`,
 /// 3. those whose fit failed,
-/// 4. an even selection of the others.
+/// 4. an even selection of the others, of which a further flight changes few.
 #[must_use]
 pub fn maneuvers_with_page(
     maneuvers: &[Maneuver],
@@ -34,7 +34,8 @@ pub fn maneuvers_with_page(
     let all: Vec<&str> = maneuvers.iter().map(|m| m.maneuver_id.as_str()).collect();
     let mut selected: BTreeSet<&str> = representatives(maneuvers, fits, typical_alpha_deg);
     let mut fill = |is_candidate: &dyn Fn(&str) -> bool, most: usize| {
-        let candidates = all.iter().copied().filter(|id| is_candidate(id));
+        let candidates = all.iter().copied().enumerate();
+        let candidates = candidates.filter(|(_, id)| is_candidate(id));
         add_evenly(&mut selected, candidates, most);
     };
     fill(&|id| changed.contains(id), most / 2);
@@ -81,15 +82,25 @@ pub fn representatives<'a>(
         .collect()
 }
 
-/// Adds candidates until `most` are selected, at equal distances if there are too many.
+/// Golden ratio's inverse, in units of 2⁻⁶⁴.
+const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// Adds candidates, with their numbers in the campaign, until `most` are selected.
+///
+/// If there are too many, those are selected whose number times the golden ratio has the smallest fractions.
+/// Such numbers are spread evenly, and further maneuvers replace few of them.
 fn add_evenly<'a>(
     selected: &mut BTreeSet<&'a str>,
-    candidates: impl Iterator<Item = &'a str>,
+    candidates: impl Iterator<Item = (usize, &'a str)>,
     most: usize,
 ) {
-    let left: Vec<&str> = candidates.filter(|id| !selected.contains(id)).collect();
-    let room = most.saturating_sub(selected.len()).min(left.len());
-    selected.extend((0..room).filter_map(|k| left.get(k * left.len() / room.max(1))));
+    let mut left: Vec<(u64, &str)> = candidates
+        .filter(|(_, id)| !selected.contains(id))
+        .map(|(number, id)| (GOLDEN.wrapping_mul(number as u64), id))
+        .collect();
+    left.sort_unstable();
+    let room = most.saturating_sub(selected.len());
+    selected.extend(left.into_iter().take(room).map(|(_, id)| id));
 }
 
 #[cfg(test)]
@@ -119,6 +130,49 @@ mod tests {
             campaign.maneuvers.len(),
         );
         assert_eq!(pages.len(), campaign.maneuvers.len());
+    }
+
+    /// Numbers of the maneuvers that are selected from so many.
+    fn selected(maneuvers: usize, most: usize) -> BTreeSet<usize> {
+        let ids: Vec<String> = (0..maneuvers).map(|number| number.to_string()).collect();
+        let mut selected = BTreeSet::new();
+        add_evenly(
+            &mut selected,
+            ids.iter().map(String::as_str).enumerate(),
+            most,
+        );
+        selected
+            .into_iter()
+            .filter_map(|id| id.parse().ok())
+            .collect()
+    }
+
+    #[test]
+    fn pages_are_spread_evenly_over_flights_and_over_the_cards_of_a_flight() {
+        for (maneuvers, most) in [(530, 300), (530, 265), (2000, 100)] {
+            let chosen = selected(maneuvers, most);
+            assert_eq!(chosen.len(), most);
+            for parts in 2..20 {
+                let share = |is_of: &dyn Fn(usize) -> bool| {
+                    let all = (0..maneuvers).filter(|number| is_of(*number)).count();
+                    let of = chosen.iter().filter(|number| is_of(**number)).count();
+                    of as f64 - (all * most) as f64 / maneuvers as f64
+                };
+                for k in 0..parts {
+                    let consecutive = share(&|number| number * parts / maneuvers == k);
+                    assert!(consecutive.abs() < 3.0, "{parts} flights: {consecutive}");
+                    let card = share(&|number| number % parts == k);
+                    assert!(card.abs() < 9.0, "one of {parts} cards: {card}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_further_flight_changes_few_pages() {
+        let (before, after) = (selected(521, 300), selected(530, 300));
+        assert!(before.intersection(&after).count() >= 294);
+        assert_eq!(selected(300, 300).len(), 300);
     }
 
     #[test]
