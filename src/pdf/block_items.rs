@@ -27,6 +27,15 @@ impl BlockItems {
         }
     }
 
+    /// Items of neighbours one after the other.
+    pub fn in_order(parts: Vec<BlockItems>) -> BlockItems {
+        let mut all = BlockItems::default();
+        for part in parts {
+            all.add(part);
+        }
+        all
+    }
+
     /// The beginning of an element with this id, if it has one.
     pub fn with_anchor(id: Option<&str>) -> BlockItems {
         BlockItems {

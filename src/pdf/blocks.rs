@@ -75,21 +75,38 @@ impl<'a> Blocks<'a> {
 
     /// Items of an element's children, in a column of a width (pt).
     pub fn children(&self, node: Node, width: f32, style: Style) -> BlockItems {
-        let made: Vec<BlockItems> = pieces(node)
-            .into_par_iter()
-            .map(|piece| match piece {
-                Piece::Text(nodes) => {
-                    let reader = InlineReader::new(self.drawings.fonts);
-                    BlockItems::of(self.text(reader, nodes, width, style))
-                }
-                Piece::Block(block) => self.block(block, width, style),
-            })
-            .collect();
-        let mut all = BlockItems::default();
-        for part in made {
-            all.add(part);
+        let pieces = pieces(node);
+        let made = pieces.par_iter();
+        BlockItems::in_order(made.map(|piece| self.piece(piece, width, style)).collect())
+    }
+
+    /// Items of an element's children, with smaller drawings where all then fit on one page.
+    fn children_on_one_page(&self, node: Node, width: f32, style: Style) -> BlockItems {
+        let pieces = pieces(node);
+        let made = pieces.par_iter();
+        let mut made: Vec<BlockItems> = made.map(|piece| self.piece(piece, width, style)).collect();
+        let drawn: f32 = made.iter().map(|part| part.drawn_height).sum();
+        let items: Vec<&Item> = made.iter().flat_map(|part| &part.items).collect();
+        let excess = height_on_page(&items) - self.page_height;
+        let shrinking = self.shrinking * (drawn - excess) / drawn.max(1.0);
+        if excess > 0.0 && shrinking >= LEAST_SHRINKING {
+            let smaller = Blocks { shrinking, ..*self };
+            let parts = pieces.iter().zip(&mut made);
+            for (piece, part) in parts.filter(|(_, part)| part.drawn_height > 0.0) {
+                *part = smaller.piece(piece, width, style);
+            }
         }
-        all
+        BlockItems::in_order(made)
+    }
+
+    fn piece(&self, piece: &Piece, width: f32, style: Style) -> BlockItems {
+        match piece {
+            Piece::Text(nodes) => {
+                let reader = InlineReader::new(self.drawings.fonts);
+                BlockItems::of(self.text(reader, nodes.iter().copied(), width, style))
+            }
+            Piece::Block(block) => self.block(*block, width, style),
+        }
     }
 
     /// Lines of running text.
@@ -123,7 +140,7 @@ impl<'a> Blocks<'a> {
             });
         } else {
             let (element, space_after) = if has_class(node, "one-page") {
-                self.on_one_page(node, width, style)
+                (self.children_on_one_page(node, width, style), 0.0)
             } else {
                 self.element(node, width, style)
             };
@@ -131,18 +148,6 @@ impl<'a> Blocks<'a> {
             made.items.push(Item::room(space_after));
         }
         made
-    }
-
-    /// Items of an element, with smaller drawings where it then fits on one page.
-    fn on_one_page(&self, node: Node, width: f32, style: Style) -> (BlockItems, f32) {
-        let made = self.element(node, width, style);
-        let drawn = made.0.drawn_height;
-        let excess = height_on_page(&made.0.items) - self.page_height;
-        let shrinking = self.shrinking * (drawn - excess) / drawn.max(1.0);
-        if excess <= 0.0 || shrinking < LEAST_SHRINKING {
-            return made;
-        }
-        Blocks { shrinking, ..*self }.element(node, width, style)
     }
 
     /// Items of an element, and the space after it (pt).
@@ -290,8 +295,8 @@ impl<'a> Blocks<'a> {
 }
 
 /// Height of items that begin a page: without empty space before the first and after the last.
-fn height_on_page(items: &[Item]) -> f32 {
-    let is_set = |item: &Item| !item.is_room;
+fn height_on_page(items: &[&Item]) -> f32 {
+    let is_set = |item: &&Item| !item.is_room;
     let first = items.iter().position(is_set).unwrap_or(0);
     let end = items.iter().rposition(is_set).map_or(0, |last| last + 1);
     let set = items.get(first..end).unwrap_or(&[]);
@@ -345,7 +350,8 @@ mod tests {
                 .iter()
                 .any(|m| matches!(m, PlacedMark::DrawingStream { .. }))
         });
-        (drawing.unwrap().height, height_on_page(&items))
+        let all: Vec<&Item> = items.iter().collect();
+        (drawing.unwrap().height, height_on_page(&all))
     }
 
     #[test]

@@ -19,7 +19,7 @@
 //! | class | effect |
 //! |---|---|
 //! | `new-page` | begins a page |
-//! | `one-page` | its drawings shrink, by 30 % at most, where it then fits on one page |
+//! | `one-page` (`div`, `section`) | its drawings shrink, by 30 % at most, where it then fits on one page |
 //! | `screen` | is omitted |
 //! | `note` (`p`), `small` (`div`) | small type |
 //! | `pairs` (`div`) | children two by two |
