@@ -179,11 +179,9 @@ fn series(column: &Column) -> Series {
     let name = column.name.as_str().into();
     match &column.cells {
         Cells::Text(cells) => {
-            let texts = cells.iter().map(|text| {
-                let text = visible_text::of((*text)?);
-                Some(no_formula(&text).into_owned())
-            });
-            Series::new(name, texts.collect::<Vec<Option<String>>>())
+            let written = |text| no_formula(visible_text::of(text));
+            let texts = cells.iter().map(|text| text.map(written));
+            Series::new(name, texts.collect::<Vec<Option<Cow<str>>>>())
         }
         Cells::Number(cells) => Series::new(name, cells),
         Cells::Whole(cells) => Series::new(name, cells),
@@ -192,11 +190,11 @@ fn series(column: &Column) -> Series {
 
 /// Text with an apostrophe before it if a spreadsheet would take it for a formula. A single
 /// character, such as the unit `-`, is never one.
-fn no_formula(text: &str) -> Cow<'_, str> {
+fn no_formula(text: Cow<'_, str>) -> Cow<'_, str> {
     if text.len() > 1 && text.starts_with(['=', '+', '-', '@', '\t', '\r']) {
         format!("'{text}").into()
     } else {
-        text.into()
+        text
     }
 }
 
@@ -263,7 +261,7 @@ mod tests {
             ("-", "-"),
             ("", ""),
         ] {
-            assert_eq!(no_formula(text), written);
+            assert_eq!(no_formula(text.into()), written);
         }
         let folder = tempfile::tempdir().unwrap();
         let row = CheckRow {

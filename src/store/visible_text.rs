@@ -5,8 +5,10 @@ use std::borrow::Cow;
 /// Text with such characters replaced by underscores. Line breaks, which some messages have, are
 /// kept.
 pub fn of(text: &str) -> Cow<'_, str> {
+    let is_plain = |byte: u8| matches!(byte, b' '..=b'~' | b'\n');
     let deceives = |c: char| c != '\n' && is_invisible(c);
-    if text.contains(deceives) {
+    // Most texts are plain; they are told from others without decoding.
+    if !text.bytes().all(is_plain) && text.contains(deceives) {
         let replaced = text.chars().map(|c| if deceives(c) { '_' } else { c });
         replaced.collect::<String>().into()
     } else {
