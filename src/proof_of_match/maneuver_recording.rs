@@ -85,7 +85,7 @@ impl ManeuverRecording {
             signals.iter().copied(),
             mass,
         )?;
-        let motions: Vec<Motion> = window.motion(aircraft).points().collect();
+        let motion = window.motion(aircraft);
         let measured = measured(record, range.clone());
         let trim_samples = trim_samples(record, maneuver, samples, longest_trim_s);
         Ok(ManeuverRecording {
@@ -93,15 +93,10 @@ impl ManeuverRecording {
             start_s: record.time_s(first),
             samples,
             trim_samples,
-            inputs: motions.iter().map(inputs).collect(),
+            inputs: motion.points().map(|point| inputs(&point)).collect(),
             signals: by_point(&window, &signals),
             width: signals.len(),
-            motions: motions
-                .iter()
-                .step_by(2)
-                .take(trim_samples)
-                .copied()
-                .collect(),
+            motions: (0..trim_samples).map(|k| motion.at(2 * k)).collect(),
             altitude_ft: window
                 .signal(crate::flight::signal::ALTITUDE)
                 .first()
