@@ -25,14 +25,21 @@ impl DrawingStreams<'_> {
     /// Stream of an `svg` element.
     pub fn of(&self, svg: Node) -> DrawingStream {
         let text = svg.document().input_text().get(svg.range());
-        let mut key = blake3::Hasher::new();
-        key.update(self.declarations.as_bytes());
-        key.update(text.unwrap_or_default().as_bytes());
-        let key = key.finalize().to_hex();
-        let bytes = self.cache.get_or_draw(&key, || Some(self.converted(svg)));
+        let drawn = text.and_then(|text| {
+            let key = self.key(text);
+            self.cache.get_or_draw(&key, || Some(self.converted(svg)))
+        });
         DrawingStream {
-            bytes: bytes.unwrap_or_default(),
+            bytes: drawn.unwrap_or_else(|| Arc::new(self.converted(svg))),
         }
+    }
+
+    /// Key of the drawing of an element's text.
+    fn key(&self, text: &str) -> String {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(self.declarations.as_bytes());
+        hasher.update(text.as_bytes());
+        hasher.finalize().to_hex().to_string()
     }
 
     fn converted(&self, svg: Node) -> Vec<u8> {
@@ -86,9 +93,14 @@ mod tests {
 
     use super::*;
 
-    /// Stream of the drawing of a page after some declarations.
-    fn stream(cache: &DrawingCache, declarations: &str, drawing: &str) -> DrawingStream {
-        let page = format!("<p>{drawing}</p>");
+    const DRAWING: &str =
+        r#"<svg viewBox="0 0 9 9"><rect opacity=".5" width="1" height="2"/></svg>"#;
+    const LIGHTER: &str =
+        r#"<svg viewBox="0 0 9 9"><rect opacity=".2" width="1" height="2"/></svg>"#;
+
+    /// Streams of the drawings of a page after some declarations.
+    fn streams(cache: &DrawingCache, declarations: &str, page: &str) -> Vec<DrawingStream> {
+        let page = format!("{page}</p>");
         let xml = roxmltree::Document::parse(&page).unwrap();
         let fonts = Fonts::load().unwrap();
         let streams = DrawingStreams {
@@ -96,31 +108,38 @@ mod tests {
             cache,
             declarations,
         };
-        streams.of(xml.root_element().first_element_child().unwrap())
+        let drawings = xml.root_element().children().filter(Node::is_element);
+        drawings.map(|svg| streams.of(svg)).collect()
     }
-
-    const DRAWING: &str =
-        r#"<svg viewBox="0 0 9 9"><rect opacity=".5" width="1" height="2"/></svg>"#;
 
     #[test]
     fn a_drawing_is_its_opacities_and_its_operators() {
-        let stream = stream(&DrawingCache::default(), "", DRAWING);
+        let streams = streams(&DrawingCache::default(), "", &format!("<p>{DRAWING}"));
         let mut operators = String::new();
-        let mut decoder = flate2::read::ZlibDecoder::new(stream.stream());
+        let mut decoder = flate2::read::ZlibDecoder::new(streams[0].stream());
         decoder.read_to_string(&mut operators).unwrap();
-        assert_eq!(stream.opacities(), [50]);
+        assert_eq!(streams[0].opacities(), [50]);
         assert_eq!(operators, "/A50 gs\n0 0 0 rg\n0 0 1 2 re f\n");
     }
 
     #[test]
-    fn a_drawing_is_converted_again_if_it_or_the_declarations_changed() {
+    fn each_drawing_of_a_page_is_its_own() {
+        // After a byte order mark, and letters of several bytes.
+        for begin in ["<p>", "\u{feff}<p>90°"] {
+            let page = format!("{begin}{DRAWING}{LIGHTER}");
+            let streams = streams(&DrawingCache::default(), "", &page);
+            let opacities = streams.iter().map(DrawingStream::opacities);
+            assert_eq!(opacities.collect::<Vec<_>>(), [[50], [20]]);
+        }
+    }
+
+    #[test]
+    fn a_drawing_is_converted_once_unless_declarations_change() {
         let cache = DrawingCache::default();
-        let first = stream(&cache, "", DRAWING);
-        let again = stream(&cache, "", DRAWING);
-        assert!(Arc::ptr_eq(&first.bytes, &again.bytes));
-        let declared = stream(&cache, "<!DOCTYPE p>", DRAWING);
-        assert!(!Arc::ptr_eq(&first.bytes, &declared.bytes));
-        let changed = stream(&cache, "", &DRAWING.replace(".5", ".6"));
-        assert_eq!(changed.opacities(), [60]);
+        let page = format!("<p>{DRAWING}");
+        let made = |declarations| streams(&cache, declarations, &page).remove(0).bytes;
+        let first = made("");
+        assert!(Arc::ptr_eq(&first, &made("")));
+        assert!(!Arc::ptr_eq(&first, &made("<!DOCTYPE p>")));
     }
 }
