@@ -1,6 +1,7 @@
 //! Fixture of the report's tests: a small campaign with every kind of row.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::OnceLock;
 
 use super::contents::{ConfiguredClass, Contents, HistoryFigure};
 use super::page::draw_history;
@@ -44,8 +45,9 @@ pub struct Campaign {
     pub events: Vec<EventRow>,
     pub problems: Vec<Problem>,
     pub pages: BTreeSet<String>,
-    pub history_figures: BTreeMap<String, HistoryFigure>,
     pub histories: Vec<History>,
+    /// The histories drawn, as they are when the contents are first asked for.
+    pub history_figures: OnceLock<BTreeMap<String, HistoryFigure>>,
     pub provenance: Provenance,
     pub order: Vec<String>,
     pub classes: Vec<ConfiguredClass>,
@@ -53,6 +55,14 @@ pub struct Campaign {
 }
 
 impl Campaign {
+    fn draw_histories(&self) -> BTreeMap<String, HistoryFigure> {
+        let drawn = self.histories.iter().enumerate().map(|(i, history)| {
+            let figure = draw_history(history, format!("h{i}"));
+            (history.maneuver_id.clone(), figure)
+        });
+        drawn.collect()
+    }
+
     pub fn contents(&self) -> Contents<'_> {
         Contents {
             title: "A campaign",
@@ -81,7 +91,7 @@ impl Campaign {
             events: &self.events,
             problems: &self.problems,
             pages: &self.pages,
-            history_figures: &self.history_figures,
+            history_figures: self.history_figures.get_or_init(|| self.draw_histories()),
             histories: &self.histories,
             typical_alpha_deg: 30.0,
             provenance: &self.provenance,
@@ -414,10 +424,9 @@ fn fly(campaign: &mut Campaign, class: &str, axis: Axis, alpha_deg: f64) {
     }
     campaign.maneuvers.push(maneuver);
     campaign.pages.insert(maneuver_id.clone());
-    let history = history(&maneuver_id, class, alpha_deg);
-    let figure = draw_history(&history, format!("h-{maneuver_id}"));
-    campaign.history_figures.insert(maneuver_id.clone(), figure);
-    campaign.histories.push(history);
+    campaign
+        .histories
+        .push(history(&maneuver_id, class, alpha_deg));
 }
 
 fn history(maneuver_id: &str, class: &str, alpha_deg: f64) -> History {

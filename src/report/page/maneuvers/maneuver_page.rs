@@ -294,7 +294,7 @@ mod tests {
             place: "1-OLON-10".into(),
             ..problem("it did not settle")
         });
-        campaign.history_figures.remove("1-OLON-20");
+        campaign.histories.remove(1);
         let contents = campaign.contents();
         let pages = made(&contents);
         assert_eq!(pages.len(), campaign.maneuvers.len());
