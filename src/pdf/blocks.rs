@@ -75,16 +75,13 @@ impl<'a> Blocks<'a> {
 
     /// Items of an element's children, in a column of a width (pt).
     pub fn children(&self, node: Node, width: f32, style: Style) -> BlockItems {
-        let pieces = pieces(node);
-        let made = pieces.par_iter();
-        BlockItems::in_order(made.map(|piece| self.piece(piece, width, style)).collect())
+        BlockItems::in_order(self.made(&pieces(node), width, style))
     }
 
     /// Items of an element's children, with smaller drawings where all then fit on one page.
     fn children_on_one_page(&self, node: Node, width: f32, style: Style) -> BlockItems {
         let pieces = pieces(node);
-        let made = pieces.par_iter();
-        let mut made: Vec<BlockItems> = made.map(|piece| self.piece(piece, width, style)).collect();
+        let mut made = self.made(&pieces, width, style);
         let drawn: f32 = made.iter().map(|part| part.drawn_height).sum();
         let items: Vec<&Item> = made.iter().flat_map(|part| &part.items).collect();
         let excess = height_on_page(&items) - self.page_height;
@@ -97,6 +94,14 @@ impl<'a> Blocks<'a> {
             }
         }
         BlockItems::in_order(made)
+    }
+
+    /// Items of each piece.
+    fn made(&self, pieces: &[Piece], width: f32, style: Style) -> Vec<BlockItems> {
+        let pieces = pieces.par_iter();
+        pieces
+            .map(|piece| self.piece(piece, width, style))
+            .collect()
     }
 
     fn piece(&self, piece: &Piece, width: f32, style: Style) -> BlockItems {
@@ -139,11 +144,7 @@ impl<'a> Blocks<'a> {
                 ..Item::default()
             });
         } else {
-            let (element, space_after) = if has_class(node, "one-page") {
-                (self.children_on_one_page(node, width, style), 0.0)
-            } else {
-                self.element(node, width, style)
-            };
+            let (element, space_after) = self.element(node, width, style);
             made.add(element);
             made.items.push(Item::room(space_after));
         }
@@ -180,6 +181,9 @@ impl<'a> Blocks<'a> {
             }
             "div" if has_class(node, "small") => (self.children(node, width, small), 2.0),
             "div" if has_class(node, "pairs") => (self.pairs(node, width, style), 2.0),
+            _ if has_class(node, "one-page") => {
+                (self.children_on_one_page(node, width, style), 0.0)
+            }
             _ => (self.children(node, width, style), 0.0),
         }
     }

@@ -12,8 +12,7 @@ use crate::maneuver::Class;
 use crate::pdf;
 use crate::pipeline::campaign::Campaign;
 use crate::pipeline::conductor::{Conductor, step_versions};
-use crate::report;
-use crate::report::HistoryFigure;
+use crate::report::{self, HistoryFigure};
 use crate::store::{ArtefactName, Kind, Store};
 use crate::tables::{EstimateRow, History};
 
