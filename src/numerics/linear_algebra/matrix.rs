@@ -19,8 +19,9 @@ use crate::numerics::vectors::simd::{AlignedBuffer, VECTOR, load, store, vectori
 /// Rows and lags that a loop computes side by side: enough independent sums to hide the latency of
 /// one.
 const ROWS_AT_ONCE: usize = 8;
-/// Vectors and rows of a tile of a product: one load of a factor serves several vectors.
-const WIDE_TILE: usize = 3;
+/// Vectors and rows of a tile of a product: one load of a factor serves several vectors, and registers are left
+/// for the factors.
+const WIDE_TILE: usize = 2;
 const ROWS_OF_WIDE_TILE: usize = 4;
 /// Rows of the second matrix of a product that all tiles read before the next rows: they stay in the
 /// processor's first cache.
@@ -344,9 +345,9 @@ impl<const TRANSPOSED: bool> Product<'_, TRANSPOSED> {
                 sums[t][c] = load::<S>(self.to, (row + t) * width + lane + c * S::F64_LANES);
             }
         }
-        for i in of.start..of.end {
-            let entries = &self.matrix.values()[i * width + lane..][..C * S::F64_LANES];
-            let entries = S::as_simd_f64s(entries).0;
+        let rows = &self.matrix.values()[of.start * width..of.end * width];
+        for (i, entries) in of.clone().zip(rows.chunks_exact(width)) {
+            let entries = S::as_simd_f64s(&entries[lane..][..C * S::F64_LANES]).0;
             // Factors of the row `i`, at equal distances.
             let (factors, distance) = if TRANSPOSED {
                 (&values[i * from + row..][..T], 1)

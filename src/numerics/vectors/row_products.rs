@@ -73,9 +73,10 @@ impl StridedRows<'_> {
     ) {
         for vector in 0..used.len() {
             let (mut first, mut rows) = (vector * VECTOR, used[vector]);
-            // Narrower vectors have half the registers: a tile of half the rows, and one more vector.
+            // Narrower vectors have half the registers: a tile of half the rows. With three vectors it would fill
+            // them all, and sums would move to memory and back.
             while S::F64_LANES < VECTOR && rows > 4 {
-                self.add_gram_rows::<S, 4, 3>(simd, first, matrix, width, interleaved);
+                self.add_gram_rows::<S, 4, 2>(simd, first, matrix, width, interleaved);
                 (first, rows) = (first + 4, rows - 4);
             }
             match rows {
@@ -83,7 +84,7 @@ impl StridedRows<'_> {
                 1 => self.add_gram_rows::<S, 1, 3>(simd, first, matrix, width, interleaved),
                 2 => self.add_gram_rows::<S, 2, 3>(simd, first, matrix, width, interleaved),
                 3 => self.add_gram_rows::<S, 3, 3>(simd, first, matrix, width, interleaved),
-                4 => self.add_gram_rows::<S, 4, 3>(simd, first, matrix, width, interleaved),
+                4 => self.add_gram_rows::<S, 4, 2>(simd, first, matrix, width, interleaved),
                 5 => self.add_gram_rows::<S, 5, 2>(simd, first, matrix, width, interleaved),
                 6 => self.add_gram_rows::<S, 6, 2>(simd, first, matrix, width, interleaved),
                 7 => self.add_gram_rows::<S, 7, 2>(simd, first, matrix, width, interleaved),
@@ -135,12 +136,14 @@ impl StridedRows<'_> {
         let first = self.place(first);
         let places: [usize; C] = from_fn(|c| self.place(lane + c * S::F64_LANES));
         let end = (first + T).max(places[C - 1] + S::F64_LANES);
+        let mut rest = self.values;
         for k in 0..self.count {
             if k % ROWS_BETWEEN == 0 {
                 interleaved.advance();
             }
             // Rows of one length, so that their bounds are checked once.
-            let row = &self.values[k * self.stride..][..end];
+            let row = &rest[..end];
+            rest = rest.get(self.stride..).unwrap_or_default();
             let mut s = [simd.splat_f64s(0.0); C];
             for c in 0..C {
                 s[c] = load::<S>(row, places[c]);
