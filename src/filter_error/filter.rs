@@ -15,7 +15,9 @@ use super::gains::{Pattern, PatternGain, patterns};
 use super::input_process_noise::InputNoise;
 use super::linearised::Linearised;
 use super::noise::{Noise, NoiseParameter, NoisePrior};
-use super::pass::{FilterPass, LaneBlocks, LaneGain, MeasurementUpdates, PassOutputs, RowSink};
+use super::pass::{
+    FilterPass, LaneBlocks, MeasurementUpdates, PassOutputs, RowSink, UpdateGain, gain_slopes,
+};
 use super::response::FilterResponse;
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::ManeuverSignals;
@@ -276,9 +278,9 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         gains: &[PatternGain<NX>],
     ) -> MeasurementUpdates<'_, NX> {
         let noise = self.noise(parameters);
-        let lane_gain = |gain: &PatternGain<NX>| LaneGain::new(gain, &self.layout);
         MeasurementUpdates {
-            gains: gains.iter().map(lane_gain).collect(),
+            gains: gains.iter().map(UpdateGain::new).collect(),
+            gain_slopes: gain_slopes(gains, &self.layout),
             patterns: &self.patterns,
             pattern_of: &self.pattern_of,
             biases: self.biases(parameters),
@@ -326,11 +328,11 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         rows
     }
 
-    fn decay_row(&self, noise: &Noise) -> AlignedBuffer {
-        let mut row = AlignedBuffer::zeros(self.layout.width());
+    fn decay_row(&self, noise: &Noise) -> LaneBlocks {
+        let mut row = LaneBlocks::zeros(1, self.layout.width());
         for (n, parameter) in self.noise_parameters.iter().enumerate() {
             let lane = self.lane(self.first_noise() + n);
-            row.slice_mut()[lane] = noise.decay_slope(*parameter, self.case.step_s);
+            row.set(0, lane, noise.decay_slope(*parameter, self.case.step_s));
         }
         row
     }

@@ -22,7 +22,7 @@ use super::gains::{Gain, OutputMatrix, Pattern, PatternGain};
 use crate::dynamics::{InGusts, OUTPUTS};
 use crate::numerics::linear_algebra::matrix::AlignedMatrix;
 use crate::numerics::vectors::row_products::Idle;
-use crate::numerics::vectors::simd::{AlignedBuffer, VECTOR, load};
+use crate::numerics::vectors::simd::{AlignedBuffer, VECTOR};
 use crate::output_error::case::Case;
 use crate::output_error::case::build_up::ValuedTerm;
 use crate::output_error::case::chunking::{CHUNK, Strided};
@@ -34,16 +34,6 @@ use crate::output_error::kernel::normal_equations::NormalSums;
 use crate::output_error::kernel::pass::{Diverged, MeasurementUpdate, Propagation};
 use crate::output_error::kernel::propagators::Propagators;
 use crate::output_error::kernel::trajectory::{STATE_BOUND, StageHistory, Trajectory, set_factors};
-
-/// Gain of a pattern with its slopes in the lanes of the parameters.
-pub(super) struct LaneGain<const NX: usize> {
-    gain: Gain<NX>,
-    /// Matrix −K: change of the state's sensitivities with the outputs' sensitivities.
-    reaction: Gain<NX>,
-    whitening: OutputMatrix,
-    /// Slopes of the gain: state by state, output by output.
-    slopes: LaneBlocks,
-}
 
 /// Rows of numbers in the lanes of the parameters. They are stored vector by vector, and for each
 /// of the widest vectors row by row.
@@ -65,55 +55,65 @@ impl LaneBlocks {
         self.values.slice_mut()[(block + row) * VECTOR + lane % VECTOR] = value;
     }
 
-    /// Rows of the vector at a lane; `rows` is their number, a constant when compiled.
+    /// Rows of the vector at a lane, every [`step_of_rows`] vectors.
     #[inline(always)]
-    fn rows_of_lane<S: Simd>(&self, rows: usize, lane: usize) -> LaneRows<'_, S> {
-        let first = lane / VECTOR * rows * VECTOR;
-        let block = &self.values.slice()[first..first + rows * VECTOR];
-        LaneRows {
-            vectors: S::as_simd_f64s(block).0,
-            within: lane % VECTOR / S::F64_LANES,
-        }
+    fn at_lane<S: Simd>(&self, lane: usize) -> &[S::f64s] {
+        let length = self.rows * VECTOR;
+        let block = &self.values.slice()[lane / VECTOR * length..][..length];
+        &S::as_simd_f64s(block).0[lane % VECTOR / S::F64_LANES..]
     }
 }
 
-/// Rows in the lanes of one vector.
-#[derive(Clone, Copy)]
-struct LaneRows<'a, S: Simd> {
-    vectors: &'a [S::f64s],
-    within: usize,
+/// Distance between the rows of a block, in vectors.
+#[inline(always)]
+const fn step_of_rows<S: Simd>() -> usize {
+    VECTOR / S::F64_LANES
 }
 
-impl<S: Simd> LaneRows<'_, S> {
-    #[inline(always)]
-    fn row(self, row: usize) -> S::f64s {
-        self.vectors[row * (VECTOR / S::F64_LANES) + self.within]
-    }
+/// Gain of a pattern.
+pub(super) struct UpdateGain<const NX: usize> {
+    gain: Gain<NX>,
+    /// Matrix −K: change of the state's sensitivities with the outputs' sensitivities.
+    reaction: Gain<NX>,
+    whitening: OutputMatrix,
 }
 
-impl<const NX: usize> LaneGain<NX> {
-    pub fn new(pattern: &PatternGain<NX>, layout: &LaneLayout) -> Self {
-        let mut slopes = LaneBlocks::zeros(NX * OUTPUTS, layout.width());
-        for slope in &pattern.slopes {
-            let lane = layout.parameter_lanes[slope.parameter];
-            for i in 0..NX {
-                for o in 0..OUTPUTS {
-                    slopes.set(i * OUTPUTS + o, lane, slope.gain[(i, o)]);
-                }
-            }
-        }
-        LaneGain {
+impl<const NX: usize> UpdateGain<NX> {
+    pub fn new(pattern: &PatternGain<NX>) -> Self {
+        UpdateGain {
             gain: pattern.gain,
             reaction: -pattern.gain,
             whitening: pattern.whitening,
-            slopes,
         }
     }
+}
+
+/// Slopes of the gains in the lanes of the parameters: pattern by pattern, state by state, output by
+/// output.
+pub(super) fn gain_slopes<const NX: usize>(
+    gains: &[PatternGain<NX>],
+    layout: &LaneLayout,
+) -> LaneBlocks {
+    let mut slopes = LaneBlocks::zeros(gains.len() * NX * OUTPUTS, layout.width());
+    for (pattern, gain) in gains.iter().enumerate() {
+        for slope in &gain.slopes {
+            let lane = layout.parameter_lanes[slope.parameter];
+            for i in 0..NX {
+                for o in 0..OUTPUTS {
+                    let row = (pattern * NX + i) * OUTPUTS + o;
+                    slopes.set(row, lane, slope.gain[(i, o)]);
+                }
+            }
+        }
+    }
+    slopes
 }
 
 /// Values of a pass that do not change within it.
 pub(super) struct MeasurementUpdates<'a, const NX: usize> {
-    pub gains: Vec<LaneGain<NX>>,
+    /// Gain of each pattern.
+    pub gains: Vec<UpdateGain<NX>>,
+    pub gain_slopes: LaneBlocks,
     pub patterns: &'a [Pattern],
     /// Pattern of each sample.
     pub pattern_of: &'a [u8],
@@ -122,7 +122,7 @@ pub(super) struct MeasurementUpdates<'a, const NX: usize> {
     pub bias_rows: LaneBlocks,
     /// Share of a rotary gust that remains after a step, and its slope in each lane.
     pub decay: f64,
-    pub decay_row: AlignedBuffer,
+    pub decay_row: LaneBlocks,
 }
 
 /// Results of a pass besides the sums, to which it appends sample by sample.
@@ -264,7 +264,35 @@ struct ChunkUpdates<'a, const NX: usize, E> {
     equations: std::marker::PhantomData<E>,
 }
 
+/// Rows of the measurement updates in some vectors of lanes.
+struct UpdateLanes<'l, S: Simd, const N: usize> {
+    gain_slopes: [&'l [S::f64s]; N],
+    biases: [&'l [S::f64s]; N],
+    decay_slopes: [&'l [S::f64s]; N],
+}
+
 impl<const NX: usize, E: InGusts<NX>> MeasurementUpdate<NX> for &ChunkUpdates<'_, NX, E> {
+    type Lanes<'l, S: Simd, const N: usize>
+        = UpdateLanes<'l, S, N>
+    where
+        Self: 'l;
+
+    #[inline(always)]
+    fn in_lanes<S: Simd, const N: usize>(&self, lanes: [usize; N]) -> UpdateLanes<'_, S, N> {
+        let corrections = self.corrections;
+        let mut found = UpdateLanes {
+            gain_slopes: [&[][..]; N],
+            biases: [&[][..]; N],
+            decay_slopes: [&[][..]; N],
+        };
+        for n in 0..N {
+            found.gain_slopes[n] = corrections.gain_slopes.at_lane::<S>(lanes[n]);
+            found.biases[n] = corrections.bias_rows.at_lane::<S>(lanes[n]);
+            found.decay_slopes[n] = corrections.decay_row.at_lane::<S>(lanes[n]);
+        }
+        found
+    }
+
     #[inline(always)]
     fn output_factors(&self, k: usize) -> Option<&[f64; VECTOR]> {
         Some(&self.factors[k])
@@ -275,18 +303,20 @@ impl<const NX: usize, E: InGusts<NX>> MeasurementUpdate<NX> for &ChunkUpdates<'_
         &self,
         simd: S,
         k: usize,
-        lanes: [usize; N],
+        lanes: &UpdateLanes<'_, S, N>,
         s: &mut [[S::f64s; NX]; N],
         y: &mut [[S::f64s; OUTPUTS]; N],
     ) {
         let corrections = self.corrections;
-        let gain = &corrections.gains[usize::from(self.patterns[k])];
-        let mut slopes = [gain.slopes.rows_of_lane::<S>(NX * OUTPUTS, lanes[0]); N];
+        let (pattern, step) = (usize::from(self.patterns[k]), step_of_rows::<S>());
+        let gain = &corrections.gains[pattern];
+        let rows = NX * OUTPUTS;
+        let mut slopes = lanes.gain_slopes;
         for n in 0..N {
-            slopes[n] = gain.slopes.rows_of_lane(NX * OUTPUTS, lanes[n]);
-            let biases = corrections.bias_rows.rows_of_lane::<S>(OUTPUTS, lanes[n]);
+            slopes[n] = &slopes[n][pattern * rows * step..][..=(rows - 1) * step];
+            let biases = &lanes.biases[n][..=(OUTPUTS - 1) * step];
             for o in 0..OUTPUTS {
-                y[n][o] = simd.add_f64s(y[n][o], biases.row(o));
+                y[n][o] = simd.add_f64s(y[n][o], biases[o * step]);
             }
         }
         for o in 0..OUTPUTS {
@@ -294,14 +324,14 @@ impl<const NX: usize, E: InGusts<NX>> MeasurementUpdate<NX> for &ChunkUpdates<'_
             for i in 0..NX {
                 let reaction = simd.splat_f64s(gain.reaction[(i, o)]);
                 for n in 0..N {
-                    s[n][i] = simd.mul_add_f64s(slopes[n].row(i * OUTPUTS + o), v, s[n][i]);
+                    s[n][i] = simd.mul_add_f64s(slopes[n][(i * OUTPUTS + o) * step], v, s[n][i]);
                     s[n][i] = simd.mul_add_f64s(reaction, y[n][o], s[n][i]);
                 }
             }
         }
         let decay = simd.splat_f64s(corrections.decay);
         for n in 0..N {
-            let decay_slope = load::<S>(corrections.decay_row.slice(), lanes[n]);
+            let decay_slope = lanes.decay_slopes[n][0];
             for &(rate, relative) in E::AIR_RELATIVE_RATES {
                 let gust = simd.sub_f64s(s[n][relative], s[n][rate]);
                 s[n][relative] = simd.mul_add_f64s(decay, gust, s[n][rate]);

@@ -33,7 +33,6 @@ pub(crate) const VECTOR: usize = 8;
 pub(crate) struct AlignedBuffer {
     buffer: Vec<f64>,
     first: usize,
-    length: usize,
 }
 
 /// Length of a cache line in bytes.
@@ -50,11 +49,7 @@ impl AlignedBuffer {
         let mut buffer = vec![0.0; length + LINE / size_of::<f64>()];
         let first = first_of_line(&buffer);
         buffer.truncate(first + length);
-        AlignedBuffer {
-            buffer,
-            first,
-            length,
-        }
+        AlignedBuffer { buffer, first }
     }
 
     /// Removes all values and makes room for a number of values, which are not cleared before they
@@ -67,24 +62,22 @@ impl AlignedBuffer {
             self.buffer.resize(self.first, 0.0);
         }
         self.buffer.truncate(self.first);
-        self.length = 0;
     }
 
     /// Appends a number of zeros.
     #[inline]
     pub fn append_zeros(&mut self, length: usize) {
-        self.length += length;
-        self.buffer.resize(self.first + self.length, 0.0);
+        self.buffer.resize(self.buffer.len() + length, 0.0);
     }
 
     #[inline]
     pub fn slice(&self) -> &[f64] {
-        &self.buffer[self.first..self.first + self.length]
+        &self.buffer[self.first..]
     }
 
     #[inline]
     pub fn slice_mut(&mut self) -> &mut [f64] {
-        &mut self.buffer[self.first..self.first + self.length]
+        &mut self.buffer[self.first..]
     }
 }
 

@@ -220,18 +220,26 @@ fn initial_sensitivities<const NX: usize>(
 
 /// Update of the states by the measurements, between a sample's outputs and the next step.
 pub(crate) trait MeasurementUpdate<const NX: usize> {
+    /// Numbers of the update in some vectors of lanes.
+    type Lanes<'l, S: Simd, const N: usize>
+    where
+        Self: 'l;
+
+    /// Finds the numbers in the vectors that begin at some lanes, once for a chunk.
+    fn in_lanes<S: Simd, const N: usize>(&self, lanes: [usize; N]) -> Self::Lanes<'_, S, N>;
+
     /// Returns the factors of the first vector's regressors in the outputs, if they differ from the
     /// factors at the step's first stage.
     fn output_factors(&self, k: usize) -> Option<&[f64; VECTOR]>;
 
-    /// Corrects the sensitivities `s` of the states in the vectors at some lanes. The sensitivities
+    /// Corrects the sensitivities `s` of the states in the vectors of `lanes`. The sensitivities
     /// `y` of the outputs were computed before, at the chunk's sample k. Replaces `y` by the
     /// sensitivities that the sink receives.
     fn correct<S: Simd, const N: usize>(
         &self,
         simd: S,
         k: usize,
-        lanes: [usize; N],
+        lanes: &Self::Lanes<'_, S, N>,
         s: &mut [[S::f64s; NX]; N],
         y: &mut [[S::f64s; OUTPUTS]; N],
     );
@@ -241,6 +249,11 @@ pub(crate) trait MeasurementUpdate<const NX: usize> {
 struct NoUpdate;
 
 impl<const NX: usize> MeasurementUpdate<NX> for NoUpdate {
+    type Lanes<'l, S: Simd, const N: usize> = ();
+
+    #[inline(always)]
+    fn in_lanes<S: Simd, const N: usize>(&self, _: [usize; N]) {}
+
     #[inline(always)]
     fn output_factors(&self, _: usize) -> Option<&[f64; VECTOR]> {
         None
@@ -251,7 +264,7 @@ impl<const NX: usize> MeasurementUpdate<NX> for NoUpdate {
         &self,
         _: S,
         _: usize,
-        _: [usize; N],
+        (): &(),
         _: &mut [[S::f64s; NX]; N],
         _: &mut [[S::f64s; OUTPUTS]; N],
     ) {
@@ -302,10 +315,12 @@ impl<S: Simd, const NX: usize, K: MeasurementUpdate<NX>> Propagation<'_, S, NX, 
                 s[n][i] = self.sensitivities[i * vectors + lanes[n] / S::F64_LANES];
             }
         }
+        let update = self.correction.in_lanes::<S, N>(lanes);
         for k in 0..self.count {
             let mut r = [[self.simd.splat_f64s(0.0); STAGES]; N];
             let mut y = self.read::<E, N>(k, lane, groups, places, &s, &mut r);
-            self.correction.correct(self.simd, k, lanes, &mut s, &mut y);
+            self.correction
+                .correct(self.simd, k, &update, &mut s, &mut y);
             for n in 0..N {
                 self.rows.store::<S>(k, lanes[n], &y[n]);
             }
