@@ -106,8 +106,8 @@ fn turned((s, c): (f64, f64), quarters: i64) -> (f64, f64) {
     }
 }
 
-/// Sines and cosines of two angles within ±π/4. All four are one polynomial with different
-/// coefficients, so one vector computes them.
+/// Sines and cosines of two angles within ±π/4: all four are one polynomial with different
+/// coefficients.
 #[inline(always)]
 fn near_zero(r: [f64; 2]) -> [(f64, f64); 2] {
     let angle = [r[0], r[1], r[0], r[1]];
