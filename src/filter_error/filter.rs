@@ -15,9 +15,7 @@ use super::gains::{Pattern, PatternGain, patterns};
 use super::input_process_noise::InputNoise;
 use super::linearised::Linearised;
 use super::noise::{Noise, NoiseParameter, NoisePrior};
-use super::pass::{
-    FilterPass, LaneBlocks, MeasurementUpdates, PassOutputs, RowSink, UpdateGain, gain_slopes,
-};
+use super::pass::{FilterPass, LaneBlocks, MeasurementUpdates, PassOutputs, RowSink, gain_slopes};
 use super::response::FilterResponse;
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::ManeuverSignals;
@@ -272,14 +270,14 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         })
     }
 
-    pub(super) fn measurement_updates(
-        &self,
+    pub(super) fn measurement_updates<'a>(
+        &'a self,
         parameters: &[f64],
-        gains: &[PatternGain<NX>],
-    ) -> MeasurementUpdates<'_, NX> {
+        gains: &'a [PatternGain<NX>],
+    ) -> MeasurementUpdates<'a, NX> {
         let noise = self.noise(parameters);
         MeasurementUpdates {
-            gains: gains.iter().map(UpdateGain::new).collect(),
+            gains,
             gain_slopes: gain_slopes(gains, &self.layout),
             patterns: &self.patterns,
             pattern_of: &self.pattern_of,

@@ -18,7 +18,7 @@
 use nalgebra::{SMatrix, SVector};
 use pulp::{Simd, WithSimd};
 
-use super::gains::{Gain, OutputMatrix, Pattern, PatternGain};
+use super::gains::{Pattern, PatternGain};
 use crate::dynamics::{InGusts, OUTPUTS};
 use crate::numerics::linear_algebra::matrix::AlignedMatrix;
 use crate::numerics::vectors::row_products::Idle;
@@ -70,24 +70,6 @@ const fn step_of_rows<S: Simd>() -> usize {
     VECTOR / S::F64_LANES
 }
 
-/// Gain of a pattern.
-pub(super) struct UpdateGain<const NX: usize> {
-    gain: Gain<NX>,
-    /// Matrix −K: change of the state's sensitivities with the outputs' sensitivities.
-    reaction: Gain<NX>,
-    whitening: OutputMatrix,
-}
-
-impl<const NX: usize> UpdateGain<NX> {
-    pub fn new(pattern: &PatternGain<NX>) -> Self {
-        UpdateGain {
-            gain: pattern.gain,
-            reaction: -pattern.gain,
-            whitening: pattern.whitening,
-        }
-    }
-}
-
 /// Slopes of the gains in the lanes of the parameters: pattern by pattern, state by state, output by
 /// output.
 pub(super) fn gain_slopes<const NX: usize>(
@@ -112,7 +94,7 @@ pub(super) fn gain_slopes<const NX: usize>(
 /// Values of a pass that do not change within it.
 pub(super) struct MeasurementUpdates<'a, const NX: usize> {
     /// Gain of each pattern.
-    pub gains: Vec<UpdateGain<NX>>,
+    pub gains: &'a [PatternGain<NX>],
     pub gain_slopes: LaneBlocks,
     pub patterns: &'a [Pattern],
     /// Pattern of each sample.
@@ -321,11 +303,16 @@ impl<const NX: usize, E: InGusts<NX>> MeasurementUpdate<NX> for &ChunkUpdates<'_
         }
         for o in 0..OUTPUTS {
             let v = simd.splat_f64s(self.innovations[k][o]);
+            // Sensitivities of the innovation.
+            let mut innovation = [v; N];
+            for n in 0..N {
+                innovation[n] = simd.neg_f64s(y[n][o]);
+            }
             for i in 0..NX {
-                let reaction = simd.splat_f64s(gain.reaction[(i, o)]);
+                let gain = simd.splat_f64s(gain.gain[(i, o)]);
                 for n in 0..N {
                     s[n][i] = simd.mul_add_f64s(slopes[n][(i * OUTPUTS + o) * step], v, s[n][i]);
-                    s[n][i] = simd.mul_add_f64s(reaction, y[n][o], s[n][i]);
+                    s[n][i] = simd.mul_add_f64s(gain, innovation[n], s[n][i]);
                 }
             }
         }
