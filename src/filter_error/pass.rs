@@ -21,7 +21,6 @@ use pulp::{Simd, WithSimd};
 use super::gains::{Pattern, PatternGain};
 use crate::dynamics::{InGusts, OUTPUTS};
 use crate::numerics::linear_algebra::matrix::AlignedMatrix;
-use crate::numerics::vectors::row_products::Idle;
 use crate::numerics::vectors::simd::{AlignedBuffer, VECTOR};
 use crate::output_error::case::Case;
 use crate::output_error::case::build_up::ValuedTerm;
@@ -33,7 +32,9 @@ use crate::output_error::kernel::chunk_rows::ChunkRows;
 use crate::output_error::kernel::normal_equations::NormalSums;
 use crate::output_error::kernel::pass::{Diverged, MeasurementUpdate, Propagation};
 use crate::output_error::kernel::propagators::Propagators;
-use crate::output_error::kernel::trajectory::{STATE_BOUND, StageHistory, Trajectory, set_factors};
+use crate::output_error::kernel::trajectory::{
+    StageHistory, Trajectory, is_out_of_bounds, set_factors,
+};
 
 /// Rows of numbers in the lanes of the parameters. They are stored vector by vector, and for each
 /// of the widest vectors row by row.
@@ -147,7 +148,7 @@ impl<const NX: usize> RowSink<NX> for NormalSums {
         mut rows: ChunkRows,
     ) {
         self.complete_rows(white.len(), &mut rows, |k| (white[k], used(k)));
-        self.add_rows(simd, first, white.len(), &rows, &mut Idle);
+        self.add_rows(simd, first, white.len(), &rows);
     }
 }
 
@@ -412,10 +413,10 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink<NX>> WithSimd for FilterPass<'_
                 stride: 1,
             };
             build_up.set(case, &self.terms, points);
-            let mut trajectory = Trajectory::new(case, &build_up, &mut history, x, points, count);
+            let mut trajectory = Trajectory::new(case, &build_up, &mut history, points);
             for k in 0..count {
                 let sample = first + k;
-                if !x.iter().all(|x| x.abs() < STATE_BOUND) {
+                if is_out_of_bounds(&x) {
                     return Err(Diverged { sample });
                 }
                 let mut y = if self.sink.is_some() {
@@ -437,9 +438,9 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink<NX>> WithSimd for FilterPass<'_
                 self.outputs.innovations.push(chunk.innovations[k]);
                 self.outputs.whitened.push(white);
                 x = if self.sink.is_some() {
-                    trajectory.step_from(corrected)
+                    trajectory.record_step(k, &corrected)
                 } else {
-                    trajectory.state_after(k, corrected)
+                    trajectory.step(k, &corrected)
                 };
             }
             let Some(sink) = self.sink.as_deref_mut() else {

@@ -17,25 +17,6 @@ use pulp::Simd;
 
 use super::simd::{VECTOR, load};
 
-/// Work that advances in small steps between the rows of a sum. A chain of dependent operations and
-/// the independent sums then share the processor.
-pub(crate) trait Interleaved {
-    /// Takes one step, if any is left.
-    fn advance(&mut self);
-}
-
-/// No interleaved work.
-pub(crate) struct Idle;
-
-impl Interleaved for Idle {
-    #[inline(always)]
-    fn advance(&mut self) {}
-}
-
-/// Rows of a tile between two steps of the interleaved work. The steps of a chunk then spread over most of its
-/// sums; closer steps would wait for each other, and the last sums would have no work beside them.
-const ROWS_BETWEEN: usize = 6;
-
 /// Rows of numbers, in vectors of [`VECTOR`] lanes.
 #[derive(Clone, Copy)]
 pub(crate) struct StridedRows<'a> {
@@ -58,37 +39,24 @@ impl StridedRows<'_> {
     /// use of each vector.
     #[inline(always)]
     pub fn add_gram<S: Simd>(self, simd: S, used: &[usize], matrix: &mut [f64], width: usize) {
-        self.add_gram_interleaved(simd, used, matrix, width, &mut Idle);
-    }
-
-    /// [`StridedRows::add_gram`] with other work interleaved.
-    #[inline(always)]
-    pub fn add_gram_interleaved<S: Simd>(
-        self,
-        simd: S,
-        used: &[usize],
-        matrix: &mut [f64],
-        width: usize,
-        interleaved: &mut impl Interleaved,
-    ) {
         for vector in 0..used.len() {
             let (mut first, mut rows) = (vector * VECTOR, used[vector]);
             // Narrower vectors have half the registers: a tile of half the rows. With three vectors it would fill
             // them all, and sums would move to memory and back.
             while S::F64_LANES < VECTOR && rows > 4 {
-                self.add_gram_rows::<S, 4, 2>(simd, first, matrix, width, interleaved);
+                self.add_gram_rows::<S, 4, 2>(simd, first, matrix, width);
                 (first, rows) = (first + 4, rows - 4);
             }
             match rows {
                 0 => {}
-                1 => self.add_gram_rows::<S, 1, 3>(simd, first, matrix, width, interleaved),
-                2 => self.add_gram_rows::<S, 2, 3>(simd, first, matrix, width, interleaved),
-                3 => self.add_gram_rows::<S, 3, 3>(simd, first, matrix, width, interleaved),
-                4 => self.add_gram_rows::<S, 4, 2>(simd, first, matrix, width, interleaved),
-                5 => self.add_gram_rows::<S, 5, 2>(simd, first, matrix, width, interleaved),
-                6 => self.add_gram_rows::<S, 6, 2>(simd, first, matrix, width, interleaved),
-                7 => self.add_gram_rows::<S, 7, 2>(simd, first, matrix, width, interleaved),
-                _ => self.add_gram_rows::<S, VECTOR, 2>(simd, first, matrix, width, interleaved),
+                1 => self.add_gram_rows::<S, 1, 3>(simd, first, matrix, width),
+                2 => self.add_gram_rows::<S, 2, 3>(simd, first, matrix, width),
+                3 => self.add_gram_rows::<S, 3, 3>(simd, first, matrix, width),
+                4 => self.add_gram_rows::<S, 4, 2>(simd, first, matrix, width),
+                5 => self.add_gram_rows::<S, 5, 2>(simd, first, matrix, width),
+                6 => self.add_gram_rows::<S, 6, 2>(simd, first, matrix, width),
+                7 => self.add_gram_rows::<S, 7, 2>(simd, first, matrix, width),
+                _ => self.add_gram_rows::<S, VECTOR, 2>(simd, first, matrix, width),
             }
         }
     }
@@ -101,17 +69,16 @@ impl StridedRows<'_> {
         first: usize,
         matrix: &mut [f64],
         width: usize,
-        interleaved: &mut impl Interleaved,
     ) {
         let (mut lane, end) = (0, first + T);
         while lane + (C - 1) * S::F64_LANES < end {
-            self.add_tile::<S, T, C>(simd, first, lane, matrix, width, interleaved);
+            self.add_tile::<S, T, C>(simd, first, lane, matrix, width);
             lane += C * S::F64_LANES;
         }
         if lane + S::F64_LANES < end {
-            self.add_tile::<S, T, 2>(simd, first, lane, matrix, width, interleaved);
+            self.add_tile::<S, T, 2>(simd, first, lane, matrix, width);
         } else if lane < end {
-            self.add_tile::<S, T, 1>(simd, first, lane, matrix, width, interleaved);
+            self.add_tile::<S, T, 1>(simd, first, lane, matrix, width);
         }
     }
 
@@ -124,7 +91,6 @@ impl StridedRows<'_> {
         lane: usize,
         matrix: &mut [f64],
         width: usize,
-        interleaved: &mut impl Interleaved,
     ) {
         let mut sums = [[simd.splat_f64s(0.0); C]; T];
         let matrix =
@@ -137,10 +103,7 @@ impl StridedRows<'_> {
         let places: [usize; C] = from_fn(|c| self.place(lane + c * S::F64_LANES));
         let end = (first + T).max(places[C - 1] + S::F64_LANES);
         let mut rest = self.values;
-        for k in 0..self.count {
-            if k % ROWS_BETWEEN == 0 {
-                interleaved.advance();
-            }
+        for _ in 0..self.count {
             // Rows of one length, so that their bounds are checked once.
             let row = &rest[..end];
             rest = rest.get(self.stride..).unwrap_or_default();

@@ -20,7 +20,6 @@ use pulp::Simd;
 use super::chunk_rows::ChunkRows;
 use super::pass::Sink;
 use crate::dynamics::OUTPUTS;
-use crate::numerics::vectors::row_products::Interleaved;
 use crate::numerics::vectors::simd::{AlignedBuffer, vectorised};
 use crate::output_error::case::Measurements;
 use crate::output_error::case::blocks::BlockSums;
@@ -253,7 +252,6 @@ impl Sink for NormalAccumulator<'_> {
         samples: Strided,
         outputs: &[[f64; OUTPUTS]],
         mut rows: ChunkRows,
-        interleaved: &mut impl Interleaved,
     ) {
         let Measurements { values, used } = self.measurements;
         let residuals = |k: usize| {
@@ -266,8 +264,7 @@ impl Sink for NormalAccumulator<'_> {
         };
         let count = outputs.len();
         self.sums.complete_rows(count, &mut rows, residuals);
-        self.sums
-            .add_rows(simd, samples.first, count, &rows, interleaved);
+        self.sums.add_rows(simd, samples.first, count, &rows);
     }
 }
 
@@ -300,14 +297,7 @@ impl NormalSums {
 
     /// Adds the complete rows of a chunk, which begins at the sample `first`.
     #[inline(always)]
-    pub fn add_rows<S: Simd>(
-        &mut self,
-        simd: S,
-        first: usize,
-        samples: usize,
-        rows: &ChunkRows,
-        interleaved: &mut impl Interleaved,
-    ) {
+    pub fn add_rows<S: Simd>(&mut self, simd: S, first: usize, samples: usize, rows: &ChunkRows) {
         let NormalSums {
             gram,
             stride,
@@ -322,13 +312,8 @@ impl NormalSums {
             add_to_blocks(simd, samples, *samples_per_block, rows, width, blocks);
         }
         for (o, gram) in gram.iter_mut().enumerate() {
-            rows.of_output(o, samples).add_gram_interleaved(
-                simd,
-                &layout.lanes_used,
-                gram.slice_mut(),
-                width,
-                interleaved,
-            );
+            let rows = rows.of_output(o, samples);
+            rows.add_gram(simd, &layout.lanes_used, gram.slice_mut(), width);
         }
     }
 }

@@ -5,8 +5,7 @@
 //! side. Let s be the sensitivities of the states to a derivative, k the coefficient of the
 //! derivative, and r_j its regressor at the stage j. All sensitivities take a step at once,
 //! s ← Φ s + Σ_j Γ_jk r_j. The outputs have the sensitivities C s + D_k r. Parameters lie side by side in
-//! the lanes of the processor's vectors ([`LaneLayout`]). While the sink sums one chunk, the
-//! trajectory of the next one advances between the rows.
+//! the lanes of the processor's vectors ([`LaneLayout`]).
 //!
 //! The loops are compiled for several widths of vectors and chosen when the program runs. Each lane
 //! is computed alike in all of them, with fused multiplication, so every width gives the same bits.
@@ -26,10 +25,9 @@ use super::chunk_build_up::ChunkBuildUp;
 use super::chunk_regressors::ChunkRegressors;
 use super::chunk_rows::ChunkRows;
 use super::propagators::Propagators;
-use super::trajectory::{StageHistory, Trajectory};
+use super::trajectory::{StageHistory, Trajectory, is_out_of_bounds};
 use crate::dynamics::{COEFFICIENTS, Equations, OUTPUTS};
 use crate::numerics::runge_kutta::{POINT, STAGES};
-use crate::numerics::vectors::row_products::Interleaved;
 use crate::numerics::vectors::simd::{AlignedBuffer, VECTOR, load};
 use crate::output_error::case::build_up::ValuedTerm;
 use crate::output_error::case::chunking::{CHUNK, Strided, WIDEST_STRIDE};
@@ -44,15 +42,13 @@ pub struct Diverged {
 
 /// Consumer of the outputs' sensitivities.
 pub(crate) trait Sink {
-    /// Takes the outputs of some samples and their sensitivities. The sink may overwrite the rows, and
-    /// interleaves the other work.
+    /// Takes the outputs of some samples and their sensitivities. The sink may overwrite the rows.
     fn take<S: Simd>(
         &mut self,
         simd: S,
         samples: Strided,
         outputs: &[[f64; OUTPUTS]],
         rows: ChunkRows,
-        interleaved: &mut impl Interleaved,
     );
 }
 
@@ -125,7 +121,7 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
     fn with_simd<S: Simd>(self, simd: S) -> Result<(), Diverged> {
         let (case, layout, stride) = (self.case, &self.case.layout, self.stride);
         let samples = case.samples().div_ceil(stride);
-        let length = |first: usize| CHUNK.min(samples - first);
+        let step_s = stride as f64 * case.step_s;
         let mut sensitivities = initial_sensitivities::<NX>(case.initial_state, layout);
         let sensitivities = sensitivities.slice_mut();
         let mut rows = AlignedBuffer::zeros(ChunkRows::length(layout.width()));
@@ -133,58 +129,37 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
         let mut regressors = AlignedBuffer::zeros(ChunkRegressors::length(layout));
         let mut regressors = ChunkRegressors::new(regressors.slice_mut());
         let mut build_up = ChunkBuildUp::<NX>::ZERO;
-        let mut histories = [StageHistory::<NX>::EMPTY; 2];
+        let mut history = StageHistory::<NX>::EMPTY;
         let mut propagators = Propagators::<NX>::ZERO;
         let mut x = self.start;
-        if samples > 0 {
-            let points = Strided { first: 0, stride };
-            build_up.set(case, &self.terms, points);
-            let [history, _] = &mut histories;
-            x = Trajectory::new(case, &build_up, history, x, points, length(0)).finish();
-        }
-        for (chunk, first) in (0..samples).step_by(CHUNK).enumerate() {
-            // The history of this chunk is read while the next chunk's is written.
-            let [even, odd] = &mut histories;
-            let (history, next_history) = if chunk % 2 == 0 {
-                (&*even, odd)
-            } else {
-                (&*odd, even)
-            };
-            let count = length(first);
-            if let Some(sample) = history.first_out_of_bounds(count) {
-                return Err(Diverged {
-                    sample: stride * (first + sample),
-                });
-            }
-            for k in 0..count {
-                let sample = stride * (first + k);
-                let y = propagators.read_outputs(case, &build_up, &history.states[k], sample, k);
-                for o in 0..OUTPUTS {
-                    self.outputs[first + k][o] = y[o] + self.biases[o];
-                }
-            }
-            propagators.set_steps::<S, E>(simd, history, count, stride as f64 * case.step_s);
+        for first in (0..samples).step_by(CHUNK) {
+            let count = CHUNK.min(samples - first);
             let points = Strided {
                 first: 2 * stride * first,
                 stride,
             };
+            build_up.set(case, &self.terms, points);
+            let mut trajectory = Trajectory::new(case, &build_up, &mut history, points);
+            for k in 0..count {
+                let sample = stride * (first + k);
+                if is_out_of_bounds(&x) {
+                    return Err(Diverged { sample });
+                }
+                let y = propagators.read_outputs(case, &build_up, &x, sample, k);
+                for o in 0..OUTPUTS {
+                    self.outputs[first + k][o] = y[o] + self.biases[o];
+                }
+                x = trajectory.record_step(k, &x);
+            }
+            propagators.set_steps::<S, E>(simd, &history, count, step_s);
             regressors.set(case, layout, points);
-            let next = first + count;
-            let next_count = if next < samples { length(next) } else { 0 };
-            let next_points = Strided {
-                first: 2 * stride * next.min(samples - 1),
-                stride,
-            };
-            build_up.set(case, &self.terms, next_points);
-            let mut trajectory =
-                Trajectory::new(case, &build_up, next_history, x, next_points, next_count);
             let mut propagation = Propagation {
                 simd,
                 layout,
                 regressors: &regressors,
                 sensitivities: S::as_mut_simd_f64s(sensitivities).0,
                 rows: rows.reborrow(),
-                history,
+                history: &history,
                 propagators: &propagators,
                 count,
                 correction: NoUpdate,
@@ -194,10 +169,8 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
                 first: stride * first,
                 stride,
             };
-            let outputs = &self.outputs[first..next];
-            self.sink
-                .take(simd, samples, outputs, rows.reborrow(), &mut trajectory);
-            x = trajectory.finish();
+            let outputs = &self.outputs[first..first + count];
+            self.sink.take(simd, samples, outputs, rows.reborrow());
         }
         Ok(())
     }

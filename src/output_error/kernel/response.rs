@@ -7,7 +7,6 @@ use super::chunk_rows::ChunkRows;
 use super::normal_equations::{NormalAccumulator, NormalSums};
 use super::pass::{Diverged, Sink};
 use crate::dynamics::{Equations, OUTPUTS};
-use crate::numerics::vectors::row_products::Interleaved;
 use crate::numerics::vectors::simd::AlignedBuffer;
 use crate::output_error::case::Case;
 use crate::output_error::case::blocks::samples_per_block;
@@ -74,7 +73,6 @@ impl Sink for SensitivityRecorder<'_> {
         samples: Strided,
         outputs: &[[f64; OUTPUTS]],
         rows: ChunkRows,
-        _: &mut impl Interleaved,
     ) {
         let width = self.sensitivities.width;
         let kept = self.sensitivities.rows.slice_mut();
