@@ -47,6 +47,9 @@ pub trait Equations<const NX: usize> {
     const RATES_BY_STATE: &'static [(usize, usize)];
     /// Entries (rate, coefficient) of the slopes that can differ from zero.
     const RATES_BY_COEFFICIENT: &'static [(usize, usize)];
+    /// `true` at these entries: known to the compiler where a list would be read from memory.
+    const HAS_SLOPE_BY_STATE: [[bool; NX]; NX] = marked(Self::RATES_BY_STATE);
+    const HAS_SLOPE_BY_COEFFICIENT: [[bool; COEFFICIENTS]; NX] = marked(Self::RATES_BY_COEFFICIENT);
     /// Entries (output, state) and (output, coefficient) of the slopes that can differ from zero.
     const OUTPUTS_BY_STATE: &'static [(usize, usize)];
     const OUTPUTS_BY_COEFFICIENT: &'static [(usize, usize)];
@@ -87,4 +90,16 @@ pub trait Equations<const NX: usize> {
         x: &SVector<f64, NX>,
         c: &[f64; COEFFICIENTS],
     ) -> Outputs<NX>;
+}
+
+/// Matrix that is `true` at the entries of a list, (row, column).
+const fn marked<const ROWS: usize, const COLUMNS: usize>(
+    entries: &[(usize, usize)],
+) -> [[bool; COLUMNS]; ROWS] {
+    let (mut marked, mut rest) = ([[false; COLUMNS]; ROWS], entries);
+    while let [(row, column), others @ ..] = rest {
+        marked[*row][*column] = true;
+        rest = others;
+    }
+    marked
 }

@@ -31,21 +31,24 @@ pub fn weights_s(step_s: f64) -> [f64; STAGES] {
 
 /// State after one step of `step_s` from `x`. `slope(stage, x)` returns the rate at a stage, and
 /// `plus(x, slope, h)` returns x + h slope.
+///
+/// The stages are written out, so that the compiler knows the number of each.
 #[inline(always)]
-pub fn step<X: Clone>(
+pub fn step<X>(
     x: &X,
     step_s: f64,
     mut slope: impl FnMut(usize, &X) -> X,
     plus: impl Fn(&X, &X, f64) -> X,
 ) -> X {
-    let (mut at, mut end) = (x.clone(), x.clone());
-    let stages = reaches_s(step_s).into_iter().zip(weights_s(step_s));
-    for (stage, (reach, weight)) in stages.enumerate() {
-        let rate = slope(stage, &at);
-        end = plus(&end, &rate, weight);
-        at = plus(x, &rate, reach);
-    }
-    end
+    let (reaches, weights) = (reaches_s(step_s), weights_s(step_s));
+    let rate = slope(0, x);
+    let (at, end) = (plus(x, &rate, reaches[0]), plus(x, &rate, weights[0]));
+    let rate = slope(1, &at);
+    let (at, end) = (plus(x, &rate, reaches[1]), plus(&end, &rate, weights[1]));
+    let rate = slope(2, &at);
+    let (at, end) = (plus(x, &rate, reaches[2]), plus(&end, &rate, weights[2]));
+    let rate = slope(3, &at);
+    plus(&end, &rate, weights[3])
 }
 
 #[cfg(test)]

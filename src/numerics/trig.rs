@@ -115,7 +115,12 @@ fn near_zero(r: [f64; 2]) -> [(f64, f64); 2] {
     let zz = times(z, z);
     // Sine: r + z r p; cosine: 1 − z/2 + z² p.
     let factor = [r[0], r[1], z[0], z[1]];
-    let start = fused([1.0, 1.0, -0.5, -0.5], factor, [0.0, 0.0, 1.0, 1.0]);
+    let start = [
+        r[0],
+        r[1],
+        (-0.5_f64).mul_add(z[0], 1.0),
+        (-0.5_f64).mul_add(z[1], 1.0),
+    ];
     let both = fused(times(z, factor), polynomial(z, zz), start);
     [(both[0], both[2]), (both[1], both[3])]
 }

@@ -109,9 +109,14 @@ impl<const NX: usize> Propagators<NX> {
                     simd.mul_f64s(last, b),
                 );
             }
-            for &(i, j) in E::RATES_BY_STATE {
-                product[i][j] = simd.mul_f64s(last, load::<S>(&history.a[STAGES - 1][i][j], at));
-                phi[i][j] = product[i][j];
+            for i in 0..NX {
+                for j in 0..NX {
+                    if E::HAS_SLOPE_BY_STATE[i][j] {
+                        let a = load::<S>(&history.a[STAGES - 1][i][j], at);
+                        product[i][j] = simd.mul_f64s(last, a);
+                        phi[i][j] = product[i][j];
+                    }
+                }
             }
             for stage in (0..STAGES - 1).rev() {
                 let reach = simd.splat_f64s(reaches[stage]);
@@ -121,8 +126,8 @@ impl<const NX: usize> Propagators<NX> {
                         m[i][j] = simd.mul_add_f64s(reach, product[i][j], diagonal);
                     }
                 }
-                product = times_a(simd, &m, history, stage, at);
-                self.set_gammas(simd, &m, history, stage, at);
+                product = times_a::<S, NX, E>(simd, &m, history, stage, at);
+                self.set_gammas::<S, E>(simd, &m, history, stage, at);
                 for i in 0..NX {
                     for j in 0..NX {
                         phi[i][j] = simd.add_f64s(phi[i][j], product[i][j]);
@@ -140,7 +145,7 @@ impl<const NX: usize> Propagators<NX> {
 
     /// Computes Γ = M B of a stage.
     #[inline(always)]
-    fn set_gammas<S: Simd>(
+    fn set_gammas<S: Simd, E: Equations<NX>>(
         &mut self,
         simd: S,
         m: &[[S::f64s; NX]; NX],
@@ -152,8 +157,10 @@ impl<const NX: usize> Propagators<NX> {
             let mut gamma = [simd.splat_f64s(0.0); NX];
             for i in 0..NX {
                 for l in 0..NX {
-                    let b = load::<S>(&history.b[stage][l][k], at);
-                    gamma[i] = simd.mul_add_f64s(m[i][l], b, gamma[i]);
+                    if E::HAS_SLOPE_BY_COEFFICIENT[l][k] {
+                        let b = load::<S>(&history.b[stage][l][k], at);
+                        gamma[i] = simd.mul_add_f64s(m[i][l], b, gamma[i]);
+                    }
                 }
                 store::<S>(&mut self.gamma[stage][k][i], at, gamma[i]);
             }
@@ -163,7 +170,7 @@ impl<const NX: usize> Propagators<NX> {
 
 /// Product M A of a stage.
 #[inline(always)]
-fn times_a<S: Simd, const NX: usize>(
+fn times_a<S: Simd, const NX: usize, E: Equations<NX>>(
     simd: S,
     m: &[[S::f64s; NX]; NX],
     history: &StageHistory<NX>,
@@ -174,8 +181,10 @@ fn times_a<S: Simd, const NX: usize>(
     for i in 0..NX {
         for j in 0..NX {
             for l in 0..NX {
-                let a = load::<S>(&history.a[stage][l][j], at);
-                product[i][j] = simd.mul_add_f64s(m[i][l], a, product[i][j]);
+                if E::HAS_SLOPE_BY_STATE[l][j] {
+                    let a = load::<S>(&history.a[stage][l][j], at);
+                    product[i][j] = simd.mul_add_f64s(m[i][l], a, product[i][j]);
+                }
             }
         }
     }

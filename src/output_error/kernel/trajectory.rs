@@ -127,10 +127,11 @@ impl<'a, const NX: usize, E: Equations<NX>> Trajectory<'a, NX, E> {
         for &(i, j) in E::RATES_BY_COEFFICIENT {
             history.b[stage][i][j][k] = rates.by_coefficient[(i, j)];
         }
-        // All entries: a list of those that can differ from zero would be read from memory.
         for i in 0..NX {
             for j in 0..NX {
-                history.a[stage][i][j][k] = a[(i, j)];
+                if E::HAS_SLOPE_BY_STATE[i][j] {
+                    history.a[stage][i][j][k] = a[(i, j)];
+                }
             }
         }
         set_factors::<NX, E>(
