@@ -26,11 +26,10 @@ use crate::output_error::case::Case;
 use crate::output_error::case::build_up::ValuedTerm;
 use crate::output_error::case::chunking::{CHUNK, Strided};
 use crate::output_error::case::layout::LaneLayout;
-use crate::output_error::kernel::chunk_build_up::ChunkBuildUp;
-use crate::output_error::kernel::chunk_regressors::ChunkRegressors;
 use crate::output_error::kernel::chunk_rows::ChunkRows;
 use crate::output_error::kernel::normal_equations::NormalSums;
-use crate::output_error::kernel::pass::{Diverged, MeasurementUpdate, Propagation};
+use crate::output_error::kernel::pass::Diverged;
+use crate::output_error::kernel::propagation::{ChunkMemory, MeasurementUpdate};
 use crate::output_error::kernel::propagators::Propagators;
 use crate::output_error::kernel::trajectory::{
     StageHistory, Trajectory, is_out_of_bounds, set_factors,
@@ -119,7 +118,7 @@ pub(super) struct PassOutputs<'a> {
 
 /// Consumer of the steps and of the rows of whitened sensitivities.
 pub(super) trait RowSink<const NX: usize> {
-    /// Takes the steps of some samples of a chunk, before their rows.
+    /// Takes the steps of some samples of a chunk, after their rows.
     fn take_steps(&mut self, history: &StageHistory<NX>, steps: &Propagators<NX>, samples: usize);
 
     /// Takes the rows of a chunk that begins at the sample `first`. `white` has the whitened
@@ -397,13 +396,7 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink<NX>> WithSimd for FilterPass<'_
     fn with_simd<S: Simd>(mut self, simd: S) -> Result<(), Diverged> {
         let (case, layout) = (self.case, self.layout);
         let samples = case.samples();
-        let mut rows = AlignedBuffer::zeros(ChunkRows::length(layout.width()));
-        let mut rows = ChunkRows::new(rows.slice_mut());
-        let mut regressors = AlignedBuffer::zeros(ChunkRegressors::length(layout));
-        let mut regressors = ChunkRegressors::new(regressors.slice_mut());
-        let mut build_up = ChunkBuildUp::<NX>::ZERO;
-        let mut history = StageHistory::<NX>::EMPTY;
-        let mut propagators = Propagators::<NX>::ZERO;
+        let mut memory = ChunkMemory::new(layout, self.start_sensitivities);
         let mut chunk = ChunkUpdates::<NX, E>::new(self.corrections, layout);
         let mut x = self.start;
         for first in (0..samples).step_by(CHUNK) {
@@ -412,17 +405,20 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink<NX>> WithSimd for FilterPass<'_
                 first: 2 * first,
                 stride: 1,
             };
-            build_up.set(case, &self.terms, points);
-            let mut trajectory = Trajectory::new(case, &build_up, &mut history, points);
+            memory.build_up.set(case, &self.terms, points);
+            let mut trajectory =
+                Trajectory::new(case, &memory.build_up, &mut memory.history, points);
             for k in 0..count {
                 let sample = first + k;
                 if is_out_of_bounds(&x) {
                     return Err(Diverged { sample });
                 }
                 let mut y = if self.sink.is_some() {
-                    propagators.read_outputs(case, &build_up, &x, sample, k)
+                    memory
+                        .propagators
+                        .read_outputs(case, &memory.build_up, &x, sample, k)
                 } else {
-                    let c = build_up.coefficients::<E>(2 * k, &x);
+                    let c = memory.build_up.coefficients::<E>(2 * k, &x);
                     let inputs = (
                         &case.motion.rate_inputs[2 * sample],
                         &case.motion.sensor_inputs[sample],
@@ -446,27 +442,14 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink<NX>> WithSimd for FilterPass<'_
             let Some(sink) = self.sink.as_deref_mut() else {
                 continue;
             };
-            propagators.set_steps::<S, E>(simd, &history, count, case.step_s);
-            sink.take_steps(&history, &propagators, count);
-            regressors.set(case, layout, points);
-            let mut propagation = Propagation {
-                simd,
-                layout,
-                regressors: &regressors,
-                sensitivities: S::as_mut_simd_f64s(self.start_sensitivities.slice_mut()).0,
-                rows: rows.reborrow(),
-                history: &history,
-                propagators: &propagators,
-                count,
-                correction: &chunk,
-            };
-            propagation.run::<E>();
             let white = &self.outputs.whitened[first..first + count];
             let used = |k: usize| {
                 let pattern = usize::from(chunk.patterns[k]);
                 &self.corrections.patterns[pattern].used
             };
-            sink.take(simd, first, white, used, rows.reborrow());
+            let rows = memory.propagate(simd, (case, layout), (points, count), &chunk);
+            sink.take(simd, first, white, used, rows);
+            sink.take_steps(&memory.history, &memory.propagators, count);
         }
         Ok(())
     }

@@ -39,14 +39,6 @@ impl<'a> ChunkRows<'a> {
         ChunkRows { values }
     }
 
-    /// Borrows the same rows for a shorter time.
-    #[inline(always)]
-    pub fn reborrow(&mut self) -> ChunkRows<'_> {
-        ChunkRows {
-            values: self.values,
-        }
-    }
-
     #[inline(always)]
     fn index(sample: usize, output: usize, lane: usize) -> usize {
         lane / VECTOR * OF_VECTOR + output * STRIP + sample * VECTOR + lane % VECTOR
