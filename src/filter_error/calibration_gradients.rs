@@ -9,8 +9,8 @@ use pulp::Arch;
 
 use super::error_propagation::{ABREAST, ErrorPropagation, OutputErrors, inputs_in_error};
 use super::filter::Filter;
-use super::pass::RecordedPass;
 use super::response::FilterResponse;
+use super::row_sinks::RecordedPass;
 use super::signal_slopes::{NodeEquations, Recorded};
 use crate::dynamics::{InGusts, OUTPUTS};
 use crate::numerics::linear_algebra::matrix::AlignedMatrix;

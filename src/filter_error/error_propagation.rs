@@ -25,7 +25,7 @@ use nalgebra::SMatrix;
 use pulp::{Simd, WithSimd};
 
 use super::gains::{Pattern, PatternGain};
-use super::pass::RecordedStep;
+use super::row_sinks::RecordedStep;
 use super::signal_slopes::RatesAndOutputs;
 use crate::dynamics::{Equations, InGusts, OUTPUTS};
 use crate::numerics::linear_algebra::matrix::AlignedMatrix;

@@ -14,9 +14,11 @@ use super::gain_computation::GainComputation;
 use super::gains::{Pattern, PatternGain, patterns};
 use super::input_process_noise::InputNoise;
 use super::linearised::Linearised;
+use super::measurement_updates::{LaneBlocks, MeasurementUpdates, gain_slopes};
 use super::noise::{Noise, NoiseParameter, NoisePrior};
-use super::pass::{FilterPass, LaneBlocks, MeasurementUpdates, PassOutputs, RowSink, gain_slopes};
+use super::pass::{FilterPass, PassOutputs};
 use super::response::FilterResponse;
+use super::row_sinks::RowSink;
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::ManeuverSignals;
 use crate::dynamics::{InGusts, OUTPUTS};
@@ -226,11 +228,11 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         let mut gain = PatternGain::none();
         gain.gain[(E::ANGLE, E::VANE)] = RAD * self.noise(parameters).angle_gain(E::VANE);
         let gains = vec![gain; self.patterns.len()];
-        let mut corrections = self.measurement_updates(parameters, &gains);
-        corrections.decay = 0.0;
+        let mut updates = self.measurement_updates(parameters, &gains);
+        updates.decay = 0.0;
         let mut response = FilterResponse::empty(self.samples(), self.parameters());
         let no_sums = None::<&mut NormalSums>;
-        self.run_on(&self.case, parameters, &corrections, &mut response, no_sums)?;
+        self.run_on(&self.case, parameters, &updates, &mut response, no_sums)?;
         Ok(response.predicted)
     }
 
@@ -241,8 +243,8 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         response: &mut FilterResponse,
         sink: Option<&mut K>,
     ) -> Result<(), Diverged> {
-        let corrections = self.measurement_updates(parameters, gains);
-        self.run_on(&self.case, parameters, &corrections, response, sink)
+        let updates = self.measurement_updates(parameters, gains);
+        self.run_on(&self.case, parameters, &updates, response, sink)
     }
 
     /// Runs a pass on a case of the same maneuver, whose instruments may be in error.
@@ -250,7 +252,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
         &self,
         case: &Case<NX, E>,
         parameters: &[f64],
-        corrections: &MeasurementUpdates<NX>,
+        updates: &MeasurementUpdates<NX>,
         response: &mut FilterResponse,
         sink: Option<&mut K>,
     ) -> Result<(), Diverged> {
@@ -260,7 +262,7 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
             terms: case.valued_terms(parameters).collect(),
             start: self.start(parameters),
             start_sensitivities: self.start_sensitivities(),
-            corrections,
+            updates,
             outputs: PassOutputs {
                 predicted: &mut response.predicted,
                 innovations: &mut response.innovations,

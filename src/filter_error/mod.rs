@@ -26,6 +26,8 @@
 //! | `gains` | gain and covariance of the innovations for each pattern of missing outputs |
 //! | `gain_computation` | gains for given parameters, with their slopes along all of them |
 //! | `reference` | one pass in plain scalar code, which the tests compare with `pass`: read it first |
+//! | `measurement_updates` | corrections of states and sensitivities between two steps |
+//! | `row_sinks` | receivers of the rows of a pass: sums, or a record of them |
 //! | `pass` | one pass: innovations and their sensitivities, in the kernel of output error |
 //! | [`response`] | result of a pass: cost, gradient and information |
 //! | [`filter`] | a maneuver prepared |
@@ -47,6 +49,7 @@ mod gains;
 mod input_process_noise;
 pub mod joint_filter;
 mod linearised;
+mod measurement_updates;
 pub mod noise;
 mod pass;
 mod quadratic_model;
@@ -54,6 +57,7 @@ mod quadratic_model;
 mod reference;
 pub mod response;
 mod riccati;
+mod row_sinks;
 pub mod scoring;
 pub mod signal_slopes;
 pub mod slopes;

@@ -1,11 +1,5 @@
 //! One pass of the filter over a maneuver, in the kernel of output error. The steps are the same,
 //! with a correction of states and sensitivities between them.
-//!
-//! Let s and y be the sensitivities of the predicted state and outputs to one parameter. Let v be
-//! the innovations, and d a slope along the parameter. The corrected state x̃ then has, after the
-//! decay T of the rotary gusts, the sensitivity T (s − K y + dK v) + dT x̃. K y has a minus sign
-//! because an innovation falls as its prediction rises. The sums receive L⁻¹ y and L⁻¹ v. With S =
-//! L Lᵀ the covariance of the innovations, L⁻¹ v is white with unit variance.
 #![expect(
     clippy::inline_always,
     reason = "compiled into one loop for the processor at hand"
@@ -15,97 +9,20 @@
     reason = "plain indices become straight code for the vectors"
 )]
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SVector;
 use pulp::{Simd, WithSimd};
 
-use super::gains::{Pattern, PatternGain};
+use super::measurement_updates::{ChunkUpdates, MeasurementUpdates};
+use super::row_sinks::RowSink;
 use crate::dynamics::{InGusts, OUTPUTS};
-use crate::numerics::linear_algebra::matrix::AlignedMatrix;
-use crate::numerics::vectors::simd::{AlignedBuffer, VECTOR};
+use crate::numerics::vectors::simd::AlignedBuffer;
 use crate::output_error::case::Case;
 use crate::output_error::case::build_up::ValuedTerm;
 use crate::output_error::case::chunking::{CHUNK, Strided};
 use crate::output_error::case::layout::LaneLayout;
-use crate::output_error::kernel::chunk_rows::ChunkRows;
-use crate::output_error::kernel::normal_equations::NormalSums;
 use crate::output_error::kernel::pass::Diverged;
-use crate::output_error::kernel::propagation::{ChunkMemory, MeasurementUpdate};
-use crate::output_error::kernel::propagators::Propagators;
-use crate::output_error::kernel::trajectory::{
-    StageHistory, Trajectory, is_out_of_bounds, set_factors,
-};
-
-/// Rows of numbers in the lanes of the parameters. They are stored vector by vector, and for each
-/// of the widest vectors row by row.
-pub(super) struct LaneBlocks {
-    values: AlignedBuffer,
-    rows: usize,
-}
-
-impl LaneBlocks {
-    pub fn zeros(rows: usize, width: usize) -> Self {
-        LaneBlocks {
-            values: AlignedBuffer::zeros(rows * width),
-            rows,
-        }
-    }
-
-    pub fn set(&mut self, row: usize, lane: usize, value: f64) {
-        let block = lane / VECTOR * self.rows;
-        self.values.slice_mut()[(block + row) * VECTOR + lane % VECTOR] = value;
-    }
-
-    /// Rows of the vector at a lane, every [`step_of_rows`] vectors.
-    #[inline(always)]
-    fn at_lane<S: Simd>(&self, lane: usize) -> &[S::f64s] {
-        let length = self.rows * VECTOR;
-        let block = &self.values.slice()[lane / VECTOR * length..][..length];
-        &S::as_simd_f64s(block).0[lane % VECTOR / S::F64_LANES..]
-    }
-}
-
-/// Distance between the rows of a block, in vectors.
-#[inline(always)]
-const fn step_of_rows<S: Simd>() -> usize {
-    VECTOR / S::F64_LANES
-}
-
-/// Slopes of the gains in the lanes of the parameters: pattern by pattern, state by state, output by
-/// output.
-pub(super) fn gain_slopes<const NX: usize>(
-    gains: &[PatternGain<NX>],
-    layout: &LaneLayout,
-) -> LaneBlocks {
-    let mut slopes = LaneBlocks::zeros(gains.len() * NX * OUTPUTS, layout.width());
-    for (pattern, gain) in gains.iter().enumerate() {
-        for slope in &gain.slopes {
-            let lane = layout.parameter_lanes[slope.parameter];
-            for i in 0..NX {
-                for o in 0..OUTPUTS {
-                    let row = (pattern * NX + i) * OUTPUTS + o;
-                    slopes.set(row, lane, slope.gain[(i, o)]);
-                }
-            }
-        }
-    }
-    slopes
-}
-
-/// Values of a pass that do not change within it.
-pub(super) struct MeasurementUpdates<'a, const NX: usize> {
-    /// Gain of each pattern.
-    pub gains: &'a [PatternGain<NX>],
-    pub gain_slopes: LaneBlocks,
-    pub patterns: &'a [Pattern],
-    /// Pattern of each sample.
-    pub pattern_of: &'a [u8],
-    pub biases: [f64; OUTPUTS],
-    /// Lanes of the biases: output by output, one where a bias shifts the output.
-    pub bias_rows: LaneBlocks,
-    /// Share of a rotary gust that remains after a step, and its slope in each lane.
-    pub decay: f64,
-    pub decay_row: LaneBlocks,
-}
+use crate::output_error::kernel::propagation::ChunkMemory;
+use crate::output_error::kernel::trajectory::{Trajectory, is_out_of_bounds};
 
 /// Results of a pass besides the sums, to which it appends sample by sample.
 pub(super) struct PassOutputs<'a> {
@@ -116,109 +33,6 @@ pub(super) struct PassOutputs<'a> {
     pub whitened: &'a mut Vec<[f64; OUTPUTS]>,
 }
 
-/// Consumer of the steps and of the rows of whitened sensitivities.
-pub(super) trait RowSink<const NX: usize> {
-    /// Takes the steps of some samples of a chunk, after their rows.
-    fn take_steps(&mut self, history: &StageHistory<NX>, steps: &Propagators<NX>, samples: usize);
-
-    /// Takes the rows of a chunk that begins at the sample `first`. `white` has the whitened
-    /// innovations, and `used` the outputs that count.
-    fn take<'a, S: Simd>(
-        &mut self,
-        simd: S,
-        first: usize,
-        white: &[[f64; OUTPUTS]],
-        used: impl Fn(usize) -> &'a [bool; OUTPUTS],
-        rows: ChunkRows,
-    );
-}
-
-impl<const NX: usize> RowSink<NX> for NormalSums {
-    #[inline(always)]
-    fn take_steps(&mut self, _: &StageHistory<NX>, _: &Propagators<NX>, _: usize) {}
-
-    #[inline(always)]
-    fn take<'a, S: Simd>(
-        &mut self,
-        simd: S,
-        first: usize,
-        white: &[[f64; OUTPUTS]],
-        used: impl Fn(usize) -> &'a [bool; OUTPUTS],
-        mut rows: ChunkRows,
-    ) {
-        self.complete_rows(white.len(), &mut rows, |k| (white[k], used(k)));
-        self.add_rows(simd, first, white.len(), &rows);
-    }
-}
-
-/// One step of a filter along its own trajectory.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct RecordedStep<const NX: usize> {
-    /// Corrected state, from which the step begins.
-    pub corrected: SVector<f64, NX>,
-    /// Matrix Φ: change of the next predicted state with the corrected one.
-    pub transition: SMatrix<f64, NX, NX>,
-    /// Matrix C: change of the outputs with the predicted state.
-    pub outputs: SMatrix<f64, OUTPUTS, NX>,
-}
-
-/// Steps and rows of all samples of a pass.
-pub(super) struct RecordedPass<const NX: usize> {
-    pub steps: Vec<RecordedStep<NX>>,
-    /// Whitened sensitivities in the lanes of the parameters: sample by sample, output by output;
-    /// zero where an output does not count.
-    pub rows: AlignedMatrix,
-}
-
-impl<const NX: usize> RecordedPass<NX> {
-    pub fn new(samples: usize, width: usize) -> Self {
-        RecordedPass {
-            steps: Vec::with_capacity(samples),
-            rows: AlignedMatrix::zeros(samples * OUTPUTS, width),
-        }
-    }
-}
-
-impl<const NX: usize> RowSink<NX> for RecordedPass<NX> {
-    #[inline(always)]
-    fn take_steps(&mut self, history: &StageHistory<NX>, steps: &Propagators<NX>, samples: usize) {
-        for k in 0..samples {
-            let mut step = RecordedStep {
-                corrected: history.states[k],
-                transition: SMatrix::zeros(),
-                outputs: SMatrix::zeros(),
-            };
-            for j in 0..NX {
-                for i in 0..NX {
-                    step.transition[(i, j)] = steps.phi[i][j][k];
-                }
-                for o in 0..OUTPUTS {
-                    step.outputs[(o, j)] = steps.c[o][j][k];
-                }
-            }
-            self.steps.push(step);
-        }
-    }
-
-    #[inline(always)]
-    fn take<'a, S: Simd>(
-        &mut self,
-        _: S,
-        first: usize,
-        white: &[[f64; OUTPUTS]],
-        used: impl Fn(usize) -> &'a [bool; OUTPUTS],
-        rows: ChunkRows,
-    ) {
-        let width = self.rows.width();
-        for k in 0..white.len() {
-            for o in (0..OUTPUTS).filter(|o| used(k)[*o]) {
-                let to = ((first + k) * OUTPUTS + o) * width;
-                rows.copy_to(k, o, &mut self.rows.values_mut()[to..][..width]);
-            }
-        }
-    }
-}
-
 /// One pass; without a sink no sensitivities are computed.
 pub(super) struct FilterPass<'a, const NX: usize, E: InGusts<NX>, K: RowSink<NX>> {
     pub case: &'a Case<NX, E>,
@@ -227,166 +41,9 @@ pub(super) struct FilterPass<'a, const NX: usize, E: InGusts<NX>, K: RowSink<NX>
     pub start: SVector<f64, NX>,
     /// Sensitivities of the first state: state by state a row of lanes.
     pub start_sensitivities: AlignedBuffer,
-    pub corrections: &'a MeasurementUpdates<'a, NX>,
+    pub updates: &'a MeasurementUpdates<'a, NX>,
     pub outputs: PassOutputs<'a>,
     pub sink: Option<&'a mut K>,
-}
-
-/// Measurement updates at the samples of one chunk.
-struct ChunkUpdates<'a, const NX: usize, E> {
-    corrections: &'a MeasurementUpdates<'a, NX>,
-    /// Slots of products of a state: (slot, state).
-    products: &'a [(usize, usize)],
-    /// Factors of the first vector's regressors at the predicted states.
-    factors: [[f64; VECTOR]; CHUNK],
-    innovations: [[f64; OUTPUTS]; CHUNK],
-    patterns: [u8; CHUNK],
-    /// Rotary gusts of the corrected states.
-    gusts: [[f64; NX]; CHUNK],
-    equations: std::marker::PhantomData<E>,
-}
-
-/// Rows of the measurement updates in some vectors of lanes.
-struct UpdateLanes<'l, S: Simd, const N: usize> {
-    gain_slopes: [&'l [S::f64s]; N],
-    biases: [&'l [S::f64s]; N],
-    decay_slopes: [&'l [S::f64s]; N],
-}
-
-impl<const NX: usize, E: InGusts<NX>> MeasurementUpdate<NX> for &ChunkUpdates<'_, NX, E> {
-    type Lanes<'l, S: Simd, const N: usize>
-        = UpdateLanes<'l, S, N>
-    where
-        Self: 'l;
-
-    #[inline(always)]
-    fn in_lanes<S: Simd, const N: usize>(&self, lanes: [usize; N]) -> UpdateLanes<'_, S, N> {
-        let corrections = self.corrections;
-        let mut found = UpdateLanes {
-            gain_slopes: [&[][..]; N],
-            biases: [&[][..]; N],
-            decay_slopes: [&[][..]; N],
-        };
-        for n in 0..N {
-            found.gain_slopes[n] = corrections.gain_slopes.at_lane::<S>(lanes[n]);
-            found.biases[n] = corrections.bias_rows.at_lane::<S>(lanes[n]);
-            found.decay_slopes[n] = corrections.decay_row.at_lane::<S>(lanes[n]);
-        }
-        found
-    }
-
-    #[inline(always)]
-    fn output_factors(&self, k: usize) -> Option<&[f64; VECTOR]> {
-        Some(&self.factors[k])
-    }
-
-    #[inline(always)]
-    fn correct<S: Simd, const N: usize>(
-        &self,
-        simd: S,
-        k: usize,
-        lanes: &UpdateLanes<'_, S, N>,
-        s: &mut [[S::f64s; NX]; N],
-        y: &mut [[S::f64s; OUTPUTS]; N],
-    ) {
-        let corrections = self.corrections;
-        let (pattern, step) = (usize::from(self.patterns[k]), step_of_rows::<S>());
-        let gain = &corrections.gains[pattern];
-        let rows = NX * OUTPUTS;
-        let mut slopes = lanes.gain_slopes;
-        for n in 0..N {
-            slopes[n] = &slopes[n][pattern * rows * step..][..=(rows - 1) * step];
-            let biases = &lanes.biases[n][..=(OUTPUTS - 1) * step];
-            for o in 0..OUTPUTS {
-                y[n][o] = simd.add_f64s(y[n][o], biases[o * step]);
-            }
-        }
-        for o in 0..OUTPUTS {
-            let v = simd.splat_f64s(self.innovations[k][o]);
-            // Sensitivities of the innovation.
-            let mut innovation = [v; N];
-            for n in 0..N {
-                innovation[n] = simd.neg_f64s(y[n][o]);
-            }
-            for i in 0..NX {
-                let gain = simd.splat_f64s(gain.gain[(i, o)]);
-                for n in 0..N {
-                    s[n][i] = simd.mul_add_f64s(slopes[n][(i * OUTPUTS + o) * step], v, s[n][i]);
-                    s[n][i] = simd.mul_add_f64s(gain, innovation[n], s[n][i]);
-                }
-            }
-        }
-        let decay = simd.splat_f64s(corrections.decay);
-        for n in 0..N {
-            let decay_slope = lanes.decay_slopes[n][0];
-            for &(rate, relative) in E::AIR_RELATIVE_RATES {
-                let gust = simd.sub_f64s(s[n][relative], s[n][rate]);
-                s[n][relative] = simd.mul_add_f64s(decay, gust, s[n][rate]);
-                let gust = simd.splat_f64s(self.gusts[k][relative]);
-                s[n][relative] = simd.mul_add_f64s(decay_slope, gust, s[n][relative]);
-            }
-        }
-        // From the last output on, as the first ones are read till the end.
-        for o in (0..OUTPUTS).rev() {
-            let mut white = [simd.splat_f64s(0.0); N];
-            for p in 0..=o {
-                let factor = simd.splat_f64s(gain.whitening[(o, p)]);
-                for n in 0..N {
-                    white[n] = simd.mul_add_f64s(factor, y[n][p], white[n]);
-                }
-            }
-            for n in 0..N {
-                y[n][o] = white[n];
-            }
-        }
-    }
-}
-
-impl<'a, const NX: usize, E: InGusts<NX>> ChunkUpdates<'a, NX, E> {
-    fn new(corrections: &'a MeasurementUpdates<'a, NX>, layout: &'a LaneLayout) -> Self {
-        ChunkUpdates {
-            corrections,
-            products: &layout.products,
-            factors: [[1.0; VECTOR]; CHUNK],
-            innovations: [[0.0; OUTPUTS]; CHUNK],
-            patterns: [0; CHUNK],
-            gusts: [[0.0; NX]; CHUNK],
-            equations: std::marker::PhantomData,
-        }
-    }
-
-    /// Corrects the predicted state of a sample with the outputs `y`, and returns it with its
-    /// whitened innovation.
-    #[inline(always)]
-    fn correct_state(
-        &mut self,
-        sample: usize,
-        k: usize,
-        x: &SVector<f64, NX>,
-        y: &[f64; OUTPUTS],
-        measured: &[f64; OUTPUTS],
-    ) -> (SVector<f64, NX>, [f64; OUTPUTS]) {
-        set_factors::<NX, E>(&mut self.factors[k], x, self.products);
-        let pattern = self.corrections.pattern_of[sample];
-        let used = &self.corrections.patterns[usize::from(pattern)].used;
-        let gain = &self.corrections.gains[usize::from(pattern)];
-        let (mut corrected, mut white) = (*x, [0.0; OUTPUTS]);
-        for o in 0..OUTPUTS {
-            let v = if used[o] { measured[o] - y[o] } else { 0.0 };
-            self.innovations[k][o] = v;
-            for i in 0..NX {
-                corrected[i] = gain.gain[(i, o)].mul_add(v, corrected[i]);
-            }
-            for p in 0..=o {
-                white[o] = gain.whitening[(o, p)].mul_add(self.innovations[k][p], white[o]);
-            }
-        }
-        self.patterns[k] = pattern;
-        for &(rate, relative) in E::AIR_RELATIVE_RATES {
-            self.gusts[k][relative] = corrected[relative] - corrected[rate];
-        }
-        (E::decayed(corrected, self.corrections.decay), white)
-    }
 }
 
 impl<const NX: usize, E: InGusts<NX>, K: RowSink<NX>> WithSimd for FilterPass<'_, NX, E, K> {
@@ -397,7 +54,7 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink<NX>> WithSimd for FilterPass<'_
         let (case, layout) = (self.case, self.layout);
         let samples = case.samples();
         let mut memory = ChunkMemory::new(layout, self.start_sensitivities);
-        let mut chunk = ChunkUpdates::<NX, E>::new(self.corrections, layout);
+        let mut chunk = ChunkUpdates::<NX, E>::new(self.updates, layout);
         let mut x = self.start;
         for first in (0..samples).step_by(CHUNK) {
             let count = CHUNK.min(samples - first);
@@ -426,7 +83,7 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink<NX>> WithSimd for FilterPass<'_
                     E::outputs(inputs.0, inputs.1, &x, &c).outputs.into()
                 };
                 for o in 0..OUTPUTS {
-                    y[o] += self.corrections.biases[o];
+                    y[o] += self.updates.biases[o];
                 }
                 let (corrected, white) =
                     chunk.correct_state(sample, k, &x, &y, &case.measurements.values[sample]);
@@ -445,7 +102,7 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink<NX>> WithSimd for FilterPass<'_
             let white = &self.outputs.whitened[first..first + count];
             let used = |k: usize| {
                 let pattern = usize::from(chunk.patterns[k]);
-                &self.corrections.patterns[pattern].used
+                &self.updates.patterns[pattern].used
             };
             let rows = memory.propagate(simd, (case, layout), (points, count), &chunk);
             sink.take(simd, first, white, used, rows);

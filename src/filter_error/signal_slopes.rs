@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
 
-use super::pass::RecordedStep;
+use super::row_sinks::RecordedStep;
 use crate::aero::Derivative;
 use crate::aircraft::Aircraft;
 use crate::dynamics::motion::ManeuverSignals;

@@ -3,8 +3,8 @@
 use nalgebra::DVector;
 
 use super::*;
-use crate::filter_error::pass::RecordedPass;
 use crate::filter_error::response::FilterResponse;
+use crate::filter_error::row_sinks::RecordedPass;
 use crate::filter_error::signal_slopes::Recorded;
 use crate::flight::signal;
 use crate::output_error::calibration_errors::SignalError;
@@ -69,9 +69,9 @@ fn shift_by_pass<const NX: usize, E: InGusts<NX>>(
         .case
         .as_recorded(&aircraft(), windows, measured, &held_start);
     let mut moved = FilterResponse::empty(filter.samples(), filter.parameters());
-    let corrections = filter.measurement_updates(at, &gains);
+    let updates = filter.measurement_updates(at, &gains);
     filter
-        .run_on(&case, at, &corrections, &mut moved, None::<&mut NormalSums>)
+        .run_on(&case, at, &updates, &mut moved, None::<&mut NormalSums>)
         .unwrap();
     let mut shift = DVector::zeros(filter.first_noise());
     let whitened = moved.whitened.iter().zip(&exact.whitened);
