@@ -92,13 +92,10 @@ impl<const NX: usize, E: InGusts<NX>> Filter<NX, E> {
     fn series(&self, response: &FilterResponse) -> Vec<BlockSeries> {
         let (sums, n) = (&response.sums, self.first_noise());
         let length = sums.samples_per_block();
-        let mut all = vec![0.0; self.parameters()];
         let series = (0..OUTPUTS).map(|o| {
             let squares = sums.squares(o).view((0, 0), (n, n)).into_owned();
             let sums_of = |samples: Range<usize>, row: &mut [f64]| {
-                let block = sums.block(samples.start / length, o, &mut all);
-                row[..n].copy_from_slice(&all[..n]);
-                block
+                sums.block(samples.start / length, o, &mut row[..n])
             };
             let samples = self.samples();
             BlockSeries::new(

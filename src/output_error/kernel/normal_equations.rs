@@ -106,8 +106,8 @@ impl NormalSums {
         self.samples_per_block
     }
 
-    /// Writes the sensitivities of an output to all parameters, summed over a block's samples that
-    /// count, and returns the other sums. All are zero after a coarse pass.
+    /// Writes the sensitivities of an output to the first parameters, as many as the row has room for,
+    /// summed over a block's samples that count. Returns the other sums. All are zero after a coarse pass.
     pub fn block(&self, block: usize, output: usize, row: &mut [f64]) -> BlockSums {
         let width = self.layout.width();
         let first = (block * OUTPUTS + output) * width;
