@@ -20,9 +20,11 @@ use crate::output_error::case::Case;
 use crate::output_error::case::build_up::ValuedTerm;
 use crate::output_error::case::chunking::{CHUNK, Strided};
 use crate::output_error::case::layout::LaneLayout;
+use crate::output_error::kernel::chunk_build_up::ChunkBuildUp;
 use crate::output_error::kernel::pass::Diverged;
-use crate::output_error::kernel::propagation::ChunkMemory;
-use crate::output_error::kernel::trajectory::{Trajectory, is_out_of_bounds};
+use crate::output_error::kernel::propagation::ChunkSensitivities;
+use crate::output_error::kernel::propagators::Propagators;
+use crate::output_error::kernel::trajectory::{StageHistory, Trajectory, is_out_of_bounds};
 
 /// Results of a pass besides the sums, to which it appends sample by sample.
 pub(super) struct PassOutputs<'a> {
@@ -53,7 +55,10 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink<NX>> WithSimd for FilterPass<'_
     fn with_simd<S: Simd>(mut self, simd: S) -> Result<(), Diverged> {
         let (case, layout) = (self.case, self.layout);
         let samples = case.samples();
-        let mut memory = ChunkMemory::new(layout, self.start_sensitivities);
+        let mut sensitivities = ChunkSensitivities::new(layout, self.start_sensitivities);
+        let mut build_up = ChunkBuildUp::<NX>::ZERO;
+        let mut history = StageHistory::<NX>::EMPTY;
+        let mut propagators = Propagators::<NX>::ZERO;
         let mut chunk = ChunkUpdates::<NX, E>::new(self.updates, layout);
         let mut x = self.start;
         for first in (0..samples).step_by(CHUNK) {
@@ -62,20 +67,17 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink<NX>> WithSimd for FilterPass<'_
                 first: 2 * first,
                 stride: 1,
             };
-            memory.build_up.set(case, &self.terms, points);
-            let mut trajectory =
-                Trajectory::new(case, &memory.build_up, &mut memory.history, points);
+            build_up.set(case, &self.terms, points);
+            let mut trajectory = Trajectory::new(case, &build_up, &mut history, points);
             for k in 0..count {
                 let sample = first + k;
                 if is_out_of_bounds(&x) {
                     return Err(Diverged { sample });
                 }
                 let mut y = if self.sink.is_some() {
-                    memory
-                        .propagators
-                        .read_outputs(case, &memory.build_up, &x, sample, k)
+                    propagators.read_outputs(case, &build_up, &x, sample, k)
                 } else {
-                    let c = memory.build_up.coefficients::<E>(2 * k, &x);
+                    let c = build_up.coefficients::<E>(2 * k, &x);
                     let inputs = (
                         &case.motion.rate_inputs[2 * sample],
                         &case.motion.sensor_inputs[sample],
@@ -104,9 +106,15 @@ impl<const NX: usize, E: InGusts<NX>, K: RowSink<NX>> WithSimd for FilterPass<'_
                 let pattern = usize::from(chunk.patterns[k]);
                 &self.updates.patterns[pattern].used
             };
-            let rows = memory.propagate(simd, (case, layout), (points, count), &chunk);
+            let rows = sensitivities.propagate(
+                simd,
+                (case, layout),
+                (points, count),
+                (&history, &mut propagators),
+                &chunk,
+            );
             sink.take(simd, first, white, used, rows);
-            sink.take_steps(&memory.history, &memory.propagators, count);
+            sink.take_steps(&history, &propagators, count);
         }
         Ok(())
     }

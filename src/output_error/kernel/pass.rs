@@ -1,8 +1,8 @@
 //! One pass over a maneuver: the states, and the sensitivities of all parameters beside them.
 //!
 //! A pass goes chunk by chunk. The [`Trajectory`] integrates the states and records the slopes of
-//! each stage. [`ChunkMemory::propagate`] then takes the sensitivities of all parameters through the
-//! recorded steps.
+//! each stage. [`ChunkSensitivities::propagate`] then takes the sensitivities of all parameters
+//! through the recorded steps.
 //!
 //! The loops are compiled for several widths of vectors and chosen when the program runs. Each lane
 //! is computed alike in all of them, with fused multiplication, so every width gives the same bits.
@@ -18,9 +18,11 @@
 use nalgebra::SVector;
 use pulp::{Arch, Simd, WithSimd};
 
+use super::chunk_build_up::ChunkBuildUp;
 use super::chunk_rows::ChunkRows;
-use super::propagation::{ChunkMemory, NoUpdate};
-use super::trajectory::{Trajectory, is_out_of_bounds};
+use super::propagation::{ChunkSensitivities, NoUpdate};
+use super::propagators::Propagators;
+use super::trajectory::{StageHistory, Trajectory, is_out_of_bounds};
 use crate::dynamics::{Equations, OUTPUTS};
 use crate::numerics::vectors::simd::AlignedBuffer;
 use crate::output_error::case::build_up::ValuedTerm;
@@ -115,8 +117,11 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
     fn with_simd<S: Simd>(self, simd: S) -> Result<(), Diverged> {
         let (case, layout, stride) = (self.case, &self.case.layout, self.stride);
         let samples = case.samples().div_ceil(stride);
-        let sensitivities = initial_sensitivities::<NX>(case.initial_state, layout);
-        let mut memory = ChunkMemory::new(layout, sensitivities);
+        let start = initial_sensitivities::<NX>(case.initial_state, layout);
+        let mut sensitivities = ChunkSensitivities::new(layout, start);
+        let mut build_up = ChunkBuildUp::<NX>::ZERO;
+        let mut history = StageHistory::<NX>::EMPTY;
+        let mut propagators = Propagators::<NX>::ZERO;
         let mut x = self.start;
         for first in (0..samples).step_by(CHUNK) {
             let count = CHUNK.min(samples - first);
@@ -124,23 +129,26 @@ impl<const NX: usize, E: Equations<NX>, K: Sink> WithSimd for Pass<'_, NX, E, K>
                 first: 2 * stride * first,
                 stride,
             };
-            memory.build_up.set(case, &self.terms, points);
-            let mut trajectory =
-                Trajectory::new(case, &memory.build_up, &mut memory.history, points);
+            build_up.set(case, &self.terms, points);
+            let mut trajectory = Trajectory::new(case, &build_up, &mut history, points);
             for k in 0..count {
                 let sample = stride * (first + k);
                 if is_out_of_bounds(&x) {
                     return Err(Diverged { sample });
                 }
-                let y = memory
-                    .propagators
-                    .read_outputs(case, &memory.build_up, &x, sample, k);
+                let y = propagators.read_outputs(case, &build_up, &x, sample, k);
                 for o in 0..OUTPUTS {
                     self.outputs[first + k][o] = y[o] + self.biases[o];
                 }
                 x = trajectory.record_step(k, &x);
             }
-            let rows = memory.propagate(simd, (case, layout), (points, count), NoUpdate);
+            let rows = sensitivities.propagate(
+                simd,
+                (case, layout),
+                (points, count),
+                (&history, &mut propagators),
+                NoUpdate,
+            );
             let samples = Strided {
                 first: stride * first,
                 stride,

@@ -15,7 +15,6 @@
 
 use pulp::Simd;
 
-use super::chunk_build_up::ChunkBuildUp;
 use super::chunk_regressors::ChunkRegressors;
 use super::chunk_rows::ChunkRows;
 use super::propagators::Propagators;
@@ -27,54 +26,47 @@ use crate::output_error::case::Case;
 use crate::output_error::case::chunking::Strided;
 use crate::output_error::case::layout::LaneLayout;
 
-/// Memory of a pass: the numbers of one chunk, which those of the next one overwrite.
-pub(crate) struct ChunkMemory<const NX: usize> {
-    pub build_up: ChunkBuildUp<NX>,
-    pub history: StageHistory<NX>,
-    pub propagators: Propagators<NX>,
+/// Sensitivities of a pass, and the memory in which they are propagated.
+pub(crate) struct ChunkSensitivities {
     regressors: AlignedBuffer,
     rows: AlignedBuffer,
     /// Sensitivities at the chunk's first sample: state by state a row of lanes.
-    sensitivities: AlignedBuffer,
+    states: AlignedBuffer,
 }
 
-impl<const NX: usize> ChunkMemory<NX> {
-    /// Memory of a pass with these sensitivities of the first state.
-    #[inline(always)]
-    pub fn new(layout: &LaneLayout, sensitivities: AlignedBuffer) -> Self {
-        ChunkMemory {
-            build_up: ChunkBuildUp::ZERO,
-            history: StageHistory::EMPTY,
-            propagators: Propagators::ZERO,
+impl ChunkSensitivities {
+    /// Sensitivities at the first sample of a pass.
+    pub fn new(layout: &LaneLayout, states: AlignedBuffer) -> Self {
+        ChunkSensitivities {
             regressors: AlignedBuffer::zeros(ChunkRegressors::length(layout)),
             rows: AlignedBuffer::zeros(ChunkRows::length(layout.width())),
-            sensitivities,
+            states,
         }
     }
 
-    /// Propagates the sensitivities through the recorded steps of the chunk's first `count` samples,
-    /// and returns the rows of its outputs.
+    /// Propagates the sensitivities through the recorded steps of a chunk's first `count` samples, and
+    /// returns the rows of the outputs.
     #[inline(always)]
-    pub fn propagate<S: Simd, E: Equations<NX>>(
+    pub fn propagate<const NX: usize, S: Simd, E: Equations<NX>>(
         &mut self,
         simd: S,
         (case, layout): (&Case<NX, E>, &LaneLayout),
         (points, count): (Strided, usize),
+        (history, propagators): (&StageHistory<NX>, &mut Propagators<NX>),
         update: impl MeasurementUpdate<NX>,
     ) -> ChunkRows<'_> {
         let step_s = points.stride as f64 * case.step_s;
-        self.propagators
-            .set_steps::<S, E>(simd, &self.history, count, step_s);
+        propagators.set_steps::<S, E>(simd, history, count, step_s);
         let mut regressors = ChunkRegressors::new(self.regressors.slice_mut());
         regressors.set(case, layout, points);
         let mut propagation = Propagation {
             simd,
             layout,
             regressors: &regressors,
-            sensitivities: S::as_mut_simd_f64s(self.sensitivities.slice_mut()).0,
+            sensitivities: S::as_mut_simd_f64s(self.states.slice_mut()).0,
             rows: ChunkRows::new(self.rows.slice_mut()),
-            history: &self.history,
-            propagators: &self.propagators,
+            history,
+            propagators,
             count,
             update,
         };
