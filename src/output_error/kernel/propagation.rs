@@ -45,7 +45,8 @@ impl ChunkSensitivities {
     }
 
     /// Propagates the sensitivities through the recorded steps of a chunk's first `count` samples, and
-    /// returns the rows of the outputs.
+    /// returns the rows of the outputs. History and propagators stay variables of the caller: in one
+    /// struct a store to one would make the compiler read the others again.
     #[inline(always)]
     pub fn propagate<const NX: usize, S: Simd, E: Equations<NX>>(
         &mut self,
